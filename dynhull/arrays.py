@@ -1,0 +1,137 @@
+"""Arrays of points as they come in: converted when that is exact, refused with the first bad row when it is not."""
+
+import math
+from collections.abc import Iterable
+from numbers import Number
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Points = npt.NDArray[np.float64]
+
+LARGEST_EXACT_INTEGER = 2**53
+
+
+def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
+    """Return `xy` as a C-contiguous float64 array of shape (n, 2) with finite entries and no negative zeros.
+
+    Raises:
+        ValueError: the shape is not (n, 2), an entry is not finite, or is no double (an integer beyond 2**53, say).
+        TypeError: an entry is not a real number.
+
+    The message names the first bad row.
+    """
+    array = _as_array(xy, name)
+    if array.ndim == 1 and array.size == 0:
+        return np.empty((0, 2))
+    if array.ndim != 2 or array.shape[1] != 2:
+        hint = f"; one point is [[{array[0]}, {array[1]}]]" if array.shape == (2,) else ""
+        raise ValueError(f"{name} must have shape (n, 2), got {array.shape}{hint}")
+    # Adding zero turns -0.0 into 0.0: they are the same point.
+    return np.ascontiguousarray(_finite(_as_double(array, name), name) + 0.0)
+
+
+def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
+    """Return `xy` as a float64 array of shape (..., 2), checked like `as_points`."""
+    array = _as_array(xy, name)
+    if array.ndim == 0 or array.shape[-1] != 2:
+        raise ValueError(f"{name} must have shape (..., 2), got {array.shape}")
+    flat = array.reshape(-1, 2)
+    return _finite(_as_double(flat, name), name).reshape(array.shape) + 0.0
+
+
+def as_coordinate(value: Any, name: str) -> float:
+    """Return one coordinate as a finite float, converted when exact."""
+    if type(value) is not float:
+        value = _as_double_scalar(value, name)
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {value!r}: coordinates must be finite")
+    return value + 0.0
+
+
+def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
+    """Return `ops` as int8 of shape (rows,), each +1 (insert) or -1 (delete)."""
+    array = np.asarray(ops)
+    if array.shape != (rows,):
+        raise ValueError(f"ops must have shape ({rows},) like the points, got {array.shape}")
+    if array.dtype.kind not in "iuf" and rows:
+        raise TypeError(f"ops must be numbers, got {array.dtype}")
+    bad = np.flatnonzero((array != 1) & (array != -1))
+    if bad.size:
+        raise ValueError(f"ops row {bad[0]} is {array[bad[0]]!s}: must be +1 (insert) or -1 (delete)")
+    return np.ascontiguousarray(array, dtype=np.int8)
+
+
+def _as_array(xy: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+    if isinstance(xy, Iterable) and not hasattr(xy, "__len__") and not hasattr(xy, "__array__"):
+        xy = list(xy)
+    try:
+        array = np.asarray(xy)
+    except ValueError:
+        for row, entry in enumerate(xy):  # type: ignore[arg-type]
+            if not hasattr(entry, "__len__") or len(entry) != 2:
+                raise ValueError(f"{name} row {row} is {entry!r}: must be two numbers") from None
+        raise
+    if array.dtype.kind in "USVMm":
+        raise TypeError(f"{name} row {_first_not_a_number(xy)}: coordinates must be real numbers, got {array.dtype}")
+    return array
+
+
+def _first_not_a_number(xy: Any) -> int:
+    """The row that made numpy choose a text, date or record type."""
+    for row, entry in enumerate(xy):
+        values = entry if hasattr(entry, "__len__") and not isinstance(entry, str | bytes) else [entry]
+        if not all(isinstance(value, Number) for value in values):
+            return row
+    return 0
+
+
+def _as_double(array: npt.NDArray[Any], name: str) -> Points:
+    """Convert an (n, 2) array to float64, refusing the first row that would not keep its value."""
+    kind = array.dtype.kind
+    if kind == "b" or array.dtype in (np.float16, np.float32, np.float64):
+        return np.asarray(array, dtype=np.float64)
+    if kind in "iu":
+        large = (array > LARGEST_EXACT_INTEGER) | (array < -LARGEST_EXACT_INTEGER)
+        doubtful = np.flatnonzero(large.any(axis=1))
+    elif kind in "fc":  # wider than a double, or complex: right where it comes back the same
+        with np.errstate(over="ignore"):
+            same = (array.real.astype(np.float64) == array) | np.isnan(array)
+        doubtful = np.flatnonzero(~same.all(axis=1))
+        if doubtful.size:
+            row = doubtful[0]
+            raise ValueError(f"{name} row {row} is {_text(array[row])}: not exactly a pair of doubles")
+        return array.real.astype(np.float64)
+    else:
+        doubtful = np.arange(len(array))
+    for row in doubtful.tolist():
+        for value in array[row].tolist():
+            _as_double_scalar(value, f"{name} row {row}")
+    return array.astype(np.float64)
+
+
+def _as_double_scalar(value: Any, name: str) -> float:
+    if not isinstance(value, Number) and not hasattr(value, "__float__"):
+        raise TypeError(f"{name}: coordinates must be real numbers, got {value!r}")
+    try:
+        double = float(value.real if isinstance(value, complex) and value.imag == 0 else value)
+    except OverflowError:
+        raise ValueError(f"{name} is {value!r}: too large for a double") from None
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: coordinates must be real numbers, got {value!r}") from None
+    if double != value and not math.isnan(double):
+        raise ValueError(f"{name} is {value!r}: no double has this value")
+    return double
+
+
+def _finite(array: Points, name: str) -> Points:
+    finite = np.isfinite(array)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=-1))[0])
+        raise ValueError(f"{name} row {row} is {_text(array[row])}: coordinates must be finite")
+    return array
+
+
+def _text(row: npt.NDArray[Any]) -> str:
+    return "(" + ", ".join(str(value) for value in row.tolist()) + ")"

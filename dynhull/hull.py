@@ -1,0 +1,247 @@
+"""DynamicHull: the public face of a hull tree. Checks arguments, speaks numpy."""
+
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from . import measure
+from .arrays import Points, as_coordinate, as_operations, as_points
+from .tree import LOWER, UPPER, HullTree
+
+
+class MissingPointError(KeyError):
+    """A delete names a point that is not there.
+
+    Attributes:
+        point: the coordinates.
+        row: the row of the batch, None for a single delete.
+    """
+
+    def __init__(self, point: tuple[float, float], row: int | None = None) -> None:
+        super().__init__(point, row)
+        self.point = point
+        self.row = row
+
+    def __str__(self) -> str:
+        where = "" if self.row is None else f"row {self.row}: "
+        return f"{where}point {self.point} is not there to delete; nothing was changed"
+
+
+class DynamicHull:
+    """The convex hull of a multiset of points in the plane, under inserts and deletes. Exact for every finite double.
+
+    Args:
+        points: (n, 2) array-like of finite numbers, none to begin with when left out. O(n log n).
+
+    Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
+    numeric, or that no double can hold, names the first bad row, and changes nothing.
+
+    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a query.
+
+    >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
+    >>> hull.insert(5, 2)
+    True
+    >>> hull.delete(2, 1)
+    False
+    >>> hull.vertices().tolist()
+    [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]
+    """
+
+    __slots__ = ("_tree",)
+    __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
+
+    def __init__(self, points: npt.ArrayLike | None = None) -> None:
+        self._tree = HullTree(None if points is None else as_points(points))
+
+    # Updates
+
+    def insert(self, x: float, y: float) -> bool:
+        """Add a point. True where the hull changed. O(log² n)."""
+        return self._tree.insert(as_coordinate(x, "x"), as_coordinate(y, "y"))
+
+    def delete(self, x: float, y: float) -> bool:
+        """Remove a point once. True where the hull changed; KeyError where the point is not there. O(log² n)."""
+        p = as_coordinate(x, "x"), as_coordinate(y, "y")
+        try:
+            return self._tree.delete(*p)
+        except KeyError:
+            raise MissingPointError(p) from None
+
+    def insert_many(self, xy: npt.ArrayLike) -> int:
+        """Add points as one batch. Returns how many. O(log² n) each, O((n + k) log k) for k >= n."""
+        points = as_points(xy)
+        return self._tree.apply(np.ones(len(points), np.int8), points, False)[0]
+
+    def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
+        """Remove points as one batch. Returns how many were removed. O(log² n) each.
+
+        Args:
+            xy: (k, 2) array-like.
+            missing: for a point that is not there (often enough): "raise" raises KeyError, which names its row, before
+                anything changes; "ignore" passes over it.
+        """
+        points = as_points(xy)
+        return self._apply(np.full(len(points), -1, np.int8), points, missing)
+
+    def apply(self, ops: npt.ArrayLike, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
+        """Apply inserts and deletes as one batch. Returns how many rows were applied. O(log² n) each.
+
+        A batch is a set: the order of its rows does not matter, and a point inserted and deleted in one batch leaves no
+        trace.
+
+        Args:
+            ops: k numbers, +1 to insert and -1 to delete the point of that row.
+            xy: (k, 2) array-like.
+            missing: as for `delete_many`.
+        """
+        points = as_points(xy)
+        return self._apply(as_operations(ops, len(points)), points, missing)
+
+    def clear(self) -> None:
+        """Remove every point."""
+        self._tree.clear()
+
+    def _apply(self, ops: npt.NDArray[np.int8], points: Points, missing: str) -> int:
+        if missing not in ("raise", "ignore"):
+            raise ValueError(f'missing must be "raise" or "ignore", got {missing!r}')
+        applied, row = self._tree.apply(ops, points, missing == "ignore")
+        if row >= 0 and missing == "raise":
+            x, y = points[row].tolist()
+            raise MissingPointError((x, y), row)
+        return applied
+
+    # What is there
+
+    def __len__(self) -> int:
+        """How many points, with multiplicity. O(1)."""
+        return len(self._tree)
+
+    @property
+    def distinct(self) -> int:
+        """How many different points. O(1)."""
+        return self._tree.distinct
+
+    @property
+    def changes(self) -> int:
+        """Grows by one with every update, single or batch, that changed the hull. O(1)."""
+        return self._tree.changes
+
+    def count(self, x: float, y: float) -> int:
+        """How many times the point is there. O(log n)."""
+        return self._tree.count(as_coordinate(x, "x"), as_coordinate(y, "y"))
+
+    def __contains__(self, point: tuple[float, float]) -> bool:
+        """Whether (x, y) is one of the points. O(log n)."""
+        x, y = point
+        return self.count(x, y) > 0
+
+    def points(self) -> Points:
+        """(n, 2) points in lexicographic order, with multiplicity. O(n)."""
+        return self._tree.points()
+
+    def vertices(self) -> Points:
+        """(h, 2) vertices, counter-clockwise from the lexicographically smallest; none lies between its neighbours.
+
+        O(h log n). No points: (0, 2). One point, any number of times: one vertex. All on one line: two.
+        """
+        return self._tree.vertices()
+
+    def upper(self) -> Points:
+        """(k, 2) vertices of the upper chain, left to right. O(h log n)."""
+        return self._tree.chain(UPPER)
+
+    def lower(self) -> Points:
+        """(k, 2) vertices of the lower chain, left to right. O(h log n)."""
+        return self._tree.chain(LOWER)
+
+    # Queries
+
+    def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
+        """Where each of (k, 2) points is: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
+        return self._tree.locate(as_points(xy))
+
+    def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
+        return self.locate(xy) >= 0
+
+    def support(self, directions: npt.ArrayLike) -> Points:
+        """(k, 2) extreme vertices, one for each of (k, 2) directions, which need no unit length. Exact. O(log n) each.
+
+        Where a whole edge is extreme, its lexicographically smaller end.
+
+        Raises:
+            ValueError: a direction is (0, 0), or there are no points.
+        """
+        vectors = as_points(directions, "directions")
+        zero = np.flatnonzero(~vectors.any(axis=1))
+        if zero.size:
+            raise ValueError(f"directions row {zero[0]} is (0.0, 0.0): no direction")
+        if len(vectors) and not len(self):
+            raise ValueError("an empty hull has no extreme points: insert some first")
+        return self._tree.support(vectors)
+
+    def tangents(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(k, 2, 2) left and right tangent points seen from each of (k, 2) points. Exact. O(log n) each.
+
+        Seen from an outside point the hull lies between the two: none of it left of the ray to the left tangent point,
+        none of it right of the ray to the right one. Of two vertices on one such ray, the farther. NaN for points that
+        are not strictly outside, and for an empty hull.
+        """
+        return self._tree.tangents(as_points(xy))
+
+    # Measures
+
+    @property
+    def area(self) -> float:
+        """Area, the exact value rounded once. O(h log n)."""
+        return measure.area(self.vertices())
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the boundary; for two vertices, there and back. O(h log n)."""
+        return measure.perimeter(self.vertices())
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """Centre of area, the exact value rounded once; of a segment the middle, NaN without points. O(h log n)."""
+        return measure.centroid(self.vertices())
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Least x, least y, greatest x, greatest y; NaN without points. O(h log n)."""
+        return measure.bounds(self.vertices())
+
+    # As a value
+
+    def copy(self) -> Self:
+        """An independent hull of the same points. O(n)."""
+        new = type(self)(self.points())
+        new._tree.changes = self.changes
+        return new
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.copy()
+
+    def __getstate__(self) -> tuple[Points, int]:
+        return self.points(), self.changes
+
+    def __setstate__(self, state: tuple[Points, int]) -> None:
+        points, changes = state
+        self._tree = HullTree(points)
+        self._tree.changes = changes
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other hull holds the same points, as often. O(n)."""
+        if not isinstance(other, DynamicHull):
+            return NotImplemented
+        return len(self) == len(other) and np.array_equal(self.points(), other.points())
+
+    def __repr__(self) -> str:
+        return f"<DynamicHull of {len(self)} points, {len(self.vertices())} vertices>"
+
+    def check(self) -> None:
+        """Raise AssertionError where an invariant of the tree is broken. O(n log n); for tests and bug reports."""
+        self._tree.check()

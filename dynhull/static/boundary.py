@@ -1,0 +1,27 @@
+"""The degenerate side of static hulls, in one place: points on the boundary that are not vertices."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+
+from ..predicates import Point, orientation
+
+
+def check_collinear(collinear: str) -> None:
+    """Raise ValueError unless the argument is one of the two words."""
+    if collinear not in ("drop", "keep"):
+        raise ValueError(f'collinear must be "drop" or "keep", got {collinear!r}')
+
+
+def with_boundary_points(hull: Sequence[Point], points: Sequence[Point]) -> list[Point]:
+    """Add to strict vertices, counter-clockwise from the least, all distinct points on the edges. O(n log n)."""
+    if len(hull) < 3:
+        return sorted(set(points))
+    turning = hull.index(max(hull))
+    lower, upper = list(hull[: turning + 1]), [hull[0], *reversed(hull[turning:])]
+    on_lower, on_upper = (sorted(p for p in set(points) if _on_chain(chain, p)) for chain in (lower, upper))
+    return on_lower + on_upper[-2:0:-1]
+
+
+def _on_chain(chain: Sequence[Point], p: Point) -> bool:
+    i = bisect_left(chain, p)
+    return (i < len(chain) and chain[i] == p) or (0 < i < len(chain) and orientation(chain[i - 1], chain[i], p) == 0)

@@ -1,0 +1,659 @@
+"""HullTree: a fully dynamic planar convex hull, the readable reference.
+
+Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981), bridge-only. An AVL tree holds the points
+in lexicographic order, up to LEAF of them in a leaf. For the upper and the lower side, a leaf keeps the chain of its own
+hull; an inner node keeps only the bridge (a, b), the common tangent of its children's chains:
+
+    chain(node) = chain(left) up to a, then chain(right) from b
+
+Both sides share all code: `SIGNS[side] * orientation(a, b, p) > 0` says that p lies outside the edge from a to b.
+Lexicographic order is the order along x after an infinitesimal shear, so equal x need no special case. Chains are
+strict: a point between two vertices of one line is not a vertex.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from math import inf
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Points
+from .predicates import Point, crossing, direction_sign, orientation
+from .static.monotone_chain import half_chain
+
+UPPER, LOWER = SIDES = (0, 1)
+SIGNS = (1, -1)
+LOWEST, HIGHEST = (-inf, -inf), (inf, inf)
+
+Edge = tuple[Point, Point]
+
+
+class _Leaf:
+    """Up to LEAF distinct points in order, and the two chains of their hull."""
+
+    __slots__ = ("chains", "points")
+    height = 0
+
+    def __init__(self, points: list[Point]) -> None:
+        self.points = points
+        self.chains = [half_chain(points, sign) for sign in SIGNS]
+
+    def add(self, p: Point, side: int) -> bool:
+        """Repair one chain for p, just added to the points. True where p is on it. O(points)."""
+        chain, sign = self.chains[side], SIGNS[side]
+        i = k = bisect_left(chain, p)
+        if 0 < i < len(chain) and sign * orientation(chain[i - 1], chain[i], p) <= 0:
+            return False
+        while k + 1 < len(chain) and sign * orientation(p, chain[k], chain[k + 1]) >= 0:
+            k += 1
+        while i > 1 and sign * orientation(chain[i - 2], chain[i - 1], p) >= 0:
+            i -= 1
+        chain[i:k] = [p]
+        return True
+
+    def remove(self, p: Point, side: int) -> bool:
+        """Repair one chain for p, just removed from the points. True where p was on it. O(points)."""
+        chain = self.chains[side]
+        i = bisect_left(chain, p)
+        if i == len(chain) or chain[i] != p:
+            return False
+        first = bisect_left(self.points, chain[i - 1]) if i > 0 else 0
+        last = bisect_right(self.points, chain[i + 1]) if i + 1 < len(chain) else len(self.points)
+        chain[max(i - 1, 0) : i + 2] = half_chain(self.points[first:last], SIGNS[side])
+        return True
+
+
+class _Node:
+    """Two children, the point that separates them, and a bridge a side."""
+
+    __slots__ = ("bridges", "height", "left", "right", "separator")
+
+    def __init__(self, left: "_Tree", right: "_Tree") -> None:
+        self.left = left
+        self.right = right
+        self.separator = _first(right)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Recompute height and bridges from the children. O(log n)."""
+        self.height = 1 + max(self.left.height, self.right.height)
+        self.bridges = [_bridge(self.left, self.right, side) for side in SIDES]
+
+
+_Tree = _Leaf | _Node
+
+
+class _Cursor:
+    """A binary search along the chain of a subtree.
+
+    At every step (a, b) is an edge of the chain, and the caller says on which side of it the sought vertex lies; once
+    only one vertex is left, a is b.
+    """
+
+    __slots__ = ("_chain", "_first", "_highest", "_last", "_lowest", "_node", "_side", "a", "b")
+
+    def __init__(self, tree: _Tree, side: int, lowest: Point = LOWEST, highest: Point = HIGHEST) -> None:
+        """Search the whole chain, or its part between two of its vertices."""
+        self._node = tree
+        self._side = side
+        self._lowest = lowest
+        self._highest = highest
+        self._descend()
+
+    def go_left(self) -> None:
+        """The sought vertex is a, or left of it."""
+        if isinstance(self._node, _Leaf):
+            self._last = (self._first + self._last) // 2
+            self._halve()
+        else:
+            self._highest = self.a
+            self._node = self._node.left
+            self._descend()
+
+    def go_right(self) -> None:
+        """The sought vertex is b, or right of it."""
+        if isinstance(self._node, _Leaf):
+            self._first = (self._first + self._last) // 2 + 1
+            self._halve()
+        else:
+            self._lowest = self.b
+            self._node = self._node.right
+            self._descend()
+
+    def _descend(self) -> None:
+        """Pass the bridges that lie under the chain: those that reach beyond its ends."""
+        node, side, lowest, highest = self._node, self._side, self._lowest, self._highest
+        while isinstance(node, _Node):
+            self.a, self.b = a, b = node.bridges[side]
+            if b > highest:
+                node = node.left
+            elif a < lowest:
+                node = node.right
+            else:
+                self._node = node
+                return
+        self._node = node
+        self._chain = chain = node.chains[side]
+        self._first = bisect_left(chain, lowest)
+        self._last = bisect_right(chain, highest) - 1
+        self._halve()
+
+    def _halve(self) -> None:
+        middle = (self._first + self._last) // 2
+        self.a = self._chain[middle]
+        self.b = self._chain[middle + 1] if middle < self._last else self.a
+
+
+def _bridge(left: _Tree, right: _Tree, side: int) -> Edge:
+    """The edge that joins the chains of two subtrees, all of `left` before all of `right`. O(log n) orientations.
+
+    With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
+    lies outside or on the line through a and b; likewise on the right. Where both edges have each other's ends inside,
+    their lines cross between the chains, and on which side of `first`, the least point of the right subtree, decides.
+    """
+    sign = SIGNS[side]
+    first = None
+    left_cursor, right_cursor = _Cursor(left, side), _Cursor(right, side)
+    while True:
+        a, b = left_cursor.a, left_cursor.b
+        c, d = right_cursor.a, right_cursor.b
+        if a is b and c is d:
+            return a, c
+        start_before = a is not b and (
+            sign * orientation(a, b, c) >= 0 or (c is not d and sign * orientation(a, b, d) >= 0)
+        )
+        end_after = c is not d and (
+            sign * orientation(c, d, a) >= 0 or (a is not b and sign * orientation(c, d, b) >= 0)
+        )
+        if start_before or end_after:
+            if start_before:
+                left_cursor.go_left()
+            if end_after:
+                right_cursor.go_right()
+        elif c is d:
+            left_cursor.go_right()
+        elif a is b:
+            right_cursor.go_left()
+        else:
+            first = first or _first(right)
+            if sign * orientation(a, b, first) >= 0:
+                left_cursor.go_left()
+            elif sign * crossing(a, b, c, d, first) >= 0:
+                left_cursor.go_right()
+            else:
+                right_cursor.go_left()
+
+
+def _tangent_to_left(cursor: _Cursor, p: Point, sign: int) -> Point:
+    """Where the tangent from p, right of the chain and outside of it, touches the chain; the farther of two."""
+    while cursor.a is not cursor.b:
+        if sign * orientation(cursor.a, cursor.b, p) >= 0:
+            cursor.go_left()
+        else:
+            cursor.go_right()
+    return cursor.a
+
+
+def _tangent_to_right(cursor: _Cursor, p: Point, sign: int) -> Point:
+    """Where the tangent from p, left of the chain and outside of it, touches the chain; the farther of two."""
+    while cursor.a is not cursor.b:
+        if sign * orientation(cursor.a, cursor.b, p) >= 0:
+            cursor.go_right()
+        else:
+            cursor.go_left()
+    return cursor.a
+
+
+class HullTree:
+    """A multiset of points and its convex hull. Coordinates are finite floats, zeros are positive: callers see to it.
+
+    O(log² n) an update, O(log n) a query, O(n) space.
+    """
+
+    LEAF = 64  # distinct points a leaf holds at most: measured, see benchmarks/tree.py
+
+    def __init__(self, xy: Points | None = None) -> None:
+        """Build from an (n, 2) array. O(n log n)."""
+        self._root: _Tree | None = None
+        self._copies: dict[Point, int] = {}  # how many, for the points that are there more than once
+        self._size = 0
+        self._distinct = 0
+        self.changes = 0
+        if xy is not None:
+            self._build(Counter(_tuples(xy)))
+
+    def __len__(self) -> int:
+        return self._size
+
+    @property
+    def distinct(self) -> int:
+        return self._distinct
+
+    def clear(self) -> None:
+        """Remove every point."""
+        if self._root is not None:
+            self._build(Counter())
+            self.changes += 1
+
+    def count(self, x: float, y: float) -> int:
+        """How many times the point is there. O(log n)."""
+        p = (x, y)
+        node = self._root
+        if node is None:
+            return 0
+        while isinstance(node, _Node):
+            node = node.right if p >= node.separator else node.left
+        i = bisect_left(node.points, p)
+        if i < len(node.points) and node.points[i] == p:
+            return self._copies.get(p, 1)
+        return 0
+
+    # Updates
+
+    def insert(self, x: float, y: float) -> bool:
+        """Add a point. True where the hull changed. O(log² n)."""
+        changed = self._insert((x, y), 1)
+        self.changes += changed
+        return changed
+
+    def delete(self, x: float, y: float) -> bool:
+        """Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n)."""
+        changed = self._delete((x, y), 1)
+        self.changes += changed
+        return changed
+
+    def apply(self, ops: npt.NDArray[np.int8], xy: Points, ignore_missing: bool) -> tuple[int, int]:
+        """Insert the rows with +1 and delete those with -1, as a set: the order of rows does not matter.
+
+        Returns:
+            How many rows were applied, and the first row that deletes a point which is not there, or -1. With such a
+            row nothing is applied, unless missing points are to be ignored.
+        """
+        points = _tuples(xy)
+        net = Counter(p for p, op in zip(points, ops.tolist(), strict=True) if op > 0)
+        applied, first_missing = len(points), -1
+        for row in np.flatnonzero(ops < 0).tolist():
+            p = points[row]
+            if net[p] + self.count(*p) > 0:
+                net[p] -= 1
+                continue
+            if first_missing < 0:
+                first_missing = row
+            if not ignore_missing:
+                return 0, first_missing
+            applied -= 1
+        if self._distinct <= sum(1 for change in net.values() if change > 0):
+            changed = self._rebuild(net)
+        else:
+            changed = False
+            for p, change in sorted(net.items()):
+                if change > 0:
+                    changed |= self._insert(p, change)
+                elif change < 0:
+                    changed |= self._delete(p, -change)
+        self.changes += changed
+        return applied, first_missing
+
+    def _insert(self, p: Point, copies: int) -> bool:
+        self._size += copies
+        if self._root is None:
+            self._root = _Leaf([p])
+            self._distinct = 1
+            if copies > 1:
+                self._copies[p] = copies
+            return True
+        path, leaf = self._path(p)
+        i = bisect_left(leaf.points, p)
+        if i < len(leaf.points) and leaf.points[i] == p:
+            self._copies[p] = self._copies.get(p, 1) + copies
+            return False
+        leaf.points.insert(i, p)
+        self._distinct += 1
+        if copies > 1:
+            self._copies[p] = copies
+        changed = False
+        for side in SIDES:
+            if leaf.add(p, side):
+                changed |= self._climb_added(path, p, side)
+        if len(leaf.points) > self.LEAF:
+            half = len(leaf.points) // 2
+            self._replace(path, leaf, _Node(_Leaf(leaf.points[:half]), _Leaf(leaf.points[half:])))
+            self._rebalance(path)
+        return changed
+
+    def _delete(self, p: Point, copies: int) -> bool:
+        if self._root is None:
+            raise KeyError(p)
+        path, leaf = self._path(p)
+        i = bisect_left(leaf.points, p)
+        if i == len(leaf.points) or leaf.points[i] != p:
+            raise KeyError(p)
+        self._size -= copies
+        left_over = self._copies.pop(p, 1) - copies
+        if left_over > 1:
+            self._copies[p] = left_over
+        if left_over > 0:
+            return False
+        del leaf.points[i]
+        self._distinct -= 1
+        sides = [side for side in SIDES if leaf.remove(p, side)]
+        if not leaf.points:
+            self._drop(path, leaf)
+        changed = False
+        for side in sides:
+            changed |= self._climb_removed(path, p, side)
+        if not leaf.points:
+            self._rebalance(path)
+        elif len(leaf.points) < self.LEAF // 4:
+            self._merge(path, leaf)
+        return changed
+
+    def _path(self, p: Point) -> tuple[list[_Node], _Leaf]:
+        """The nodes from the root down to the leaf where p belongs."""
+        path = []
+        node = self._root
+        while isinstance(node, _Node):
+            path.append(node)
+            node = node.right if p >= node.separator else node.left
+        assert node is not None
+        return path, node
+
+    def _climb_added(self, path: list[_Node], p: Point, side: int) -> bool:
+        """Repair the bridges above p, added to its leaf's chain, while p is on the chain. True where it is at the root."""
+        sign = SIGNS[side]
+        for node in reversed(path):
+            a, b = node.bridges[side]
+            on_left = p < node.separator
+            turn = sign * orientation(a, b, p)
+            beyond = p < a if on_left else p > b
+            if turn > 0 or (turn == 0 and beyond):
+                if on_left:
+                    node.bridges[side] = p, _tangent_to_right(_Cursor(node.right, side), p, sign)
+                else:
+                    node.bridges[side] = _tangent_to_left(_Cursor(node.left, side), p, sign), p
+            elif not beyond:
+                return False
+        return True
+
+    def _climb_removed(self, path: list[_Node], p: Point, side: int) -> bool:
+        """Repair the bridges above p, removed from its leaf's chain, while p was on the chain. True where at the root."""
+        for node in reversed(path):
+            a, b = node.bridges[side]
+            if p in (a, b):
+                node.bridges[side] = _bridge(node.left, node.right, side)
+            elif a < p < b:
+                return False
+        return True
+
+    # Shape of the tree
+
+    def _replace(self, path: list[_Node], old: _Tree, new: _Tree) -> None:
+        """Put a subtree in another's place, below the last node of the path."""
+        if not path:
+            self._root = new
+        elif path[-1].left is old:
+            path[-1].left = new
+        else:
+            path[-1].right = new
+
+    def _drop(self, path: list[_Node], leaf: _Leaf) -> None:
+        """Take an empty leaf out; its sibling takes their parent's place."""
+        if not path:
+            self._root = None
+            return
+        parent = path.pop()
+        self._replace(path, parent, parent.right if parent.left is leaf else parent.left)
+
+    def _merge(self, path: list[_Node], leaf: _Leaf) -> None:
+        """Give a small leaf's points to the leaf beside it below the same parent, where there is room."""
+        if not path:
+            return
+        parent = path[-1]
+        on_left = parent.left is leaf
+        sibling = parent.right if on_left else parent.left
+        neighbour = sibling
+        if isinstance(sibling, _Node):
+            neighbour = sibling.left if on_left else sibling.right
+        assert isinstance(neighbour, _Leaf)  # a leaf's sibling is one level higher at most
+        if len(neighbour.points) + len(leaf.points) > self.LEAF * 3 // 4:
+            return
+        merged = _Leaf(leaf.points + neighbour.points if on_left else neighbour.points + leaf.points)
+        path.pop()
+        if isinstance(sibling, _Node):
+            self._replace(path, parent, sibling)
+            self._replace([sibling], neighbour, merged)
+            sibling.refresh()
+        else:
+            self._replace(path, parent, merged)
+        self._rebalance(path)
+
+    def _rebalance(self, path: list[_Node]) -> None:
+        """Restore the AVL condition along a path, from its end up; stop where nothing changes any more."""
+        while path:
+            node = path.pop()
+            lean = node.left.height - node.right.height
+            if abs(lean) > 1:
+                self._replace(path, node, _rotate(node, to_right=lean > 0))
+                continue
+            height = 1 + max(node.left.height, node.right.height)
+            if height == node.height:
+                return
+            node.height = height
+
+    def _build(self, counts: Counter[Point]) -> None:
+        """Start anew from distinct points and how often each is there."""
+        points = sorted(counts)
+        self._copies = {p: count for p, count in counts.items() if count > 1}
+        self._size = counts.total()
+        self._distinct = len(points)
+        fill = max(self.LEAF * 3 // 4, 1)
+        self._root = _balanced([_Leaf(points[i : i + fill]) for i in range(0, len(points), fill)])
+
+    def _rebuild(self, net: Counter[Point]) -> bool:
+        """Apply a batch as large as the tree by building it anew."""
+        before = self._vertices()
+        counts = Counter({p: self._copies.get(p, 1) for p in self._all_points()})
+        counts.update(net)
+        self._build(+counts)
+        return self._vertices() != before
+
+    # The hull
+
+    def points(self) -> Points:
+        """All points in lexicographic order, with multiplicity. O(n)."""
+        copies = self._copies
+        return _array([p for point in self._all_points() for p in [point] * copies.get(point, 1)])
+
+    def vertices(self) -> Points:
+        """The hull's vertices, counter-clockwise from the least. O(h log n)."""
+        return _array(self._vertices())
+
+    def chain(self, side: int) -> Points:
+        """The upper (0) or lower (1) chain from left to right. O(h log n)."""
+        return _array(self._chain(side))
+
+    def _all_points(self) -> Iterator[Point]:
+        stack = [self._root]
+        while stack:
+            node = stack.pop()
+            if isinstance(node, _Node):
+                stack += (node.right, node.left)
+            elif node is not None:
+                yield from node.points
+
+    def _vertices(self) -> list[Point]:
+        return self._chain(LOWER) + self._chain(UPPER)[-2:0:-1]
+
+    def _chain(self, side: int) -> list[Point]:
+        chain: list[Point] = []
+        stack = [(self._root, LOWEST, HIGHEST)]
+        while stack:
+            node, lowest, highest = stack.pop()
+            if isinstance(node, _Node):
+                a, b = node.bridges[side]
+                if b <= highest:
+                    stack.append((node.right, max(b, lowest), highest))
+                if a >= lowest:
+                    stack.append((node.left, lowest, min(a, highest)))
+            elif node is not None:
+                part = node.chains[side]
+                chain += part[bisect_left(part, lowest) : bisect_right(part, highest)]
+        return chain
+
+    # Queries
+
+    def locate(self, xy: Points) -> npt.NDArray[np.int8]:
+        """+1 inside, 0 on the boundary, -1 outside, a row each. O(log n) a row."""
+        return np.array([self._locate(p)[0] for p in _tuples(xy)], dtype=np.int8)
+
+    def support(self, directions: Points) -> Points:
+        """The vertex farthest in each direction; of two the lexicographically smaller. O(log n) a row."""
+        return _array([self._support(d) for d in _tuples(directions)])
+
+    def tangents(self, xy: Points) -> npt.NDArray[np.float64]:
+        """The left and the right tangent point seen from each row, NaN where it is not outside. O(log n) a row."""
+        nothing = ((np.nan, np.nan), (np.nan, np.nan))
+        rows = [self._tangents(p) or nothing for p in _tuples(xy)]
+        return np.array(rows, dtype=np.float64).reshape(len(rows), 2, 2)
+
+    def _locate(self, p: Point) -> tuple[int, int, Edge]:
+        """Where p is; outside, also the side and the edge it lies beyond: (p, p) where it lies before or after all."""
+        beyond_the_ends = UPPER, (p, p)
+        inside = 1
+        if self._root is None:
+            return -1, *beyond_the_ends
+        for side in SIDES:
+            node = self._root
+            while isinstance(node, _Node):
+                a, b = node.bridges[side]
+                if p <= a:
+                    node = node.left
+                elif p >= b:
+                    node = node.right
+                else:
+                    break
+            else:
+                chain = node.chains[side]
+                i = bisect_left(chain, p)
+                if i < len(chain) and chain[i] == p:
+                    return 0, *beyond_the_ends
+                if i in (0, len(chain)):
+                    return -1, *beyond_the_ends
+                a, b = chain[i - 1], chain[i]
+            turn = SIGNS[side] * orientation(a, b, p)
+            if turn > 0:
+                return -1, side, (a, b)
+            inside = min(inside, -turn)
+        return inside, *beyond_the_ends
+
+    def _support(self, d: Point) -> Point:
+        assert self._root is not None
+        cursor = _Cursor(self._root, UPPER if d[1] > 0 or (d[1] == 0 and d[0] < 0) else LOWER)
+        while cursor.a is not cursor.b:
+            if direction_sign(d, cursor.a, cursor.b) > 0:
+                cursor.go_right()
+            else:
+                cursor.go_left()
+        return cursor.a
+
+    def _tangents(self, p: Point) -> Edge | None:
+        where, side, (a, b) = self._locate(p)
+        if self._root is None or where >= 0:
+            return None
+        root = self._root
+        if a is not b:
+            before = _tangent_to_left(_Cursor(root, side, highest=a), p, SIGNS[side])
+            after = _tangent_to_right(_Cursor(root, side, lowest=b), p, SIGNS[side])
+            return (after, before) if side == UPPER else (before, after)
+        if p < _first(root):
+            upper, lower = (_tangent_to_right(_Cursor(root, side), p, SIGNS[side]) for side in SIDES)
+            return upper, lower
+        upper, lower = (_tangent_to_left(_Cursor(root, side), p, SIGNS[side]) for side in SIDES)
+        return lower, upper
+
+    # Verification
+
+    def check(self) -> None:
+        """Raise AssertionError where an invariant is broken: every bridge and chain against its definition.
+
+        O(n log n) orientations, none of them shared with the searches.
+        """
+        points = list(self._all_points())
+        assert points == sorted(set(points)), "points out of order"
+        assert len(points) == self._distinct, f"{len(points)} distinct points, {self._distinct} counted"
+        assert set(self._copies) <= set(points), "a count without its point"
+        assert all(count > 1 for count in self._copies.values()), "a count below two"
+        assert self._size == self._distinct + sum(self._copies.values()) - len(self._copies), "size is wrong"
+        if self._root is not None:
+            self._check(self._root)
+
+    def _check(self, tree: _Tree) -> list[Point]:
+        if isinstance(tree, _Leaf):
+            assert 0 < len(tree.points) <= self.LEAF, f"a leaf of {len(tree.points)} points"
+            for side, chain in enumerate(tree.chains):
+                assert (chain[0], chain[-1]) == (tree.points[0], tree.points[-1]), "a chain without its ends"
+                for a, b in zip(chain, chain[1:], strict=False):
+                    _check_edge((a, b), tree.points, side)
+            return tree.points
+        left, right = self._check(tree.left), self._check(tree.right)
+        assert left[-1] < tree.separator <= right[0], "separator out of place"
+        assert tree.height == 1 + max(tree.left.height, tree.right.height), "height is wrong"
+        assert abs(tree.left.height - tree.right.height) <= 1, "out of balance"
+        for side, (a, b) in enumerate(tree.bridges):
+            assert left[bisect_left(left, a)] == a, "a bridge that starts nowhere"
+            assert right[bisect_left(right, b)] == b, "a bridge that ends nowhere"
+            _check_edge((a, b), left + right, side)
+        return left + right
+
+
+def _check_edge(edge: Edge, points: Sequence[Point], side: int) -> None:
+    a, b = edge
+    for p in points:
+        turn = SIGNS[side] * orientation(a, b, p)
+        assert turn < 0 or (turn == 0 and a <= p <= b), f"{p} lies outside the edge {edge}"
+
+
+def _rotate(node: _Node, *, to_right: bool) -> _Node:
+    """Lift the higher child of a node out of balance; where its inner child is the higher one, that one. O(log n)."""
+    if to_right:
+        top = node.left
+        assert isinstance(top, _Node)
+        if top.left.height < top.right.height:
+            top = _rotate(top, to_right=False)
+        node.left, top.right = top.right, node
+    else:
+        top = node.right
+        assert isinstance(top, _Node)
+        if top.right.height < top.left.height:
+            top = _rotate(top, to_right=True)
+        node.right, top.left = top.left, node
+    node.refresh()
+    top.refresh()
+    return top
+
+
+def _balanced(trees: Sequence[_Tree]) -> _Tree | None:
+    """Join trees of equal height, in order, under a balanced top."""
+    if len(trees) > 1:
+        middle = len(trees) // 2
+        left, right = _balanced(trees[:middle]), _balanced(trees[middle:])
+        assert left is not None
+        assert right is not None
+        return _Node(left, right)
+    return trees[0] if trees else None
+
+
+def _first(tree: _Tree) -> Point:
+    while isinstance(tree, _Node):
+        tree = tree.left
+    return tree.points[0]
+
+
+def _tuples(xy: Points) -> list[Point]:
+    return list(map(tuple, xy.tolist()))
+
+
+def _array(points: Sequence[Point]) -> Points:
+    return np.array(points, dtype=np.float64).reshape(len(points), 2)
