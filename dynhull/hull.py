@@ -38,7 +38,8 @@ class DynamicHull:
     Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
     numeric, or that no double can hold, names the first bad row, and changes nothing.
 
-    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a query.
+    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
+    query.
 
     >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
     >>> hull.insert(5, 2)

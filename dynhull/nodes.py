@@ -1,6 +1,6 @@
 """The parts of a hull tree: leaves with chains, inner nodes with bridges, and searches along them.
 
-A leaf keeps the chain of its own points for the upper and for the lower side; an inner node keeps only the bridge (a, b),
+A leaf keeps the chain of its own points for the upper and the lower side; an inner node keeps only the bridge (a, b),
 the common tangent of its children's chains:
 
     chain(node) = chain(left) up to a, then chain(right) from b
