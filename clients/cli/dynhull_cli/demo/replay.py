@@ -45,7 +45,7 @@ class Watcher:
         try:
             for event in self._events:
                 with self._moved:
-                    self._copy.apply(event)
+                    self._copy.update(event)
                     self._moved.notify_all()
         except Exception as failure:  # handed to whoever waits for the copy
             with self._moved:
@@ -83,7 +83,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
             for revision, frame in enumerate(scene.frames(), start=1):
                 stream.apply(insert=frame.insert, delete=frame.delete)
                 verified = client.verify(name, min_revision=revision)
-                live = client.get_hull(name, min_revision=revision)
+                live = client.get_hull(name, min_revision=revision, measures=True)
                 copy = watcher.vertices_at(revision)
                 difference = None
                 if not verified.equal:
