@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from dynhull_cli.demo.table import Table
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from time import monotonic
 
 import numpy as np
+
 from dynhull_client import HullClient, HullCopy
 
 from .scene import Frame, Points, Scene
@@ -85,6 +86,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
                 verified = client.verify(name, min_revision=revision)
                 live = client.get_hull(name, min_revision=revision, measures=True)
                 copy = watcher.vertices_at(revision)
+                assert live.measures is not None  # asked for
                 difference = None
                 if not verified.equal:
                     difference = f"the live hull differs from Chan's recomputation: {verified.difference}"
