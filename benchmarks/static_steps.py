@@ -120,7 +120,7 @@ def draw(rows: list[Work], path: Path) -> None:
             xs, ys = [row.h for row in mine], [row.steps / n for row in mine]
             axes.loglog(xs, ys, marker="o", markersize=4, color=colour, label=name)
         h = np.array(sizes(n))
-        axes.loglog(h, 8 * np.log2(h), ":", color="#009E73", linewidth=1, label="8 log₂ h")
+        axes.loglog(h, 11 * np.log2(h), ":", color="#009E73", linewidth=1, label="11 log₂ h")
         axes.loglog(h, np.log2(h) ** 2, ":", color="#707070", linewidth=1, label="log₂² h, for comparison")
         axes.set_title(f"n = {n:,}", fontsize=10)
         axes.set_xlabel("vertices h")
