@@ -43,11 +43,10 @@ def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
 
 def as_coordinate(value: Any, name: str) -> float:
     """Return one coordinate as a finite float, converted when exact."""
-    if type(value) is not float:
-        value = _as_double_scalar(value, name)
-    if not math.isfinite(value):
-        raise ValueError(f"{name} is {value!r}: coordinates must be finite")
-    return value + 0.0
+    double: float = value if type(value) is float else _as_double_scalar(value, name)
+    if not math.isfinite(double):
+        raise ValueError(f"{name} is {double!r}: coordinates must be finite")
+    return double + 0.0
 
 
 def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
@@ -63,13 +62,13 @@ def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
     return np.ascontiguousarray(array, dtype=np.int8)
 
 
-def _as_array(xy: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:
     if isinstance(xy, Iterable) and not hasattr(xy, "__len__") and not hasattr(xy, "__array__"):
         xy = list(xy)
     try:
         array = np.asarray(xy)
     except ValueError:
-        for row, entry in enumerate(xy):  # type: ignore[arg-type]
+        for row, entry in enumerate(xy):
             if not hasattr(entry, "__len__") or len(entry) != 2:
                 raise ValueError(f"{name} row {row} is {entry!r}: must be two numbers") from None
         raise

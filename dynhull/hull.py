@@ -1,13 +1,14 @@
 """DynamicHull: the public face of a hull tree. Checks arguments, speaks numpy."""
 
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from . import measure
 from .arrays import Points, as_coordinate, as_operations, as_points
-from .tree import LOWER, UPPER, HullTree
+from .nodes import LOWER, UPPER
+from .tree import HullTree
 
 
 class MissingPointError(KeyError):
@@ -37,7 +38,8 @@ class DynamicHull:
     Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
     numeric, or that no double can hold, names the first bad row, and changes nothing.
 
-    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a query.
+    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
+    query.
 
     >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
     >>> hull.insert(5, 2)
@@ -50,9 +52,10 @@ class DynamicHull:
 
     __slots__ = ("_tree",)
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
+    _tree_type: ClassVar[type[HullTree]] = HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
-        self._tree = HullTree(None if points is None else as_points(points))
+        self._tree = self._tree_type(None if points is None else as_points(points))
 
     # Updates
 
@@ -230,7 +233,7 @@ class DynamicHull:
 
     def __setstate__(self, state: tuple[Points, int]) -> None:
         points, changes = state
-        self._tree = HullTree(points)
+        self._tree = self._tree_type(points)
         self._tree.changes = changes
 
     def __eq__(self, other: object) -> bool:

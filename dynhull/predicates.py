@@ -127,9 +127,8 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
         right = (p[..., 1] - r[..., 1]) * (q[..., 0] - r[..., 0])
         det = left - right
         bound = ORIENT_BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
-        signs = (det > bound).astype(np.int8) - (-det > bound).astype(np.int8)
-        undecided = ~(np.abs(det) > bound)
-    for index in zip(*np.nonzero(undecided), strict=True):
+        signs: npt.NDArray[np.int8] = (det > bound).astype(np.int8) - (-det > bound).astype(np.int8)
+    for index in zip(*np.nonzero(signs == 0), strict=True):
         signs[index] = orientation(tuple(p[index].tolist()), tuple(q[index].tolist()), tuple(r[index].tolist()))
     return signs
 

@@ -1,209 +1,39 @@
 """HullTree: a fully dynamic planar convex hull, the readable reference.
 
-Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981), bridge-only. An AVL tree holds the points
-in lexicographic order, up to LEAF of them in a leaf. For the upper and the lower side, a leaf keeps the chain of its own
-hull; an inner node keeps only the bridge (a, b), the common tangent of its children's chains:
-
-    chain(node) = chain(left) up to a, then chain(right) from b
-
-Both sides share all code: `SIGNS[side] * orientation(a, b, p) > 0` says that p lies outside the edge from a to b.
-Lexicographic order is the order along x after an infinitesimal shear, so equal x need no special case. Chains are
-strict: a point between two vertices of one line is not a vertex.
+Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981), bridge-only, with fat leaves. An AVL tree
+holds the points in lexicographic order, up to LEAF of them in a leaf; `nodes.py` has its parts. An update repairs
+chains and bridges from the leaf up and stops where its point is not on the hull any more, which is early for most.
 """
 
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from math import inf
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from .arrays import Points
-from .predicates import Point, crossing, direction_sign, orientation
-from .static.monotone_chain import half_chain
-
-UPPER, LOWER = SIDES = (0, 1)
-SIGNS = (1, -1)
-LOWEST, HIGHEST = (-inf, -inf), (inf, inf)
-
-Edge = tuple[Point, Point]
-
-
-class _Leaf:
-    """Up to LEAF distinct points in order, and the two chains of their hull."""
-
-    __slots__ = ("chains", "points")
-    height = 0
-
-    def __init__(self, points: list[Point]) -> None:
-        self.points = points
-        self.chains = [half_chain(points, sign) for sign in SIGNS]
-
-    def add(self, p: Point, side: int) -> bool:
-        """Repair one chain for p, just added to the points. True where p is on it. O(points)."""
-        chain, sign = self.chains[side], SIGNS[side]
-        i = k = bisect_left(chain, p)
-        if 0 < i < len(chain) and sign * orientation(chain[i - 1], chain[i], p) <= 0:
-            return False
-        while k + 1 < len(chain) and sign * orientation(p, chain[k], chain[k + 1]) >= 0:
-            k += 1
-        while i > 1 and sign * orientation(chain[i - 2], chain[i - 1], p) >= 0:
-            i -= 1
-        chain[i:k] = [p]
-        return True
-
-    def remove(self, p: Point, side: int) -> bool:
-        """Repair one chain for p, just removed from the points. True where p was on it. O(points)."""
-        chain = self.chains[side]
-        i = bisect_left(chain, p)
-        if i == len(chain) or chain[i] != p:
-            return False
-        first = bisect_left(self.points, chain[i - 1]) if i > 0 else 0
-        last = bisect_right(self.points, chain[i + 1]) if i + 1 < len(chain) else len(self.points)
-        chain[max(i - 1, 0) : i + 2] = half_chain(self.points[first:last], SIGNS[side])
-        return True
-
-
-class _Node:
-    """Two children, the point that separates them, and a bridge a side."""
-
-    __slots__ = ("bridges", "height", "left", "right", "separator")
-
-    def __init__(self, left: "_Tree", right: "_Tree") -> None:
-        self.left = left
-        self.right = right
-        self.separator = _first(right)
-        self.refresh()
-
-    def refresh(self) -> None:
-        """Recompute height and bridges from the children. O(log n)."""
-        self.height = 1 + max(self.left.height, self.right.height)
-        self.bridges = [_bridge(self.left, self.right, side) for side in SIDES]
-
-
-_Tree = _Leaf | _Node
-
-
-class _Cursor:
-    """A binary search along the chain of a subtree.
-
-    At every step (a, b) is an edge of the chain, and the caller says on which side of it the sought vertex lies; once
-    only one vertex is left, a is b.
-    """
-
-    __slots__ = ("_chain", "_first", "_highest", "_last", "_lowest", "_node", "_side", "a", "b")
-
-    def __init__(self, tree: _Tree, side: int, lowest: Point = LOWEST, highest: Point = HIGHEST) -> None:
-        """Search the whole chain, or its part between two of its vertices."""
-        self._node = tree
-        self._side = side
-        self._lowest = lowest
-        self._highest = highest
-        self._descend()
-
-    def go_left(self) -> None:
-        """The sought vertex is a, or left of it."""
-        if isinstance(self._node, _Leaf):
-            self._last = (self._first + self._last) // 2
-            self._halve()
-        else:
-            self._highest = self.a
-            self._node = self._node.left
-            self._descend()
-
-    def go_right(self) -> None:
-        """The sought vertex is b, or right of it."""
-        if isinstance(self._node, _Leaf):
-            self._first = (self._first + self._last) // 2 + 1
-            self._halve()
-        else:
-            self._lowest = self.b
-            self._node = self._node.right
-            self._descend()
-
-    def _descend(self) -> None:
-        """Pass the bridges that lie under the chain: those that reach beyond its ends."""
-        node, side, lowest, highest = self._node, self._side, self._lowest, self._highest
-        while isinstance(node, _Node):
-            self.a, self.b = a, b = node.bridges[side]
-            if b > highest:
-                node = node.left
-            elif a < lowest:
-                node = node.right
-            else:
-                self._node = node
-                return
-        self._node = node
-        self._chain = chain = node.chains[side]
-        self._first = bisect_left(chain, lowest)
-        self._last = bisect_right(chain, highest) - 1
-        self._halve()
-
-    def _halve(self) -> None:
-        middle = (self._first + self._last) // 2
-        self.a = self._chain[middle]
-        self.b = self._chain[middle + 1] if middle < self._last else self.a
-
-
-def _bridge(left: _Tree, right: _Tree, side: int) -> Edge:
-    """The edge that joins the chains of two subtrees, all of `left` before all of `right`. O(log n) orientations.
-
-    With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
-    lies outside or on the line through a and b; likewise on the right. Where both edges have each other's ends inside,
-    their lines cross between the chains, and on which side of `first`, the least point of the right subtree, decides.
-    """
-    sign = SIGNS[side]
-    first = None
-    left_cursor, right_cursor = _Cursor(left, side), _Cursor(right, side)
-    while True:
-        a, b = left_cursor.a, left_cursor.b
-        c, d = right_cursor.a, right_cursor.b
-        if a is b and c is d:
-            return a, c
-        start_before = a is not b and (
-            sign * orientation(a, b, c) >= 0 or (c is not d and sign * orientation(a, b, d) >= 0)
-        )
-        end_after = c is not d and (
-            sign * orientation(c, d, a) >= 0 or (a is not b and sign * orientation(c, d, b) >= 0)
-        )
-        if start_before or end_after:
-            if start_before:
-                left_cursor.go_left()
-            if end_after:
-                right_cursor.go_right()
-        elif c is d:
-            left_cursor.go_right()
-        elif a is b:
-            right_cursor.go_left()
-        else:
-            first = first or _first(right)
-            if sign * orientation(a, b, first) >= 0:
-                left_cursor.go_left()
-            elif sign * crossing(a, b, c, d, first) >= 0:
-                left_cursor.go_right()
-            else:
-                right_cursor.go_left()
-
-
-def _tangent_to_left(cursor: _Cursor, p: Point, sign: int) -> Point:
-    """Where the tangent from p, right of the chain and outside of it, touches the chain; the farther of two."""
-    while cursor.a is not cursor.b:
-        if sign * orientation(cursor.a, cursor.b, p) >= 0:
-            cursor.go_left()
-        else:
-            cursor.go_right()
-    return cursor.a
-
-
-def _tangent_to_right(cursor: _Cursor, p: Point, sign: int) -> Point:
-    """Where the tangent from p, left of the chain and outside of it, touches the chain; the farther of two."""
-    while cursor.a is not cursor.b:
-        if sign * orientation(cursor.a, cursor.b, p) >= 0:
-            cursor.go_right()
-        else:
-            cursor.go_left()
-    return cursor.a
+from .nodes import (
+    HIGHEST,
+    LOWER,
+    LOWEST,
+    SIDES,
+    SIGNS,
+    UPPER,
+    Cursor,
+    Edge,
+    Leaf,
+    Node,
+    Tree,
+    balanced,
+    bridge,
+    first_point,
+    rotate,
+    tangent_to_left,
+    tangent_to_right,
+)
+from .predicates import Point, direction_sign, orientation
 
 
 class HullTree:
@@ -216,7 +46,7 @@ class HullTree:
 
     def __init__(self, xy: Points | None = None) -> None:
         """Build from an (n, 2) array. O(n log n)."""
-        self._root: _Tree | None = None
+        self._root: Tree | None = None
         self._copies: dict[Point, int] = {}  # how many, for the points that are there more than once
         self._size = 0
         self._distinct = 0
@@ -229,6 +59,7 @@ class HullTree:
 
     @property
     def distinct(self) -> int:
+        """How many different points."""
         return self._distinct
 
     def clear(self) -> None:
@@ -243,7 +74,7 @@ class HullTree:
         node = self._root
         if node is None:
             return 0
-        while isinstance(node, _Node):
+        while isinstance(node, Node):
             node = node.right if p >= node.separator else node.left
         i = bisect_left(node.points, p)
         if i < len(node.points) and node.points[i] == p:
@@ -299,7 +130,7 @@ class HullTree:
     def _insert(self, p: Point, copies: int) -> bool:
         self._size += copies
         if self._root is None:
-            self._root = _Leaf([p])
+            self._root = Leaf([p])
             self._distinct = 1
             if copies > 1:
                 self._copies[p] = copies
@@ -319,7 +150,7 @@ class HullTree:
                 changed |= self._climb_added(path, p, side)
         if len(leaf.points) > self.LEAF:
             half = len(leaf.points) // 2
-            self._replace(path, leaf, _Node(_Leaf(leaf.points[:half]), _Leaf(leaf.points[half:])))
+            self._replace(path, leaf, Node(Leaf(leaf.points[:half]), Leaf(leaf.points[half:])))
             self._rebalance(path)
         return changed
 
@@ -350,18 +181,18 @@ class HullTree:
             self._merge(path, leaf)
         return changed
 
-    def _path(self, p: Point) -> tuple[list[_Node], _Leaf]:
+    def _path(self, p: Point) -> tuple[list[Node], Leaf]:
         """The nodes from the root down to the leaf where p belongs."""
         path = []
         node = self._root
-        while isinstance(node, _Node):
+        while isinstance(node, Node):
             path.append(node)
             node = node.right if p >= node.separator else node.left
         assert node is not None
         return path, node
 
-    def _climb_added(self, path: list[_Node], p: Point, side: int) -> bool:
-        """Repair the bridges above p, added to its leaf's chain, while p is on the chain. True where it is at the root."""
+    def _climb_added(self, path: list[Node], p: Point, side: int) -> bool:
+        """Repair the bridges above p, new on its leaf's chain, as far as p is on the chain. True where to the root."""
         sign = SIGNS[side]
         for node in reversed(path):
             a, b = node.bridges[side]
@@ -370,26 +201,26 @@ class HullTree:
             beyond = p < a if on_left else p > b
             if turn > 0 or (turn == 0 and beyond):
                 if on_left:
-                    node.bridges[side] = p, _tangent_to_right(_Cursor(node.right, side), p, sign)
+                    node.bridges[side] = p, tangent_to_right(Cursor(node.right, side), p, sign)
                 else:
-                    node.bridges[side] = _tangent_to_left(_Cursor(node.left, side), p, sign), p
+                    node.bridges[side] = tangent_to_left(Cursor(node.left, side), p, sign), p
             elif not beyond:
                 return False
         return True
 
-    def _climb_removed(self, path: list[_Node], p: Point, side: int) -> bool:
-        """Repair the bridges above p, removed from its leaf's chain, while p was on the chain. True where at the root."""
+    def _climb_removed(self, path: list[Node], p: Point, side: int) -> bool:
+        """Repair the bridges above p, gone from its leaf's chain, as far as p was on it. True where to the root."""
         for node in reversed(path):
             a, b = node.bridges[side]
             if p in (a, b):
-                node.bridges[side] = _bridge(node.left, node.right, side)
+                node.bridges[side] = bridge(node.left, node.right, side)
             elif a < p < b:
                 return False
         return True
 
     # Shape of the tree
 
-    def _replace(self, path: list[_Node], old: _Tree, new: _Tree) -> None:
+    def _replace(self, path: list[Node], old: Tree, new: Tree) -> None:
         """Put a subtree in another's place, below the last node of the path."""
         if not path:
             self._root = new
@@ -398,7 +229,7 @@ class HullTree:
         else:
             path[-1].right = new
 
-    def _drop(self, path: list[_Node], leaf: _Leaf) -> None:
+    def _drop(self, path: list[Node], leaf: Leaf) -> None:
         """Take an empty leaf out; its sibling takes their parent's place."""
         if not path:
             self._root = None
@@ -406,7 +237,7 @@ class HullTree:
         parent = path.pop()
         self._replace(path, parent, parent.right if parent.left is leaf else parent.left)
 
-    def _merge(self, path: list[_Node], leaf: _Leaf) -> None:
+    def _merge(self, path: list[Node], leaf: Leaf) -> None:
         """Give a small leaf's points to the leaf beside it below the same parent, where there is room."""
         if not path:
             return
@@ -414,14 +245,14 @@ class HullTree:
         on_left = parent.left is leaf
         sibling = parent.right if on_left else parent.left
         neighbour = sibling
-        if isinstance(sibling, _Node):
+        if isinstance(sibling, Node):
             neighbour = sibling.left if on_left else sibling.right
-        assert isinstance(neighbour, _Leaf)  # a leaf's sibling is one level higher at most
+        assert isinstance(neighbour, Leaf)  # a leaf's sibling is one level higher at most
         if len(neighbour.points) + len(leaf.points) > self.LEAF * 3 // 4:
             return
-        merged = _Leaf(leaf.points + neighbour.points if on_left else neighbour.points + leaf.points)
+        merged = Leaf(leaf.points + neighbour.points if on_left else neighbour.points + leaf.points)
         path.pop()
-        if isinstance(sibling, _Node):
+        if isinstance(sibling, Node):
             self._replace(path, parent, sibling)
             self._replace([sibling], neighbour, merged)
             sibling.refresh()
@@ -429,13 +260,13 @@ class HullTree:
             self._replace(path, parent, merged)
         self._rebalance(path)
 
-    def _rebalance(self, path: list[_Node]) -> None:
+    def _rebalance(self, path: list[Node]) -> None:
         """Restore the AVL condition along a path, from its end up; stop where nothing changes any more."""
         while path:
             node = path.pop()
             lean = node.left.height - node.right.height
             if abs(lean) > 1:
-                self._replace(path, node, _rotate(node, to_right=lean > 0))
+                self._replace(path, node, rotate(node, to_right=lean > 0))
                 continue
             height = 1 + max(node.left.height, node.right.height)
             if height == node.height:
@@ -449,7 +280,7 @@ class HullTree:
         self._size = counts.total()
         self._distinct = len(points)
         fill = max(self.LEAF * 3 // 4, 1)
-        self._root = _balanced([_Leaf(points[i : i + fill]) for i in range(0, len(points), fill)])
+        self._root = balanced([Leaf(points[i : i + fill]) for i in range(0, len(points), fill)])
 
     def _rebuild(self, net: Counter[Point]) -> bool:
         """Apply a batch as large as the tree by building it anew."""
@@ -478,7 +309,7 @@ class HullTree:
         stack = [self._root]
         while stack:
             node = stack.pop()
-            if isinstance(node, _Node):
+            if isinstance(node, Node):
                 stack += (node.right, node.left)
             elif node is not None:
                 yield from node.points
@@ -491,7 +322,7 @@ class HullTree:
         stack = [(self._root, LOWEST, HIGHEST)]
         while stack:
             node, lowest, highest = stack.pop()
-            if isinstance(node, _Node):
+            if isinstance(node, Node):
                 a, b = node.bridges[side]
                 if b <= highest:
                     stack.append((node.right, max(b, lowest), highest))
@@ -526,7 +357,7 @@ class HullTree:
             return -1, *beyond_the_ends
         for side in SIDES:
             node = self._root
-            while isinstance(node, _Node):
+            while isinstance(node, Node):
                 a, b = node.bridges[side]
                 if p <= a:
                     node = node.left
@@ -550,7 +381,7 @@ class HullTree:
 
     def _support(self, d: Point) -> Point:
         assert self._root is not None
-        cursor = _Cursor(self._root, UPPER if d[1] > 0 or (d[1] == 0 and d[0] < 0) else LOWER)
+        cursor = Cursor(self._root, UPPER if d[1] > 0 or (d[1] == 0 and d[0] < 0) else LOWER)
         while cursor.a is not cursor.b:
             if direction_sign(d, cursor.a, cursor.b) > 0:
                 cursor.go_right()
@@ -564,13 +395,13 @@ class HullTree:
             return None
         root = self._root
         if a is not b:
-            before = _tangent_to_left(_Cursor(root, side, highest=a), p, SIGNS[side])
-            after = _tangent_to_right(_Cursor(root, side, lowest=b), p, SIGNS[side])
+            before = tangent_to_left(Cursor(root, side, highest=a), p, SIGNS[side])
+            after = tangent_to_right(Cursor(root, side, lowest=b), p, SIGNS[side])
             return (after, before) if side == UPPER else (before, after)
-        if p < _first(root):
-            upper, lower = (_tangent_to_right(_Cursor(root, side), p, SIGNS[side]) for side in SIDES)
+        if p < first_point(root):
+            upper, lower = (tangent_to_right(Cursor(root, side), p, SIGNS[side]) for side in SIDES)
             return upper, lower
-        upper, lower = (_tangent_to_left(_Cursor(root, side), p, SIGNS[side]) for side in SIDES)
+        upper, lower = (tangent_to_left(Cursor(root, side), p, SIGNS[side]) for side in SIDES)
         return lower, upper
 
     # Verification
@@ -581,29 +412,30 @@ class HullTree:
         O(n log n) orientations, none of them shared with the searches.
         """
         points = list(self._all_points())
-        assert points == sorted(set(points)), "points out of order"
-        assert len(points) == self._distinct, f"{len(points)} distinct points, {self._distinct} counted"
-        assert set(self._copies) <= set(points), "a count without its point"
-        assert all(count > 1 for count in self._copies.values()), "a count below two"
-        assert self._size == self._distinct + sum(self._copies.values()) - len(self._copies), "size is wrong"
+        _require(points == sorted(set(points)), "points out of order")
+        _require(len(points) == self._distinct, f"{len(points)} distinct points, {self._distinct} counted")
+        _require(set(self._copies) <= set(points), "a count without its point")
+        _require(all(count > 1 for count in self._copies.values()), "a count below two")
+        extra = sum(self._copies.values()) - len(self._copies)
+        _require(self._size == self._distinct + extra, f"{self._size} points, {self._distinct} and {extra} copies")
         if self._root is not None:
             self._check(self._root)
 
-    def _check(self, tree: _Tree) -> list[Point]:
-        if isinstance(tree, _Leaf):
-            assert 0 < len(tree.points) <= self.LEAF, f"a leaf of {len(tree.points)} points"
+    def _check(self, tree: Tree) -> list[Point]:
+        """The points below, after checking them."""
+        if isinstance(tree, Leaf):
+            _require(0 < len(tree.points) <= self.LEAF, f"a leaf of {len(tree.points)} points")
             for side, chain in enumerate(tree.chains):
-                assert (chain[0], chain[-1]) == (tree.points[0], tree.points[-1]), "a chain without its ends"
-                for a, b in zip(chain, chain[1:], strict=False):
-                    _check_edge((a, b), tree.points, side)
+                _require((chain[0], chain[-1]) == (tree.points[0], tree.points[-1]), "a chain without its ends")
+                for edge in pairwise(chain):
+                    _check_edge(edge, tree.points, side)
             return tree.points
         left, right = self._check(tree.left), self._check(tree.right)
-        assert left[-1] < tree.separator <= right[0], "separator out of place"
-        assert tree.height == 1 + max(tree.left.height, tree.right.height), "height is wrong"
-        assert abs(tree.left.height - tree.right.height) <= 1, "out of balance"
+        _require(left[-1] < tree.separator <= right[0], "separator out of place")
+        _require(tree.height == 1 + max(tree.left.height, tree.right.height), "height is wrong")
+        _require(abs(tree.left.height - tree.right.height) <= 1, "out of balance")
         for side, (a, b) in enumerate(tree.bridges):
-            assert left[bisect_left(left, a)] == a, "a bridge that starts nowhere"
-            assert right[bisect_left(right, b)] == b, "a bridge that ends nowhere"
+            _require(a in left and b in right, f"the bridge {a} {b} does not join the children")
             _check_edge((a, b), left + right, side)
         return left + right
 
@@ -612,43 +444,13 @@ def _check_edge(edge: Edge, points: Sequence[Point], side: int) -> None:
     a, b = edge
     for p in points:
         turn = SIGNS[side] * orientation(a, b, p)
-        assert turn < 0 or (turn == 0 and a <= p <= b), f"{p} lies outside the edge {edge}"
+        _require(turn < 0 or (turn == 0 and a <= p <= b), f"{p} lies outside the edge {edge}")
 
 
-def _rotate(node: _Node, *, to_right: bool) -> _Node:
-    """Lift the higher child of a node out of balance; where its inner child is the higher one, that one. O(log n)."""
-    if to_right:
-        top = node.left
-        assert isinstance(top, _Node)
-        if top.left.height < top.right.height:
-            top = _rotate(top, to_right=False)
-        node.left, top.right = top.right, node
-    else:
-        top = node.right
-        assert isinstance(top, _Node)
-        if top.right.height < top.left.height:
-            top = _rotate(top, to_right=True)
-        node.right, top.left = top.left, node
-    node.refresh()
-    top.refresh()
-    return top
-
-
-def _balanced(trees: Sequence[_Tree]) -> _Tree | None:
-    """Join trees of equal height, in order, under a balanced top."""
-    if len(trees) > 1:
-        middle = len(trees) // 2
-        left, right = _balanced(trees[:middle]), _balanced(trees[middle:])
-        assert left is not None
-        assert right is not None
-        return _Node(left, right)
-    return trees[0] if trees else None
-
-
-def _first(tree: _Tree) -> Point:
-    while isinstance(tree, _Node):
-        tree = tree.left
-    return tree.points[0]
+def _require(condition: bool, what: str) -> None:
+    """An assert that python -O keeps."""
+    if not condition:
+        raise AssertionError(what)
 
 
 def _tuples(xy: Points) -> list[Point]:

@@ -45,7 +45,7 @@ def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trac
 
 
 def half_chain(points: Sequence[Point], sign: int) -> list[Point]:
-    """One side's strict chain of distinct points in lexicographic order: the upper for sign +1, the lower for -1. O(n)."""
+    """The strict upper (sign +1) or lower (sign -1) chain of distinct points in lexicographic order. O(n)."""
     chain: list[Point] = []
     for p in points:
         while len(chain) > 1 and sign * orientation(chain[-2], chain[-1], p) >= 0:

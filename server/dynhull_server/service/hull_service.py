@@ -90,12 +90,12 @@ class HullService(hull_service_pb2_grpc.HullServiceServicer):
             hull = self._hull(request.name)
             encoding = codec.decode_encoding(request.encoding)
             counts, vertices = await hull.vertices(request.min_revision)
-            response = pb.GetHullResponse(
-                hull=codec.encode_hull(hull, counts), vertices=codec.encode_points(vertices, encoding)
+            measures = await asyncio.to_thread(codec.encode_measures, vertices)
+            return pb.GetHullResponse(
+                hull=codec.encode_hull(hull, counts),
+                vertices=codec.encode_points(vertices, encoding),
+                measures=measures,
             )
-            if request.include_measures:
-                response.measures.CopyFrom(await asyncio.to_thread(codec.encode_measures, vertices))
-            return response
 
     async def Watch(self, request: pb.WatchRequest, context: Context) -> AsyncIterator[pb.WatchResponse]:
         async with self._calls.waiting(context):

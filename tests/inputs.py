@@ -1,0 +1,29 @@
+"""Points that hull code gets wrong, as hypothesis strategies."""
+
+from hypothesis import strategies as st
+
+ULP = 2.0**-53
+# Integer points on the circle of radius sqrt(5525): all of them vertices, exactly.
+CIRCLE = [(float(x), float(y)) for x in range(-75, 76) for y in range(-75, 76) if x * x + y * y == 5525]
+
+EXTREME = [0.0, -0.0, 1.0, 3.0, 9e15, 5e-324, 1e-323, 2.2250738585072014e-308, 1e-200, 1e-160, 1e160, 1.7e308]
+
+grid = st.integers(0, 3).map(float)
+ulps = st.integers(-4, 4).map(lambda i: 0.5 + i * ULP)
+extremes = st.sampled_from(EXTREME + [-value for value in EXTREME])
+finite = st.floats(allow_nan=False, allow_infinity=False)
+coordinates = {"grid": grid, "ulps": ulps, "extremes": extremes, "finite": finite}
+
+line = st.integers(-5, 5).map(lambda i: (i * 0.1, i * 0.3))
+point = st.one_of(
+    *(st.tuples(coordinate, coordinate) for coordinate in coordinates.values()),
+    st.sampled_from(CIRCLE),
+    line,
+)
+
+
+def points(max_size: int) -> st.SearchStrategy[list[tuple[float, float]]]:
+    """Lists of points, of one kind or mixed."""
+    kinds = [st.tuples(coordinate, coordinate) for coordinate in coordinates.values()]
+    kinds += [st.sampled_from(CIRCLE), line, point]
+    return st.one_of(*(st.lists(kind, max_size=max_size) for kind in kinds))

@@ -1,0 +1,64 @@
+"""What is right, from rational arithmetic and definitions: slow, and shares nothing with the library."""
+
+from collections.abc import Iterable
+from fractions import Fraction
+
+Point = tuple[float, float]
+
+
+def turn(a: Point, b: Point, c: Point) -> int:
+    (ax, ay), (bx, by), (cx, cy) = [(Fraction(x), Fraction(y)) for x, y in (a, b, c)]
+    det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return (det > 0) - (det < 0)
+
+
+def distinct(points: Iterable[Point]) -> list[Point]:
+    return sorted({(x + 0.0, y + 0.0) for x, y in points})
+
+
+def hull(points: Iterable[Point]) -> list[Point]:
+    """Strict vertices, counter-clockwise from the least: from each, the one that has no point on its right."""
+    candidates = distinct(points)
+    if len(candidates) < 2:
+        return candidates
+    vertices = [candidates[0]]
+    while True:
+        p = vertices[-1]
+        best = None
+        for q in candidates:
+            if q == p:
+                continue
+            side = -1 if best is None else turn(p, best, q)
+            if side < 0 or (side == 0 and (p < best < q or p > best > q)):
+                best = q
+        if best == vertices[0]:
+            return vertices
+        vertices.append(best)
+
+
+def boundary(points: Iterable[Point]) -> list[Point]:
+    """Every distinct point on the hull's boundary, counter-clockwise from the least; a flat hull's in order."""
+    candidates = distinct(points)
+    corners = hull(candidates)
+    if len(corners) < 3:
+        return candidates
+    result = []
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        low, high = min(a, b), max(a, b)
+        edge = [p for p in candidates if low <= p <= high and turn(a, b, p) == 0]
+        result += (edge if a < b else edge[::-1])[:-1]
+    return result
+
+
+def locate(corners: list[Point], p: Point) -> int:
+    """+1 inside, 0 on the boundary, -1 outside of a hull given by its vertices."""
+    if not corners:
+        return -1
+    if len(corners) < 3:
+        low, high = min(corners), max(corners)
+        return 0 if turn(low, high, p) == 0 and low <= p <= high else -1
+    return min(turn(a, b, p) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
+
+
+def dot(d: Point, p: Point) -> Fraction:
+    return Fraction(d[0]) * Fraction(p[0]) + Fraction(d[1]) * Fraction(p[1])
