@@ -7,23 +7,24 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import grpc
+from google.protobuf.message import DecodeError
 from grpc_status import rpc_status
 
-from ..engine.errors import RefusedError
-from .codec import InvalidFieldError
-from .status import DrainingError, refusal_status
+from .status import ANSWERED, DrainingError, error_status
+
+Context = grpc.aio.ServicerContext[Any, Any]
 
 log = logging.getLogger(__name__)
 
 
 class Progress:
-    """How many batches a call has applied."""
+    """How many batches a call has applied; None for calls that apply none or one."""
 
     batches: int | None = None
 
 
 class Calls:
-    """Every call runs inside `short` or `waiting`."""
+    """Every call runs inside `short` or `waiting`, which take its request to see whether it is one."""
 
     def __init__(self) -> None:
         self._draining = False
@@ -36,25 +37,28 @@ class Calls:
             cutoff.reschedule(asyncio.get_running_loop().time())
 
     @asynccontextmanager
-    async def short(self, context: grpc.aio.ServicerContext[Any, Any]) -> AsyncIterator[Progress]:
+    async def short(self, context: Context, request: object) -> AsyncIterator[Progress]:
         """A call that ends by itself."""
         progress = Progress()
         try:
             if self._draining:
                 raise DrainingError
+            if isinstance(request, DecodeError):
+                raise request
             yield progress
-        except (RefusedError, InvalidFieldError, DrainingError) as error:
-            await _abort(context, error, progress)
-        except (grpc.aio.AbortError, asyncio.CancelledError):
+        except ANSWERED as error:
+            status = rpc_status.to_status(error_status(error, progress.batches))
+            await context.abort(status.code, status.details, status.trailing_metadata)
+        except grpc.aio.AbortError:
             raise
         except Exception:
             log.exception("a call failed; this is a bug")
             await context.abort(grpc.StatusCode.INTERNAL, "internal error, see the server's log")
 
     @asynccontextmanager
-    async def waiting(self, context: grpc.aio.ServicerContext[Any, Any]) -> AsyncIterator[Progress]:
+    async def waiting(self, context: Context, request: object) -> AsyncIterator[Progress]:
         """A call that may wait for others: for a revision, or for its client's next message."""
-        async with self.short(context) as progress:
+        async with self.short(context, request) as progress:
             try:
                 async with asyncio.timeout(None) as cutoff:
                     self._waiting.add(cutoff)
@@ -64,12 +68,3 @@ class Calls:
                         self._waiting.discard(cutoff)
             except TimeoutError:
                 raise DrainingError from None
-
-
-async def _abort(
-    context: grpc.aio.ServicerContext[Any, Any],
-    error: RefusedError | InvalidFieldError | DrainingError,
-    progress: Progress,
-) -> None:
-    status = rpc_status.to_status(refusal_status(error, progress.batches))
-    await context.abort(status.code, status.details, status.trailing_metadata)
