@@ -22,12 +22,12 @@ class InstalledCommands(TyperGroup):
 
 
 def _command(entry: EntryPoint) -> Any:
-    try:
-        function = entry.load()
-    except ModuleNotFoundError as error:
-        function = _not_installed(entry, error)
     command = typer.Typer(add_completion=False)
-    command.command(entry.name)(function)
+    try:
+        command.command(entry.name)(entry.load())
+    except ModuleNotFoundError as error:
+        anything = {"allow_extra_args": True, "ignore_unknown_options": True}
+        command.command(entry.name, context_settings=anything)(_not_installed(entry, error))
     return typer.main.get_command(command)
 
 
@@ -43,7 +43,7 @@ def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Any:
         )
         raise typer.Exit(1)
 
-    explain.__doc__ = f"(not installed: pip install 'dynhull[{extras}]')"
+    explain.__doc__ = f'Not installed: needs the extra "{extras}".'
     return explain
 
 
