@@ -100,14 +100,17 @@ class HullService(hull_service_pb2_grpc.HullServiceServicer):
             )
 
     async def Watch(self, request: pb.WatchRequest, context: Context) -> AsyncIterator[pb.WatchResponse]:
-        async with self._calls.waiting(context, request):
+        async with self._calls.streaming(context, request):
             hull = self._hull(request.name)
             encoding = codec.decode_encoding(request.encoding)
             min_interval = codec.decode_rate(request.max_events_per_second)
             progress_interval = codec.decode_interval(request)
             async with aclosing(watch(hull, request.min_revision, min_interval, progress_interval)) as events:
-                async for event in events:
-                    yield await asyncio.to_thread(codec.encode_event, event, encoding, request.include_measures)
+                while True:
+                    async with self._calls.cutoff():
+                        event = await anext(events)
+                        message = await asyncio.to_thread(codec.encode_event, event, encoding, request.include_measures)
+                    yield message
 
     async def Verify(self, request: pb.VerifyRequest, context: Context) -> pb.VerifyResponse:
         async with self._calls.waiting(context, request):

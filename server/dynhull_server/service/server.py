@@ -13,6 +13,9 @@ from .methods import DESCRIPTOR, method_handlers
 
 SERVICE = DESCRIPTOR.full_name
 
+# Seconds for statuses to reach clients. A client that has stopped reading does not hold up the end.
+LAST_WORDS = 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -66,6 +69,6 @@ class Server:
     async def drain(self, grace: float) -> None:
         """Refuse new calls, end those that wait, and give the others `grace` seconds to finish."""
         await self._health.enter_graceful_shutdown()
-        self._calls.drain()
-        await self._server.stop(grace)
+        await self._calls.drain(grace)
+        await self._server.stop(LAST_WORDS)
         self._engine.close()
