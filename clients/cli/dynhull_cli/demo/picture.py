@@ -26,14 +26,27 @@ def draw(path: Path, scene: Scene, frame: Frame, vertices: Points, area: float) 
     wide, high = np.ptp(everything, axis=0)
     height = WIDTH * min(max(high / wide if wide else 1.0, FLATTEST), 1.0) + TITLE_HEIGHT
     figure, axes = plt.subplots(figsize=(WIDTH, height), dpi=130, layout="constrained")
-    axes.scatter(*scene.background.T, s=8, color=GROUND_COLOUR, label="airports" if len(scene.background) else None)
+    axes.scatter(
+        scene.background[:, 0],
+        scene.background[:, 1],
+        s=8,
+        color=GROUND_COLOUR,
+        label="airports" if len(scene.background) else None,
+    )
     outline = np.concatenate([vertices, vertices[:1]])
     axes.fill(*outline.T, facecolor=HULL_COLOUR, alpha=0.10)
     axes.plot(*outline.T, color=HULL_COLOUR, linewidth=1.6, label=f"convex hull, {len(vertices)} vertices")
     axes.scatter(
-        *frame.positions.T, s=12, color=POINT_COLOUR, label=f"{len(frame.positions):,} {scene.counted}", zorder=3
+        frame.positions[:, 0],
+        frame.positions[:, 1],
+        s=12,
+        color=POINT_COLOUR,
+        label=f"{len(frame.positions):,} {scene.counted}",
+        zorder=3,
     )
-    axes.scatter(*vertices.T, s=38, facecolor="white", edgecolor=HULL_COLOUR, linewidth=1.6, zorder=4)
+    axes.scatter(
+        vertices[:, 0], vertices[:, 1], s=38, facecolor="white", edgecolor=HULL_COLOUR, linewidth=1.6, zorder=4
+    )
     middle = vertices.mean(axis=0)
     if len(vertices) <= MOST_LABELS:
         for vertex, name in zip(vertices, frame.names_at(vertices), strict=True):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from time import monotonic
 
 import numpy as np
+
 from dynhull_client import HullClient, HullCopy
 
 from .scene import Frame, Points, Scene
@@ -45,7 +46,7 @@ class Watcher:
         try:
             for event in self._events:
                 with self._moved:
-                    self._copy.apply(event)
+                    self._copy.update(event)
                     self._moved.notify_all()
         except Exception as failure:  # handed to whoever waits for the copy
             with self._moved:
@@ -83,8 +84,9 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
             for revision, frame in enumerate(scene.frames(), start=1):
                 stream.apply(insert=frame.insert, delete=frame.delete)
                 verified = client.verify(name, min_revision=revision)
-                live = client.get_hull(name, min_revision=revision)
+                live = client.get_hull(name, min_revision=revision, measures=True)
                 copy = watcher.vertices_at(revision)
+                assert live.measures is not None  # asked for
                 difference = None
                 if not verified.equal:
                     difference = f"the live hull differs from Chan's recomputation: {verified.difference}"
