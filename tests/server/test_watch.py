@@ -28,8 +28,8 @@ def test_a_change_makes_the_new_hull_of_the_old(old: list[tuple[float, float]], 
     before, after = DynamicHull(old).vertices(), DynamicHull(old[: len(old) // 2] + new).vertices()
     event = EngineChange(COUNTS, before, after, difference(before, after))
     copy = HullCopy()
-    copy.apply(Snapshot(1, 0, before, None))
-    copy.apply(decode_event(encode_event(event, points_pb2.POINT_ENCODING_PACKED, False)))
+    copy.update(Snapshot(1, 0, before, None))
+    copy.update(decode_event(encode_event(event, points_pb2.POINT_ENCODING_PACKED, False)))
     assert copy.vertices.tolist() == after.tolist()
     assert copy.revision == 2
 
@@ -64,7 +64,7 @@ def test_every_event_makes_the_exact_hull(address: str, name: str, max_rate: flo
             while copy.revision < batches:
                 event = next(watch)
                 assert event.revision >= copy.revision
-                copy.apply(event)
+                copy.update(event)
                 assert copy.vertices.tolist() == hulls[copy.revision].tolist()
                 seen += 1
             writer.join()

@@ -61,7 +61,7 @@ class HullCopy:
         self.points = 0
         self.vertices: Points = np.empty((0, 2))
 
-    def apply(self, event: Event) -> None:
+    def update(self, event: Event) -> None:
         """Do what the event says. O(h)."""
         if isinstance(event, Snapshot):
             self.vertices = event.vertices
@@ -72,7 +72,7 @@ class HullCopy:
     def follow(self, watch: Iterator[Event], revision: int) -> None:
         """Take events until the copy has the revision or a later one."""
         while self.revision < revision:
-            self.apply(next(watch))
+            self.update(next(watch))
 
 
 def _changed(vertices: Points, change: Change) -> Points:
