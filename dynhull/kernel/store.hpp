@@ -86,6 +86,12 @@ class Store {
  public:
   Store() = default;
   Store(Store&& other) noexcept { swap(other); }
+  Store(const Store& other) : used_(other.used_), freed_(other.freed_), free_(other.free_) {
+    if (used_ == 0) return;
+    data_ = static_cast<Record*>(memory::resize(nullptr, 0, whole_pages(used_)));
+    capacity_ = used_;
+    std::copy_n(other.data_, used_, data_);
+  }
   Store& operator=(Store&& other) noexcept {
     swap(other);
     return *this;
