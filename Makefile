@@ -1,7 +1,7 @@
 # One word for each thing people do here. Everything runs in .venv, made on first use.
 PYTHON ?= python3
 BIN := .venv/bin
-DAY ?= 2013-02-08
+DAY ?= 2013-03-08
 
 .PHONY: demo test check proto clean
 

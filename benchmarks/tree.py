@@ -19,12 +19,12 @@ Point = tuple[float, float]
 
 
 def per_update(delete: Callable[[Point], object], insert: Callable[[Point], object], old: list, new: list) -> float:
-    """Microseconds for one delete and one insert."""
-    start = time.perf_counter()
+    """Microseconds of processor time for one delete and one insert."""
+    start = time.process_time()
     for gone, come in zip(old, new, strict=True):
         delete(gone)
         insert(come)
-    return (time.perf_counter() - start) / len(old) * 1e6
+    return (time.process_time() - start) / len(old) * 1e6
 
 
 def main() -> None:

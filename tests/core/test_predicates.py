@@ -1,5 +1,7 @@
 """Every sign equals the one from rational arithmetic."""
 
+import random
+from fractions import Fraction
 from itertools import permutations, product
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from inputs import EXTREME, ULP, point
 
 import dynhull
+from dynhull.predicates import crossing, direction_sign, orientation
 
 CASES = Path(__file__).parents[1] / "data" / "orient2d.txt"
 
@@ -29,12 +32,31 @@ def test_perturbation_grid():
     """Kettner, Mehlhorn, Pion, Schirra, Yap: 65,536 points around (0.5, 0.5), one unit in the last place apart."""
     steps = 0.5 + np.arange(256) * ULP
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1)
-    signs = dynhull.orient2d(grid, (12, 12), (24, 24))
+    # The last point is the one that the others are taken relative to: rounding differs for each.
+    rotations = [
+        dynhull.orient2d(*three)
+        for three in ((grid, (12, 12), (24, 24)), ((12, 12), (24, 24), grid), ((24, 24), grid, (12, 12)))
+    ]
     for i, j in product(range(256), repeat=2):
         a = (0.5 + i * ULP, 0.5 + j * ULP)
         expected = oracle.turn(a, (12.0, 12.0), (24.0, 24.0))
-        assert signs[i, j] == expected
-        assert dynhull.orient2d(a, (12.0, 12.0), (24.0, 24.0)) == expected
+        assert [signs[i, j] for signs in rotations] == [expected] * 3
+        assert orientation((12.0, 12.0), (24.0, 24.0), a) == expected
+        assert orientation(a, (12.0, 12.0), (24.0, 24.0)) == expected
+
+
+def test_points_very_near_a_line():
+    random_ = random.Random(0)
+    triples = []
+    for _ in range(5000):
+        (ax, ay), (bx, by) = [(random_.random(), random_.random()) for _ in range(2)]
+        along = random_.random() * 3 - 1
+        triples.append(((ax, ay), (bx, by), (ax + along * (bx - ax), ay + along * (by - ay))))
+    a, b, c = np.array(triples).transpose(1, 0, 2)
+    expected = [oracle.turn(*triple) for triple in triples]
+    assert dynhull.orient2d(a, b, c).tolist() == expected
+    assert [orientation(*triple) for triple in triples] == expected
+    assert [orientation(r, p, q) for p, q, r in triples] == expected
 
 
 @given(point, point, point)
@@ -75,3 +97,55 @@ def test_not_finite_is_refused(name, value):
     arguments[name] = [(0, 0), (value, 1)]
     with pytest.raises(ValueError, match=rf"^{name} row 1 is .*must be finite"):
         dynhull.orient2d(**arguments)
+
+
+def exact(*points):
+    return [(Fraction(x), Fraction(y)) for x, y in points]
+
+
+def sign(value):
+    return (value > 0) - (value < 0)
+
+
+def exact_crossing(*points):
+    (ax, ay), (bx, by), (cx, cy), (dx, dy), (zx, zy) = exact(*points)
+    det_ab = (ax - zx) * (by - zy) - (ay - zy) * (bx - zx)
+    det_cd = (cx - zx) * (dy - zy) - (cy - zy) * (dx - zx)
+    return sign(det_cd * (bx - ax) - det_ab * (dx - cx))
+
+
+@given(st.lists(point, min_size=5, max_size=5))
+def test_any_crossing(points):
+    assert crossing(*points) == exact_crossing(*points)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-150, 1e120])
+def test_lines_that_cross_very_near_the_vertical(scale):
+    """Where the two heights differ by less than rounding: the sign that no hull test can be sure to need."""
+    random_ = random.Random(0)
+    signs = set()
+    for _ in range(3000):
+        a, b, c, d = [(random_.random(), random_.random()) for _ in range(4)]
+        (ax, ay), (bx, by), (cx, cy), (dx, dy) = exact(a, b, c, d)
+        slope_ab, slope_cd = (by - ay) / (bx - ax), (dy - cy) / (dx - cx)
+        z = float((ay - cy + slope_cd * cx - slope_ab * ax) / (slope_cd - slope_ab)), random_.random()
+        points = [(x * scale, y * scale) for x, y in (a, b, c, d, z)]
+        signs.add(exact_crossing(*points))
+        assert crossing(*points) == exact_crossing(*points)
+    assert {-1, 1} <= signs
+
+
+@given(point, point, point)
+def test_any_direction(d, a, b):
+    expected = sign(oracle.dot(d, b) - oracle.dot(d, a))
+    assert direction_sign(d, a, b) == expected
+
+
+def test_directions_across_an_edge():
+    """Directions as near as rounding gets to the normal of the edge, whose own difference is rounded too."""
+    random_ = random.Random(0)
+    for _ in range(3000):
+        a, b = [tuple(random_.uniform(-1, 1) * 10 ** random_.uniform(-3, 3) for _ in range(2)) for _ in range(2)]
+        stretch = random_.random()
+        d = stretch * (a[1] - b[1]), stretch * (b[0] - a[0])
+        assert direction_sign(d, a, b) == sign(oracle.dot(d, b) - oracle.dot(d, a))

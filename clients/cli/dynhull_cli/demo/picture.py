@@ -1,0 +1,65 @@
+"""The hull at its largest, with the points in it."""
+
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from .scene import Frame, Points, Scene
+
+HULL_COLOUR, POINT_COLOUR, GROUND_COLOUR = "#0072B2", "#D55E00", "#B8B8B8"
+TICK_COLOUR = "#707070"
+LABEL_OFFSET = 9  # typographic points, away from the hull
+MARGIN = 0.1  # of the picture's width and height
+WIDTH, TITLE_HEIGHT = 12, 0.8  # inches
+FLATTEST = 0.4  # height of the drawing over its width
+MOST_LABELS = 24
+
+
+def draw(path: Path, scene: Scene, frame: Frame, vertices: Points, area: float) -> None:
+    """Write a PNG of one frame: background, points, hull, the corners' names."""
+    everything = np.concatenate([vertices, scene.background])
+    wide, high = np.ptp(everything, axis=0)
+    height = WIDTH * min(max(high / wide if wide else 1.0, FLATTEST), 1.0) + TITLE_HEIGHT
+    figure, axes = plt.subplots(figsize=(WIDTH, height), dpi=130, layout="constrained")
+    axes.scatter(
+        scene.background[:, 0],
+        scene.background[:, 1],
+        s=8,
+        color=GROUND_COLOUR,
+        label="airports" if len(scene.background) else None,
+    )
+    outline = np.concatenate([vertices, vertices[:1]])
+    axes.fill(*outline.T, facecolor=HULL_COLOUR, alpha=0.10)
+    axes.plot(*outline.T, color=HULL_COLOUR, linewidth=1.6, label=f"convex hull, {len(vertices)} vertices")
+    axes.scatter(
+        frame.positions[:, 0],
+        frame.positions[:, 1],
+        s=12,
+        color=POINT_COLOUR,
+        label=f"{len(frame.positions):,} {scene.counted}",
+        zorder=3,
+    )
+    axes.scatter(
+        vertices[:, 0], vertices[:, 1], s=38, facecolor="white", edgecolor=HULL_COLOUR, linewidth=1.6, zorder=4
+    )
+    middle = vertices.mean(axis=0)
+    if len(vertices) <= MOST_LABELS:
+        for vertex, name in zip(vertices, frame.names_at(vertices), strict=True):
+            x, y = LABEL_OFFSET * (vertex - middle) / (np.hypot(*(vertex - middle)) or 1.0)
+            side = "left" if x >= 0 else "right"
+            axes.annotate(name, vertex, (x, y), textcoords="offset points", ha=side, va="center", fontsize=9)
+    axes.set_title(f"{scene.title}, {frame.clock}: the hull at its largest, {area:,.0f} {scene.area_unit}", loc="left")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(MARGIN)
+    axes.set_xlabel(scene.length_unit, loc="right", color=TICK_COLOUR)
+    axes.legend(loc="lower left", frameon=False)
+    axes.tick_params(colors=TICK_COLOUR, labelsize=8)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    figure.savefig(path)
+    plt.close(figure)

@@ -1,0 +1,69 @@
+"""What a demo replays: points that come, move and go, frame by frame."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Points = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One batch of changes, and what is there after it.
+
+    Attributes:
+        clock: the frame's time, or whatever orders the frames, as text.
+        delete: (k, 2) points to delete.
+        insert: (m, 2) points to insert.
+        positions: (n, 2) all points after the batch.
+        names: n names, one for each position.
+        milestone: whether to print a line about it.
+    """
+
+    clock: str
+    delete: Points
+    insert: Points
+    positions: Points
+    names: list[str]
+    milestone: bool
+
+    def names_at(self, vertices: Points) -> list[str]:
+        """The name of a point at each of (h, 2) vertices, with the number of others there."""
+        there: dict[tuple[float, ...], list[str]] = {}
+        for position, name in zip(self.positions.tolist(), self.names, strict=True):
+            there.setdefault(tuple(position), []).append(name)
+        found = [there[tuple(vertex)] for vertex in vertices.tolist()]
+        return [first if not others else f"{first} +{len(others)}" for first, *others in found]
+
+
+class Scene(Protocol):
+    """Frames, and the words to speak of them.
+
+    Attributes:
+        title: what it is, for the heading and the picture.
+        hull_name: the hull's name on the server.
+        counted: what the points are, in the plural.
+        step: what a frame is, in the plural.
+        length_unit: the unit of coordinates, as an adjective of an axis.
+        area_unit: the unit of an area.
+        length: how many frames there are.
+        notes: what was left out of the input, and why; printed first.
+        background: (m, 2) points that never move, drawn faintly.
+    """
+
+    title: str
+    hull_name: str
+    counted: str
+    step: str
+    length_unit: str
+    area_unit: str
+    length: int
+    notes: list[str]
+    background: Points
+
+    def frames(self) -> Iterator[Frame]:
+        """The frames in order, each once."""
+        ...

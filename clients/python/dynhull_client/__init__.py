@@ -1,0 +1,63 @@
+"""Client of the dynhull server: numpy arrays in and out.
+
+>>> from dynhull_client import HullClient
+>>> with HullClient("127.0.0.1:50051") as client:  # doctest: +SKIP
+...     client.create_hull("fleet")
+...     client.apply("fleet", insert=[[0, 0], [4, 0], [2, 3]])
+...     print(client.get_hull("fleet").vertices)
+"""
+
+from .client import HullClient
+from .errors import (
+    DeadlineError,
+    DynhullError,
+    HullExistsError,
+    HullNotFoundError,
+    InvalidRequestError,
+    LimitExceededError,
+    PointMissingError,
+    UnavailableError,
+)
+from .ingest import Ingest
+from .messages import (
+    Applied,
+    Change,
+    ChanRound,
+    Difference,
+    Hull,
+    HullInfo,
+    Ingested,
+    Located,
+    Measures,
+    Progress,
+    Snapshot,
+    Verification,
+)
+from .watch import HullCopy, Watch
+
+__all__ = [
+    "Applied",
+    "ChanRound",
+    "Change",
+    "DeadlineError",
+    "Difference",
+    "DynhullError",
+    "Hull",
+    "HullClient",
+    "HullCopy",
+    "HullExistsError",
+    "HullInfo",
+    "HullNotFoundError",
+    "Ingest",
+    "Ingested",
+    "InvalidRequestError",
+    "LimitExceededError",
+    "Located",
+    "Measures",
+    "PointMissingError",
+    "Progress",
+    "Snapshot",
+    "UnavailableError",
+    "Verification",
+    "Watch",
+]

@@ -1,0 +1,37 @@
+"""Arrays as a batch to send."""
+
+from typing import Literal
+
+import numpy.typing as npt
+
+from dynhull.arrays import as_points
+from dynhull_proto.v1 import batch_pb2
+
+from .messages import encode_points
+
+Missing = Literal["raise", "count"]
+
+
+def encode_batch(
+    insert: npt.ArrayLike | None,
+    delete: npt.ArrayLike | None,
+    move: tuple[npt.ArrayLike, npt.ArrayLike] | None,
+    missing: Missing,
+) -> batch_pb2.Batch:
+    """The batch as sent; ValueError or TypeError names the argument and the first bad row."""
+    if missing not in ("raise", "count"):
+        raise ValueError(f'missing must be "raise" or "count", got {missing!r}')
+    batch = batch_pb2.Batch()
+    if missing == "count":
+        batch.missing_points = batch_pb2.MISSING_POINT_POLICY_COUNT
+    if insert is not None:
+        batch.inserts.CopyFrom(encode_points(as_points(insert, "insert")))
+    if delete is not None:
+        batch.deletes.CopyFrom(encode_points(as_points(delete, "delete")))
+    if move is not None:
+        origins, destinations = as_points(move[0], "move[0]"), as_points(move[1], "move[1]")
+        if len(origins) != len(destinations):
+            raise ValueError(f"move has {len(origins)} origins and {len(destinations)} destinations")
+        batch.moves.origins.CopyFrom(encode_points(origins))
+        batch.moves.destinations.CopyFrom(encode_points(destinations))
+    return batch

@@ -1,0 +1,83 @@
+"""What can go wrong, one class a cause."""
+
+from collections.abc import Mapping
+
+import grpc
+from google.rpc.error_details_pb2 import ErrorInfo
+from grpc_status import rpc_status
+
+
+class DynhullError(Exception):
+    """A call that failed.
+
+    Attributes:
+        code: the gRPC status code.
+        reason: the server's word for the cause, such as "POINT_MISSING"; empty where the server did not give one.
+        field: the field of the request at fault, None where it is none in particular.
+        row: the row of the points at fault, None where it is none in particular.
+        value: the value at fault as text, or that of the limit exceeded; None where there is none.
+        batch: of an ingest, how many of its batches were applied before; None of other calls.
+    """
+
+    def __init__(self, message: str, code: grpc.StatusCode, reason: str, metadata: Mapping[str, str]) -> None:
+        super().__init__(message)
+        self.code = code
+        self.reason = reason
+        self.field = metadata.get("field")
+        self.row = _number(metadata.get("row"))
+        self.value = metadata.get("value")
+        self.batch = _number(metadata.get("batch"))
+
+
+class InvalidRequestError(DynhullError, ValueError):
+    """A field of the request holds what it cannot hold; nothing has changed."""
+
+
+class HullNotFoundError(DynhullError, LookupError):
+    """There is no hull of that name."""
+
+
+class HullExistsError(DynhullError):
+    """There is a hull of that name already."""
+
+
+class PointMissingError(DynhullError, LookupError):
+    """A batch deletes a point that is not there; nothing of it was applied."""
+
+
+class LimitExceededError(DynhullError):
+    """The request goes beyond a limit of the server, such as the size of a message."""
+
+
+class UnavailableError(DynhullError, ConnectionError):
+    """There is no server at the address, or it is starting or shutting down."""
+
+
+class DeadlineError(DynhullError, TimeoutError):
+    """The call took longer than its timeout."""
+
+
+BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
+    grpc.StatusCode.INVALID_ARGUMENT: InvalidRequestError,
+    grpc.StatusCode.NOT_FOUND: HullNotFoundError,
+    grpc.StatusCode.ALREADY_EXISTS: HullExistsError,
+    grpc.StatusCode.FAILED_PRECONDITION: PointMissingError,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceededError,
+    grpc.StatusCode.UNAVAILABLE: UnavailableError,
+    grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineError,
+}
+
+
+def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
+    """The error that a finished call ended with."""
+    code, message = call.code(), call.details() or ""
+    info = ErrorInfo()
+    status = rpc_status.from_call(call)
+    for detail in [] if status is None else status.details:
+        if detail.Is(ErrorInfo.DESCRIPTOR):
+            detail.Unpack(info)
+    return BY_CODE.get(code, DynhullError)(message or code.name, code, info.reason, info.metadata)
+
+
+def _number(text: str | None) -> int | None:
+    return None if text is None else int(text)

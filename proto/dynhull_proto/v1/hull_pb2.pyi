@@ -1,0 +1,59 @@
+import datetime
+
+from google.protobuf import timestamp_pb2 as _timestamp_pb2
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Mapping as _Mapping
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class Identity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    IDENTITY_UNSPECIFIED: _ClassVar[Identity]
+    IDENTITY_MULTISET: _ClassVar[Identity]
+IDENTITY_UNSPECIFIED: Identity
+IDENTITY_MULTISET: Identity
+
+class Hull(_message.Message):
+    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    CONFIG_FIELD_NUMBER: _ClassVar[int]
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    DISTINCT_POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    CREATE_TIME_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    config: HullConfig
+    revision: int
+    point_count: int
+    distinct_point_count: int
+    create_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class HullConfig(_message.Message):
+    __slots__ = ("identity",)
+    IDENTITY_FIELD_NUMBER: _ClassVar[int]
+    identity: Identity
+    def __init__(self, identity: _Optional[_Union[Identity, str]] = ...) -> None: ...
+
+class Measures(_message.Message):
+    __slots__ = ("area", "perimeter", "centroid_x", "centroid_y", "min_x", "min_y", "max_x", "max_y")
+    AREA_FIELD_NUMBER: _ClassVar[int]
+    PERIMETER_FIELD_NUMBER: _ClassVar[int]
+    CENTROID_X_FIELD_NUMBER: _ClassVar[int]
+    CENTROID_Y_FIELD_NUMBER: _ClassVar[int]
+    MIN_X_FIELD_NUMBER: _ClassVar[int]
+    MIN_Y_FIELD_NUMBER: _ClassVar[int]
+    MAX_X_FIELD_NUMBER: _ClassVar[int]
+    MAX_Y_FIELD_NUMBER: _ClassVar[int]
+    area: float
+    perimeter: float
+    centroid_x: float
+    centroid_y: float
+    min_x: float
+    min_y: float
+    max_x: float
+    max_y: float
+    def __init__(self, area: _Optional[float] = ..., perimeter: _Optional[float] = ..., centroid_x: _Optional[float] = ..., centroid_y: _Optional[float] = ..., min_x: _Optional[float] = ..., min_y: _Optional[float] = ..., max_x: _Optional[float] = ..., max_y: _Optional[float] = ...) -> None: ...

@@ -1,0 +1,239 @@
+import datetime
+
+from dynhull_proto.v1 import batch_pb2 as _batch_pb2
+from dynhull_proto.v1 import hull_pb2 as _hull_pb2
+from dynhull_proto.v1 import points_pb2 as _points_pb2
+from google.protobuf import duration_pb2 as _duration_pb2
+from google.protobuf.internal import containers as _containers
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class CreateHullRequest(_message.Message):
+    __slots__ = ("name", "config")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    CONFIG_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    config: _hull_pb2.HullConfig
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[_hull_pb2.HullConfig, _Mapping]] = ...) -> None: ...
+
+class CreateHullResponse(_message.Message):
+    __slots__ = ("hull",)
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    hull: _hull_pb2.Hull
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
+
+class DeleteHullRequest(_message.Message):
+    __slots__ = ("name",)
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    def __init__(self, name: _Optional[str] = ...) -> None: ...
+
+class DeleteHullResponse(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
+class ListHullsRequest(_message.Message):
+    __slots__ = ("prefix", "page_size", "page_token")
+    PREFIX_FIELD_NUMBER: _ClassVar[int]
+    PAGE_SIZE_FIELD_NUMBER: _ClassVar[int]
+    PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    prefix: str
+    page_size: int
+    page_token: str
+    def __init__(self, prefix: _Optional[str] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ...) -> None: ...
+
+class ListHullsResponse(_message.Message):
+    __slots__ = ("hulls", "next_page_token")
+    HULLS_FIELD_NUMBER: _ClassVar[int]
+    NEXT_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    hulls: _containers.RepeatedCompositeFieldContainer[_hull_pb2.Hull]
+    next_page_token: str
+    def __init__(self, hulls: _Optional[_Iterable[_Union[_hull_pb2.Hull, _Mapping]]] = ..., next_page_token: _Optional[str] = ...) -> None: ...
+
+class ApplyRequest(_message.Message):
+    __slots__ = ("name", "batch")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    BATCH_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    batch: _batch_pb2.Batch
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ...) -> None: ...
+
+class ApplyResponse(_message.Message):
+    __slots__ = ("result",)
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    result: _batch_pb2.BatchResult
+    def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ...) -> None: ...
+
+class IngestRequest(_message.Message):
+    __slots__ = ("name", "batch")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    BATCH_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    batch: _batch_pb2.Batch
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ...) -> None: ...
+
+class IngestResponse(_message.Message):
+    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count")
+    BATCHES_FIELD_NUMBER: _ClassVar[int]
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    INSERTED_FIELD_NUMBER: _ClassVar[int]
+    DELETED_FIELD_NUMBER: _ClassVar[int]
+    MISSING_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    batches: int
+    revision: int
+    inserted: int
+    deleted: int
+    missing: int
+    point_count: int
+    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ...) -> None: ...
+
+class LocateRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "points")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    points: _points_pb2.Points
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class LocateResponse(_message.Message):
+    __slots__ = ("revision", "sides")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    SIDES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    sides: bytes
+    def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ...) -> None: ...
+
+class GetHullRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding", "include_measures")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_MEASURES_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    include_measures: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ...) -> None: ...
+
+class GetHullResponse(_message.Message):
+    __slots__ = ("hull", "vertices", "measures")
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    MEASURES_FIELD_NUMBER: _ClassVar[int]
+    hull: _hull_pb2.Hull
+    vertices: _points_pb2.Points
+    measures: _hull_pb2.Measures
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
+
+class WatchRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_MEASURES_FIELD_NUMBER: _ClassVar[int]
+    MAX_EVENTS_PER_SECOND_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_INTERVAL_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    include_measures: bool
+    max_events_per_second: float
+    progress_interval: _duration_pb2.Duration
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ...) -> None: ...
+
+class WatchResponse(_message.Message):
+    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "measures")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    CHANGE_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    MEASURES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    point_count: int
+    snapshot: HullSnapshot
+    change: HullChange
+    progress: HullProgress
+    measures: _hull_pb2.Measures
+    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
+
+class HullSnapshot(_message.Message):
+    __slots__ = ("vertices",)
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    vertices: _points_pb2.Points
+    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class HullChange(_message.Message):
+    __slots__ = ("removed", "removed_indices", "added", "added_indices", "rotation")
+    REMOVED_FIELD_NUMBER: _ClassVar[int]
+    REMOVED_INDICES_FIELD_NUMBER: _ClassVar[int]
+    ADDED_FIELD_NUMBER: _ClassVar[int]
+    ADDED_INDICES_FIELD_NUMBER: _ClassVar[int]
+    ROTATION_FIELD_NUMBER: _ClassVar[int]
+    removed: _points_pb2.Points
+    removed_indices: _containers.RepeatedScalarFieldContainer[int]
+    added: _points_pb2.Points
+    added_indices: _containers.RepeatedScalarFieldContainer[int]
+    rotation: int
+    def __init__(self, removed: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., removed_indices: _Optional[_Iterable[int]] = ..., added: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., added_indices: _Optional[_Iterable[int]] = ..., rotation: _Optional[int] = ...) -> None: ...
+
+class HullProgress(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
+class VerifyRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class VerifyResponse(_message.Message):
+    __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    EQUAL_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_COUNT_FIELD_NUMBER: _ClassVar[int]
+    ROUNDS_FIELD_NUMBER: _ClassVar[int]
+    FIRST_DIFFERENCE_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    equal: bool
+    point_count: int
+    vertex_count: int
+    rounds: _containers.RepeatedCompositeFieldContainer[ChanRound]
+    first_difference: VertexDifference
+    def __init__(self, revision: _Optional[int] = ..., equal: bool = ..., point_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., rounds: _Optional[_Iterable[_Union[ChanRound, _Mapping]]] = ..., first_difference: _Optional[_Union[VertexDifference, _Mapping]] = ...) -> None: ...
+
+class ChanRound(_message.Message):
+    __slots__ = ("guess", "groups", "steps", "cost", "closed")
+    GUESS_FIELD_NUMBER: _ClassVar[int]
+    GROUPS_FIELD_NUMBER: _ClassVar[int]
+    STEPS_FIELD_NUMBER: _ClassVar[int]
+    COST_FIELD_NUMBER: _ClassVar[int]
+    CLOSED_FIELD_NUMBER: _ClassVar[int]
+    guess: int
+    groups: int
+    steps: int
+    cost: float
+    closed: bool
+    def __init__(self, guess: _Optional[int] = ..., groups: _Optional[int] = ..., steps: _Optional[int] = ..., cost: _Optional[float] = ..., closed: bool = ...) -> None: ...
+
+class VertexDifference(_message.Message):
+    __slots__ = ("index", "live", "recomputed")
+    INDEX_FIELD_NUMBER: _ClassVar[int]
+    LIVE_FIELD_NUMBER: _ClassVar[int]
+    RECOMPUTED_FIELD_NUMBER: _ClassVar[int]
+    index: int
+    live: _points_pb2.Points
+    recomputed: _points_pb2.Points
+    def __init__(self, index: _Optional[int] = ..., live: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., recomputed: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...

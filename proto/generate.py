@@ -1,0 +1,65 @@
+"""Generate the Python package dynhull_proto from the .proto files: `generate.py`, or `generate.py --check`."""
+
+import argparse
+import sys
+import tempfile
+from importlib import resources
+from pathlib import Path
+
+from grpc_tools import protoc
+
+PROTO = Path(__file__).parent
+CONTRACT = PROTO / "dynhull"
+PACKAGE = PROTO / "dynhull_proto"
+
+
+def generate(out: Path) -> None:
+    """Write the generated modules to `out`/dynhull_proto.
+
+    The contract's own paths begin with dynhull/, which is the geometry library's name in Python. So protoc is shown a
+    copy of it under dynhull_proto/.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        include = Path(folder)
+        sources = []
+        for proto in sorted(CONTRACT.rglob("*.proto")):
+            source = include / PACKAGE.name / proto.relative_to(CONTRACT)
+            source.parent.mkdir(parents=True, exist_ok=True)
+            source.write_text(proto.read_text().replace('import "dynhull/', f'import "{PACKAGE.name}/'))
+            sources.append(str(source))
+        arguments = [f"--{kind}_out={out}" for kind in ("python", "pyi", "grpc_python")]
+        arguments.append(f"--mypy_grpc_out=quiet:{out}")
+        # Found beside the interpreter, so that an environment need not be activated.
+        arguments.append(f"--plugin={Path(sys.executable).with_name('protoc-gen-mypy_grpc')}")
+        well_known = resources.files("grpc_tools") / "_proto"
+        if protoc.main(["protoc", f"-I{include}", f"-I{well_known}", *arguments, *sources]) != 0:
+            raise SystemExit("protoc failed")
+    for package in (out / PACKAGE.name).rglob("*_pb2.py"):
+        (package.parent / "__init__.py").touch()
+    (out / PACKAGE.name / "__init__.py").touch()
+    (out / PACKAGE.name / "py.typed").touch()
+
+
+def contents(package: Path) -> dict[str, str]:
+    """Every generated file by its path within the package."""
+    files = (path for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return {str(path.relative_to(package)): path.read_text() for path in files}
+
+
+def main() -> None:
+    """Generate, or with --check fail where the committed package is not what would be generated."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="fail where dynhull_proto is stale, change nothing")
+    if not parser.parse_args().check:
+        generate(PROTO)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        generate(Path(folder))
+        fresh, committed = contents(Path(folder) / PACKAGE.name), contents(PACKAGE)
+    stale = sorted(path for path in fresh.keys() | committed.keys() if fresh.get(path) != committed.get(path))
+    if stale:
+        sys.exit(f"stale, run `make proto`: {', '.join(stale)}")
+
+
+if __name__ == "__main__":
+    main()

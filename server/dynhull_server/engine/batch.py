@@ -1,0 +1,60 @@
+"""A batch: inserts, deletes and moves that are applied all or none."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynhull import DynamicHull, MissingPointError
+from dynhull.arrays import Points
+
+from .errors import PointMissingError
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Points as (n, 2) arrays; `destinations` has a row for each of `origins`.
+
+    With `count_missing`, points to delete that are not there are passed over and counted.
+    """
+
+    inserts: Points
+    deletes: Points
+    origins: Points
+    destinations: Points
+    count_missing: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """What a batch did, and the counts after it."""
+
+    revision: int
+    inserted: int
+    deleted: int
+    missing: int
+    hull_changed: bool
+    points: int
+
+
+def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
+    """Apply `batch` to `hull`, as `revision`.
+
+    Raises:
+        PointMissingError: a point to delete is not there, and missing points are not to be counted; nothing changed.
+    """
+    inserted = len(batch.inserts) + len(batch.destinations)
+    to_delete = len(batch.deletes) + len(batch.origins)
+    points = np.concatenate((batch.inserts, batch.destinations, batch.deletes, batch.origins))
+    ops = np.repeat(np.array([1, -1], np.int8), [inserted, to_delete])
+    changes = hull.changes
+    try:
+        applied = hull.apply(ops, points, missing="ignore" if batch.count_missing else "raise")
+    except MissingPointError as error:
+        if error.row is None:
+            raise
+        row = error.row - inserted
+        if row < len(batch.deletes):
+            raise PointMissingError("deletes", row, error.point) from None
+        raise PointMissingError("origins", row - len(batch.deletes), error.point) from None
+    deleted = applied - inserted
+    return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))

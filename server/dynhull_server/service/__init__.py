@@ -1,0 +1,1 @@
+"""The wire: decodes requests, asks the engine, answers with messages or statuses."""

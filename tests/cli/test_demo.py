@@ -1,0 +1,88 @@
+"""`dynhull demo` as a user runs it: a real server, real input, every step verified."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from dynhull_cli.demo.replay import replay
+from dynhull_cli.demo.scene import Frame
+from dynhull_cli.demo.server import server_process
+from dynhull_client import HullClient
+
+
+def demo(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "dynhull_cli", "demo", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def is_picture(path) -> bool:
+    return path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+
+
+def test_a_day_of_flights(tmp_path):
+    picture = tmp_path / "flights.png"
+    done = demo("--day", "2013-02-09", "--out", picture)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[-1] == "VERIFIED 1440/1440"
+    hours = [line for line in lines if " km²  " in line]
+    assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(24)]
+    assert " to SJU" in done.stdout
+    assert is_picture(picture)
+
+
+def test_points_of_ones_own(tmp_path):
+    rng = np.random.default_rng(5)
+    rows = [f"{minute},{truck},{x},{y}" for minute in range(20) for truck, (x, y) in enumerate(rng.random((15, 2)))]
+    file, picture = tmp_path / "fleet.csv", tmp_path / "fleet.png"
+    file.write_text("\n".join(["minute,truck,east,north", *rows, "20,3,oops,1"]))
+    options = ["--x", "east", "--y", "north", "--id", "truck", "--time", "minute", "--out", picture]
+    done = demo("--points", file, *options)
+    assert done.returncode == 0, done.stderr
+    assert "1 bad rows left out:" in done.stdout
+    assert "line 302: east is 'oops', not a number" in done.stdout
+    assert done.stdout.splitlines()[-1] == "VERIFIED 20/20"
+    assert is_picture(picture)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        ("a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
+        ("", [], "is empty"),
+        ("x,y\nnan,nan\n", [], "has no points"),
+    ],
+)
+def test_unusable_input_says_what_to_do(tmp_path, text, options, message):
+    file = tmp_path / "points.csv"
+    file.write_text(text)
+    done = demo("--points", file, *options)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_day_of_another_year():
+    done = demo("--day", "2014-01-01")
+    assert done.returncode == 2
+    assert "the data set has the days of 2013" in done.stderr
+
+
+class Scene:
+    """Frames that claim to have points which were never sent."""
+
+    hull_name = "wrong"
+
+    def frames(self) -> Iterator[Frame]:
+        sent = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        yield Frame("0", np.empty((0, 2)), sent, sent, ["a", "b", "c"], True)
+        yield Frame("1", np.empty((0, 2)), np.empty((0, 2)), sent[:2], ["a", "b"], True)
+
+
+def test_the_first_difference_is_told():
+    with server_process() as address, HullClient(address) as client:
+        differences = [step.difference for step in replay(client, Scene())]
+    assert differences == [None, "the server holds 3 points, 2 were sent"]
