@@ -288,6 +288,14 @@ NB_MODULE(_kernel, module) {
              [](nb::handle a, nb::handle b, nb::handle c) {
                return orientation(point_of(a), point_of(b), point_of(c));
              }, "a"_a, "b"_a, "c"_a, "+1 where three points turn left, -1 right, 0 on one line.");
+  module.def("direction_sign",
+             [](nb::handle d, nb::handle a, nb::handle b) {
+               return direction_sign(point_of(d), point_of(a), point_of(b));
+             }, "d"_a, "a"_a, "b"_a, "+1 where b lies further than a in direction d, -1 less far, 0 neither.");
+  module.def("crossing",
+             [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
+               return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
+             }, "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");
 
   module.def("_before_fork", &Turns::before_fork);
