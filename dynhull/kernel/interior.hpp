@@ -39,10 +39,16 @@ class Interior {
     }
   }
 
-  // Without branches. False where a coordinate is not finite.
-  bool holds(Point p) const {
-    const Box box = boxes_[columns_(p.x)];
-    return (box.low < p.y) & (p.y < box.high);
+  // How many of the points it does not hold; they go to `outside`, which has room for all. Those with coordinates that
+  // are not finite are among them.
+  std::size_t discard(std::span<const Point> points, Point* outside) const {
+    const Columns columns = columns_;  // a copy that `outside` cannot overlap stays in registers
+    std::size_t count = 0;
+    for (Point p : points) {
+      const Box& box = boxes_[columns(p.x)];
+      if (!(box.low < p.y && p.y < box.high)) outside[count++] = p;
+    }
+    return count;
   }
 
  private:

@@ -162,20 +162,9 @@ inline std::optional<Interior> interior_of(const Point* points, std::size_t coun
   const StaticHull hull(sample, {}, false);
   if (!hull.finite()) return {};
   const Interior interior(hull.chains());
-  std::size_t discarded = 0;
-  for (Point p : sample) discarded += interior.holds(p);
-  if (discarded < WORTHWHILE && !always) return {};
+  const std::size_t kept = interior.discard(sample, sample.data());
+  if (sample.size() - kept < WORTHWHILE && !always) return {};
   return interior;
-}
-
-// Move the points that may be vertices to `kept`, which has room for all. Returns how many.
-inline std::size_t filtered(std::span<const Point> points, const Interior& interior, Point* kept) {
-  std::size_t count = 0;
-  for (Point p : points) {
-    kept[count] = p;
-    count += !interior.holds(p);
-  }
-  return count;
 }
 
 // O(n log n), and O(n) where few points are near the hull.
@@ -189,8 +178,8 @@ inline StaticHull static_hull(const Point* points, std::size_t count, Means mean
   const auto candidates = std::make_unique_for_overwrite<Point[]>(count + 1);
   std::size_t kept[2];
   both(
-      threads, [&] { kept[0] = filtered(parts[0], *interior, candidates.get()); },
-      [&] { kept[1] = filtered(parts[1], *interior, candidates.get() + half); });
+      threads, [&] { kept[0] = interior->discard(parts[0], candidates.get()); },
+      [&] { kept[1] = interior->discard(parts[1], candidates.get() + half); });
   return StaticHull({candidates.get(), kept[0]}, {candidates.get() + half, kept[1]},
                     threads && (means.threads.has_value() || kept[0] + kept[1] >= MANY));
 }
