@@ -73,7 +73,9 @@ def _by_kernel(points: Points, collinear: Collinear, trace: Trace | None) -> Poi
     hull: Points
     hull, rounds = kernel.chan(points)
     if trace is not None:
-        trace += [Round(guess, groups, steps, len(points) * log2(guess), closed) for guess, groups, steps, closed in rounds]
+        trace += [
+            Round(guess, groups, steps, len(points) * log2(guess), closed) for guess, groups, steps, closed in rounds
+        ]
     if collinear == "keep":
         kept = with_boundary_points(list(map(tuple, hull.tolist())), list(map(tuple, points.tolist())))
         return np.array(kept, dtype=np.float64).reshape(len(kept), 2)

@@ -13,10 +13,10 @@ from .monotone_chain import monotone_chain
 def convex_hull(xy: npt.ArrayLike) -> Points:
     """Convex hull by the fastest way there is. O(n log n), and O(n) where few points are near the hull.
 
-    With the kernel, the exact hull of a sample discards most points unsorted: those in boxes that are proven to lie inside
-    it (after Akl and Toussaint, "A fast convex hull algorithm", 1978). The others are sorted and chained (Andrew 1979),
-    every turn exact, large inputs in two threads. Other Python threads run meanwhile. Without the kernel, this is
-    `monotone_chain`. A contiguous float64 array is read as it is; anything else is converted first.
+    With the kernel, the exact hull of a sample discards most points unsorted: those in boxes that are proven to lie
+    inside it (in the manner of Akl and Toussaint, "A fast convex hull algorithm", 1978). The others are sorted and
+    chained (Andrew 1979), every turn exact, large inputs in two threads. Other Python threads run meanwhile. Without
+    the kernel, this is `monotone_chain`. A contiguous float64 array is read where it is; anything else is converted.
 
     Args:
         xy: (n, 2) array-like of finite numbers.
@@ -33,8 +33,8 @@ def convex_hull(xy: npt.ArrayLike) -> Points:
     """
     if kernel is None:
         return monotone_chain(xy)
-    # The kernel looks for coordinates that are not finite while it works; only where it finds one, or where the array is
-    # not plain, does the input go through the checks that say what is wrong.
+    # The kernel finds coordinates that are not finite while it works. Only then, or where the array is not plain, does
+    # the input go through the checks, which say what is wrong.
     hull: Points | None = kernel.convex_hull(xy) if _is_plain(xy) else None
     return kernel.convex_hull(as_points(xy)) if hull is None else hull
 
