@@ -49,8 +49,8 @@ ONE_SHOT = {"convex_hull": convex_hull}
 
 if kernel is not None:
 
-    def told(use_filter, threads):
-        return lambda xy: kernel.convex_hull(as_points(xy), use_filter, threads)
+    def told(discard, threads):
+        return lambda xy: kernel.convex_hull(as_points(xy), discard, threads)
 
-    for use_filter, threads in product((False, True), repeat=2):
-        ONE_SHOT[f"convex_hull, filter {use_filter}, threads {threads}"] = told(use_filter, threads)
+    for discard, threads in product((False, True), repeat=2):
+        ONE_SHOT[f"convex_hull, discard {discard}, threads {threads}"] = told(discard, threads)

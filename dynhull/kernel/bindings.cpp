@@ -232,11 +232,11 @@ nb::object orientations(const Rows& a, const Rows& b, const Rows& c) {
   return output.array({count});
 }
 
-nb::object convex_hull(const Rows& rows, std::optional<bool> filter, std::optional<bool> threads) {
+nb::object convex_hull(const Rows& rows, std::optional<bool> discard, std::optional<bool> threads) {
   std::optional<StaticHull> hull;
   {
     nb::gil_scoped_release release;
-    hull.emplace(static_hull(points_of(rows), rows.shape(0), {filter, threads}));
+    hull.emplace(static_hull(points_of(rows), rows.shape(0), {discard, threads}));
   }
   if (!hull->finite()) return nb::none();
   const auto [lower, upper] = hull->chains();
@@ -329,9 +329,10 @@ NB_MODULE(_kernel, module) {
              [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
                return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
              }, "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
-  module.def("convex_hull", &convex_hull, "xy"_a, "filter"_a = nb::none(), "threads"_a = nb::none(),
+  module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
              "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. Whether "
-             "to filter and to use two threads is decided by the input where not told. O(n log n).");
+             "to discard points by a sample's hull first, and to use two threads, the input decides where not told. "
+             "O(n log n).");
   module.def("chan", &chan, "xy"_a,
              "The same by Chan's algorithm, and its rounds: guess, groups, steps, closed. O(n log h).");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");

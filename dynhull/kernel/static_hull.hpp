@@ -146,12 +146,12 @@ class StaticHull {
   std::span<const Point> chains_[2];
 };
 
-// What to do about an input; each decided by its size, and the filter by what it does to a sample, where not told.
+// Whether to discard points by a sample's hull first, and to use two threads; decided by the input where not told.
 struct Means {
-  std::optional<bool> filter, threads;
+  std::optional<bool> discard, threads;
 };
 
-// The filter for these points; nothing where it would discard too few to pay.
+// What to discard of these points; nothing where it would be too few to pay.
 inline std::optional<Interior> interior_of(const Point* points, std::size_t count, bool always) {
   constexpr std::size_t SAMPLE = 4096, WORTHWHILE = SAMPLE / 8;
   if (count < 8 * SAMPLE && !always) return {};
@@ -173,7 +173,7 @@ inline StaticHull static_hull(const Point* points, std::size_t count, Means mean
   const bool threads = means.threads.value_or(count >= MANY && std::thread::hardware_concurrency() > 1);
   const std::size_t half = threads ? count / 2 : count;
   const std::span<const Point> parts[] = {{points, half}, {points + half, count - half}};
-  const auto interior = means.filter.value_or(true) ? interior_of(points, count, means.filter.has_value()) : std::nullopt;
+  const auto interior = means.discard.value_or(true) ? interior_of(points, count, means.discard.has_value()) : std::nullopt;
   if (!interior) return StaticHull(parts[0], parts[1], threads);
   const auto candidates = std::make_unique_for_overwrite<Point[]>(count + 1);
   std::size_t kept[2];

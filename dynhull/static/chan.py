@@ -24,8 +24,8 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     Chan, "Optimal output-sensitive convex hull algorithms in two and three dimensions" (1996). Each round guesses the
     number of vertices: 2, then the square of the last guess. Points are cut into groups of that size, each group's hull
     is computed, and gift wrapping runs across the groups, finding each group's tangent by binary search. A round that
-    does not close within `guess` steps is thrown away. The kernel does it where no trace of single steps is wanted; other
-    Python threads run meanwhile.
+    does not close within `guess` steps is thrown away. The kernel does it where no trace of single steps is wanted, and
+    lets other Python threads run meanwhile.
 
     Args:
         xy: (n, 2) array-like of finite numbers.
