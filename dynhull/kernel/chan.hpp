@@ -98,12 +98,12 @@ class Chan {
 
   Ring ring_of(Point* first, Point* last) {
     sort_points(first, scratch_.data(), static_cast<std::size_t>(last - first));
-    Chain upper(UPPER, scratch_.data()), lower(LOWER, first);
-    for (const Point* p = first; p < last; ++p) upper.push(*p);
+    Chain upper(scratch_.data()), lower(first);
+    for (const Point* p = last; p > first;) upper.push(*--p);
     for (const Point* p = first; p < last; ++p) lower.push(*p);
-    const std::size_t turning = lower.points().size() - 1;
-    Point* end = first + turning + 1;
-    if (turning > 0) end = std::reverse_copy(upper.points().begin() + 1, upper.points().end() - 1, end);
+    const auto turning = static_cast<std::size_t>(lower.end() - first) - 1;
+    Point* end = lower.end();
+    if (turning > 0) end = std::copy(upper.begin() + 1, upper.end() - 1, end);
     return {first, static_cast<std::size_t>(end - first), turning};
   }
 
