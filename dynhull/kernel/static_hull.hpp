@@ -161,19 +161,20 @@ struct Means {
   std::optional<bool> discard, threads;
 };
 
-// What to discard of these points; nothing where it would be too few to pay.
+// What to discard of these points; nothing where it would be too few to pay, unless told to.
 inline std::optional<Interior> interior_of(const Point* points, std::size_t count, bool always) {
-  constexpr std::size_t SAMPLE = 4096, WORTHWHILE = SAMPLE / 8;
-  if (count < 8 * SAMPLE && !always) return {};
-  std::vector<Point> sample(std::min(SAMPLE, count));
+  constexpr std::size_t FEW = 2048, LARGEST_SAMPLE = 4096, ONE_OF = 32;
+  if (count < FEW && !always) return {};
+  std::vector<Point> sample(std::min(LARGEST_SAMPLE, always ? count : count / ONE_OF));
   const std::size_t stride = count / std::max<std::size_t>(sample.size(), 1);
   for (std::size_t i = 0; i < sample.size(); ++i)
     sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, to follow no pattern of the input
   const StaticHull hull(sample, {}, false);
   if (!hull.finite()) return {};
+  if (2 * hull.vertices().size() > sample.size() && !always) return {};
   const Interior interior(hull.vertices());
   const std::size_t kept = interior.discard(sample, sample.data());
-  if (sample.size() - kept < WORTHWHILE && !always) return {};
+  if (sample.size() - kept < sample.size() / 8 && !always) return {};
   return interior;
 }
 
