@@ -326,9 +326,9 @@ NB_MODULE(_kernel, module) {
                return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
              }, "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
   module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
-             "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. Whether "
-             "to discard points by a sample's hull first, and to use two threads, the input decides where not told. "
-             "O(n log n).");
+             "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. "
+             "Whether to discard points by a sample's hull first, and to use two threads, the input decides where not "
+             "told. O(n log n).");
   module.def("chan", &chan, "xy"_a,
              "The same by Chan's algorithm, and its rounds: guess, groups, steps, closed. O(n log h).");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");

@@ -130,7 +130,8 @@ class StaticHull {
   Point* chain(unsigned first, Point from, Point to) {
     const auto end = [&](unsigned column) { return starts_[column + 1] - (column + 1 == first + width_ ? 2 : 0); };
     std::size_t most = 0;
-    for (unsigned column = first; column < first + width_; ++column) most = std::max(most, end(column) - starts_[column]);
+    for (unsigned column = first; column < first + width_; ++column)
+      most = std::max(most, end(column) - starts_[column]);
     const auto scratch = std::make_unique_for_overwrite<Point[]>(most);
     Chain chain(&memory_[starts_[first] - 1]);
     chain.push(from);

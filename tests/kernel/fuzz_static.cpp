@@ -71,7 +71,8 @@ class Input {
       const Means means = {choice % 2 == 1, choice / 2 == 1};
       with_failures([&] {
         const StaticHull hull = static_hull(points.data(), count, means);
-        require(hull.finite() && same({hull.vertices().begin(), hull.vertices().end()}, expected), "a static hull is wrong");
+        const Vertices vertices(hull.vertices().begin(), hull.vertices().end());
+        require(hull.finite() && same(vertices, expected), "a static hull is wrong");
       });
     }
     for (Point& p : points) p = {p.x + 0.0, p.y + 0.0};
@@ -81,8 +82,8 @@ class Input {
       std::uint64_t guess = 2;
       for (const Chan::Round& round : chan.rounds) {
         require(round.guess == guess && round.groups == (count + guess - 1) / guess, "a round is another");
-        require(round.closed == (expected.size() <= guess) && round.steps == std::min<std::uint64_t>(expected.size(), guess),
-                "a round closed too late or too early");
+        require(round.closed == (expected.size() <= guess), "a round closed too late or too early");
+        require(round.steps == std::min<std::uint64_t>(expected.size(), guess), "a round took other steps");
         guess *= guess;
       }
       require((count == 0) == chan.rounds.empty() && (count == 0 || chan.rounds.back().closed), "rounds are missing");
@@ -114,7 +115,7 @@ class Input {
         std::memcpy(&value, &bits, sizeof value);
         return std::isfinite(value) ? value : -0.0;
       }
-      case 5: return 0.85e308 * (static_cast<double>(below(3)) - 1 + unit() / spread_);  // clusters, wider than a double
+      case 5: return 0.85e308 * (static_cast<double>(below(3)) - 1 + unit() / spread_);  // clusters, as wide as can be
       default: return 5 + unit() / spread_;
     }
   }
