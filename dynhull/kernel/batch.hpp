@@ -38,7 +38,7 @@ class Commit {
 
  private:
   // Up to so many changes run one by one in the subtree that they share: measured, see docs/performance.md.
-  static constexpr std::size_t FEW = 8;
+  static constexpr std::size_t FEW = LEAF * 3 / 8;
   static constexpr std::size_t LOOKAHEAD = 4;
 
   // A subtree after its changes, detached, and how many candidates there are, a side: numbers of changes, stored in
@@ -71,7 +71,7 @@ class Commit {
         const Change& change = changes_[i];
         if (!insert && i + LOOKAHEAD < count_) nodes_.leaf(changes_[i + LOOKAHEAD].leaf).fetch();
         if (change.insert != insert) continue;
-        const Place place = find(nodes_, change.p);
+        const Place place = find_near(nodes_, change.leaf, change.p);
         const unsigned changed =
             insert ? insert_point(nodes_, place, change.p) : remove_point(nodes_, place, change.p);
         for (Side side : SIDES)

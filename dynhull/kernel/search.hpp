@@ -1,14 +1,9 @@
 // Searches along chains: a cursor, the bridge of two subtrees, tangents from a point.
 #pragma once
 
-#include <limits>
-
 #include "nodes.hpp"
 
 namespace dynhull {
-
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr Point LOWEST = {-INFINITE, -INFINITE}, HIGHEST = {INFINITE, INFINITE};
 
 // A binary search along the chain of a subtree, or its part between two of its vertices. At every step (a, b) is an
 // edge of the chain, and the caller says on which side of it the sought vertex lies; once one vertex is left, it is a.
