@@ -125,7 +125,8 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
     p, q, r = np.broadcast_arrays(*pairs)
     if kernel is not None:
         rows = (np.ascontiguousarray(pair).reshape(-1, 2) for pair in (p, q, r))
-        return kernel.orientations(*rows).reshape(p.shape[:-1])
+        signs: npt.NDArray[np.int8] = kernel.orientations(*rows)
+        return signs.reshape(p.shape[:-1])
     return _orientations(p, q, r)
 
 

@@ -1,5 +1,23 @@
+import re
+from collections.abc import Iterator
+
+import pytest
 from hypothesis import settings
+from server_process import server_process
 
 # A slow moment of the machine is not a failure.
 settings.register_profile("dynhull", deadline=None, print_blob=True)
 settings.load_profile("dynhull")
+
+
+@pytest.fixture(scope="session")
+def address() -> Iterator[str]:
+    """A server that tests share: each uses hulls of its own."""
+    with server_process() as server:
+        yield server.address
+
+
+@pytest.fixture
+def name(request: pytest.FixtureRequest) -> str:
+    """A hull name of the test's own."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:]

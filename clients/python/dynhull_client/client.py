@@ -144,11 +144,9 @@ class HullClient:
         response = self._call(self._stub.Locate, request, timeout)
         return Located(response.revision, np.frombuffer(response.sides, np.int8))
 
-    def get_hull(
-        self, name: str, *, min_revision: int = 0, measures: bool = False, timeout: float | None = None
-    ) -> Hull:
-        """The vertices and counts, with `measures` also area, perimeter, centroid and bounds."""
-        request = pb.GetHullRequest(name=name, min_revision=min_revision, include_measures=measures)
+    def get_hull(self, name: str, *, min_revision: int = 0, timeout: float | None = None) -> Hull:
+        """The vertices, counts, area, perimeter, centroid and bounds."""
+        request = pb.GetHullRequest(name=name, min_revision=min_revision)
         return messages.decode_hull(self._call(self._stub.GetHull, request, timeout))
 
     def watch(

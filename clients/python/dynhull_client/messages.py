@@ -37,14 +37,11 @@ class Measures:
 
 @dataclass(frozen=True, slots=True)
 class Hull:
-    """A hull at one revision: vertices counter-clockwise from the lexicographically smallest.
-
-    `measures` is None unless they were asked for.
-    """
+    """A hull at one revision: vertices counter-clockwise from the lexicographically smallest, and their measures."""
 
     info: HullInfo
     vertices: Points
-    measures: Measures | None
+    measures: Measures
 
     @property
     def revision(self) -> int:
@@ -190,8 +187,7 @@ def decode_measures(message: hull_pb2.Measures) -> Measures:
 
 def decode_hull(message: hull_service_pb2.GetHullResponse) -> Hull:
     """A hull."""
-    measures = decode_measures(message.measures) if message.HasField("measures") else None
-    return Hull(decode_info(message.hull), decode_points(message.vertices), measures)
+    return Hull(decode_info(message.hull), decode_points(message.vertices), decode_measures(message.measures))
 
 
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:

@@ -111,16 +111,14 @@ class LocateResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ...) -> None: ...
 
 class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_measures")
+    __slots__ = ("name", "min_revision", "encoding")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
-    INCLUDE_MEASURES_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
-    include_measures: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ...) -> None: ...
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
     __slots__ = ("hull", "vertices", "measures")

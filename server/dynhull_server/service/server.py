@@ -6,13 +6,15 @@ import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
-from dynhull_proto.v1 import hull_service_pb2, hull_service_pb2_grpc
-
 from ..engine.hulls import Engine
 from .calls import Calls
 from .hull_service import HullService
+from .methods import DESCRIPTOR, method_handlers
 
-SERVICE: str = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"].full_name
+SERVICE = DESCRIPTOR.full_name
+
+# Seconds for statuses to reach clients. A client that has stopped reading does not hold up the end.
+LAST_WORDS = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,7 @@ class Server:
 
     async def start(self) -> None:
         """Listen. Raises RuntimeError where the address is taken or is none of this machine's."""
-        hull_service_pb2_grpc.add_HullServiceServicer_to_server(HullService(self._engine, self._calls), self._server)
+        self._server.add_generic_rpc_handlers((method_handlers(HullService(self._engine, self._calls)),))
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
         reflection.enable_server_reflection((SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME), self._server)
         port = self._server.add_insecure_port(f"{self._settings.host}:{self._settings.port}")
@@ -67,6 +69,6 @@ class Server:
     async def drain(self, grace: float) -> None:
         """Refuse new calls, end those that wait, and give the others `grace` seconds to finish."""
         await self._health.enter_graceful_shutdown()
-        self._calls.drain()
-        await self._server.stop(grace)
+        await self._calls.drain(grace)
+        await self._server.stop(LAST_WORDS)
         self._engine.close()

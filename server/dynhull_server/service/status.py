@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from google.protobuf.any_pb2 import Any
-from google.protobuf.message import Message
+from google.protobuf.message import DecodeError, Message
 from google.rpc.code_pb2 import ALREADY_EXISTS, FAILED_PRECONDITION, INVALID_ARGUMENT, NOT_FOUND, RESOURCE_EXHAUSTED
 from google.rpc.code_pb2 import UNAVAILABLE as CODE_UNAVAILABLE
 from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFailure, QuotaFailure, ResourceInfo
@@ -24,8 +24,14 @@ class DrainingError(Exception):
     """The server is about to stop."""
 
 
-def refusal_status(error: RefusedError | InvalidFieldError | DrainingError, batch: int | None = None) -> Status:
-    """The status that tells a client of `error`; `batch` is the number of batches the call has applied before it."""
+ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError)
+
+
+def error_status(error: Exception, batch: int | None = None) -> Status:
+    """The status that tells a client of `error`, one of ANSWERED.
+
+    `batch` is how many batches the call has applied before it.
+    """
     where = {} if batch is None else {"batch": str(batch)}
     match error:
         case InvalidFieldError():
@@ -55,6 +61,8 @@ def refusal_status(error: RefusedError | InvalidFieldError | DrainingError, batc
             quota.violations.add(subject=error.limit, description=str(error))
             metadata = {"limit": error.limit, "value": str(error.maximum), **where}
             return _status(RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
+        case DecodeError():
+            return _status(INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where)
         case DrainingError():
             return _status(CODE_UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error

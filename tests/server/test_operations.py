@@ -1,0 +1,130 @@
+"""The server as a process: health, reflection, the command line, its end."""
+
+import subprocess
+import sys
+import threading
+
+import grpc
+import numpy as np
+import pytest
+from google.protobuf.descriptor_pool import DescriptorPool
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
+from server_process import COMMAND, PATIENCE, server_process
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+SERVICE = "dynhull.v1.HullService"
+SERVING = health_pb2.HealthCheckResponse.SERVING
+NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
+
+
+@pytest.mark.parametrize("service", ["", SERVICE])
+def test_health(channel: grpc.Channel, service: str) -> None:
+    health = health_pb2_grpc.HealthStub(channel)
+    assert health.Check(health_pb2.HealthCheckRequest(service=service)).status == SERVING
+
+
+def test_reflection_is_enough_to_call(channel: grpc.Channel) -> None:
+    database = ProtoReflectionDescriptorDatabase(channel)
+    assert set(database.get_services()) == {
+        SERVICE,
+        "grpc.health.v1.Health",
+        "grpc.reflection.v1alpha.ServerReflection",
+    }
+    described = DescriptorPool(database).FindServiceByName(SERVICE)
+    expected = pb.DESCRIPTOR.services_by_name["HullService"]
+    assert [method.name for method in described.methods] == [method.name for method in expected.methods]
+
+
+def test_a_large_batch_keeps_nobody_waiting(channel: grpc.Channel, stub: HullServiceStub, hull: str) -> None:
+    points = np.random.default_rng(0).normal(size=(100_000, 2))
+    batch = {"inserts": {"packed": points.astype("<f8").tobytes()}}
+    large = stub.Apply.future(pb.ApplyRequest(name=hull, batch=batch))
+    applied = threading.Event()
+    large.add_done_callback(lambda _: applied.set())
+    health = health_pb2_grpc.HealthStub(channel)
+    answered = 0
+    while not applied.is_set():
+        assert health.Check(health_pb2.HealthCheckRequest()).status == SERVING
+        answered += 1
+    assert large.result().result.point_count == 100_000
+    assert answered > 1
+
+
+def test_drain() -> None:
+    """At SIGTERM what waits is cut off with UNAVAILABLE, and what was acknowledged had been applied."""
+    with server_process() as server, grpc.insecure_channel(server.address) as channel:
+        stub = HullServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name="a"))
+        health = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service=SERVICE))
+        assert next(health).status == SERVING
+        watch = stub.Watch(pb.WatchRequest(name="a"))
+        next(watch)
+        read = stub.GetHull.future(pb.GetHullRequest(name="a", min_revision=1000))
+        more = threading.Event()
+
+        def requests():
+            for _ in range(3):
+                yield pb.IngestRequest(name="a", batch={"inserts": {"coordinates": [1, 2]}})
+            more.wait()
+
+        ingest = stub.Ingest.future(requests())
+        assert stub.GetHull(pb.GetHullRequest(name="a", min_revision=3)).hull.point_count == 3
+        server.process.terminate()
+        assert next(health).status == NOT_SERVING
+        for call in (lambda: list(watch), read.result, ingest.result):
+            with pytest.raises(grpc.RpcError, match="shutting down") as caught:
+                call()
+            assert caught.value.code() == grpc.StatusCode.UNAVAILABLE
+        more.set()
+        health.cancel()
+        assert server.process.wait(PATIENCE) == 0
+        with pytest.raises(grpc.RpcError) as caught:
+            stub.CreateHull(pb.CreateHullRequest(name="b"))
+        assert caught.value.code() == grpc.StatusCode.UNAVAILABLE
+
+
+def test_a_batch_under_way_is_finished_at_the_end() -> None:
+    points = np.random.default_rng(0).normal(size=(20_000, 2))
+    batch = {"inserts": {"packed": points.astype("<f8").tobytes()}}
+    with server_process() as server, grpc.insecure_channel(server.address) as channel:
+        stub = HullServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name="a"))
+        watch = stub.Watch(pb.WatchRequest(name="a"))
+        next(watch)
+        first = stub.Apply.future(pb.ApplyRequest(name="a", batch=batch))
+        second = stub.Apply.future(pb.ApplyRequest(name="a", batch=batch))
+        assert next(watch).revision >= 1
+        server.process.terminate()
+        assert {first.result().result.revision, second.result().result.revision} == {1, 2}
+        with pytest.raises(grpc.RpcError):
+            list(watch)
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([COMMAND, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)
+
+
+def test_a_port_in_use(address: str) -> None:
+    port = address.rpartition(":")[2]
+    result = run("serve", "--port", port)
+    assert result.returncode == 1
+    assert f"cannot listen on 127.0.0.1:{port}" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_other_machines_only_when_told() -> None:
+    result = run("serve", "--host", "0.0.0.0", "--port", "0")
+    assert result.returncode == 1
+    assert "--insecure" in result.stderr
+
+
+def test_python_m_is_the_same_and_says_that_memory_is_all_there_is() -> None:
+    command = [sys.executable, "-m", "dynhull_server", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline().startswith("dynhull serving on 127.0.0.1:")
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+        assert "in memory" in process.stderr.read()
