@@ -1,9 +1,10 @@
 # One word for each thing people do here. Everything runs in .venv, made on first use.
 PYTHON ?= python3
 BIN := .venv/bin
+KERNEL := $(wildcard dynhull/kernel/*)
 DAY ?= 2013-03-08
 
-.PHONY: demo test check proto clean
+.PHONY: demo test check fuzz proto clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
@@ -11,9 +12,21 @@ demo: .venv/.demo  ## replay a real day of flights through a real server and ver
 test: .venv/.test  ## the whole test suite, on both cores
 	$(BIN)/pytest -n 2 --dist worksteal
 
+FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
+	-DDYNHULL_FAIL_ALLOCATIONS
+SECONDS ?= 60
+
+fuzz:  ## random lives of the kernel under sanitizers, SECONDS for each size of leaf
+	mkdir -p build
+	for leaf in 4 62; do \
+		$(FUZZ) -DDYNHULL_LEAF=$$leaf tests/kernel/fuzz.cpp -o build/fuzz$$leaf \
+		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
+	done
+
 check: .venv/.check  ## format, lint, types, import rules, proto rules
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/buf lint
@@ -23,7 +36,7 @@ check: .venv/.check  ## format, lint, types, import rules, proto rules
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py
 
-.venv/.%: pyproject.toml
+.venv/.%: pyproject.toml CMakeLists.txt $(KERNEL)
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[$*]'

@@ -15,8 +15,8 @@ struct Row {
 };
 inline bool operator<(const Row& a, const Row& b) { return a.p < b.p || (a.p == b.p && a.row < b.row); }
 
-constexpr std::size_t SMALL_SORT = 32;          // below, insertion sort
-constexpr std::size_t ONE_PASS = 64 * LEAF;     // below, one counting pass instead of two
+constexpr std::size_t SMALL_SORT = 32;       // below, insertion sort
+constexpr std::size_t ONE_PASS = 64 * LEAF;  // below, one counting pass instead of two
 
 // Insertion sort: linear for rows that are almost in order.
 template <class R>
@@ -45,9 +45,7 @@ void counting_pass(const R* rows, R* target, std::size_t count, std::size_t buck
 template <class R>
 void sort_by_point(R* rows, R* scratch, std::size_t count) {
   if (count < SMALL_SORT) return insertion_sort(rows, rows + count);
-  const auto compare = [=] {
-    std::stable_sort(rows, rows + count, [](const R& a, const R& b) { return a.p < b.p; });
-  };
+  const auto compare = [=] { std::stable_sort(rows, rows + count, [](const R& a, const R& b) { return a.p < b.p; }); };
   double least = rows[0].p.x, greatest = least;
   bool sorted = true;
   for (std::size_t i = 1; i < count; ++i) {
@@ -60,7 +58,7 @@ void sort_by_point(R* rows, R* scratch, std::size_t count) {
   const std::size_t keys = count < ONE_PASS ? std::bit_ceil(count) : std::size_t{1} << (2 * DIGIT);
   const double scale = static_cast<double>(keys - 1) / (greatest - least);
   if (!(scale > 0 && scale < INFINITE)) return compare();  // one column, or a width beyond every double
-  const auto key = [=](const R& row) {  // monotone in x, whatever the rounding
+  const auto key = [=](const R& row) {                     // monotone in x, whatever the rounding
     return static_cast<std::uint32_t>((row.p.x - least) * scale);
   };
   if (count < ONE_PASS) {

@@ -16,9 +16,9 @@ namespace dynhull {
 
 constexpr unsigned LEAF = DYNHULL_LEAF;
 static_assert(4 <= LEAF && LEAF <= 64);
-constexpr unsigned FILL = LEAF * 27 / 32;                  // entries of a leaf built in bulk
-constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);     // a leaf with fewer entries is merged with its neighbour
-constexpr unsigned MERGE_STEP = 4;                         // a try at every fourth size: its neighbour may be full
+constexpr unsigned FILL = LEAF * 27 / 32;               // entries of a leaf built in bulk
+constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);  // a leaf with fewer entries is merged with its neighbour
+constexpr unsigned MERGE_STEP = 4;                      // a try at every fourth size: its neighbour may be full
 constexpr std::uint32_t NONE = ~std::uint32_t{0};
 
 using Mask = std::uint64_t;

@@ -109,12 +109,10 @@ inline Edge find_bridge(Cursor left, Cursor right, Side side, Point separator) {
   while (true) {
     const Point a = left.a, b = left.b, c = right.a, d = right.b;
     if (left.single && right.single) return {a, c};
-    const bool start_before =
-        !left.single && (turned(side, orientation(a, b, c)) >= 0 ||
-                         (!right.single && turned(side, orientation(a, b, d)) >= 0));
-    const bool end_after =
-        !right.single && (turned(side, orientation(c, d, a)) >= 0 ||
-                          (!left.single && turned(side, orientation(c, d, b)) >= 0));
+    const bool start_before = !left.single && (turned(side, orientation(a, b, c)) >= 0 ||
+                                               (!right.single && turned(side, orientation(a, b, d)) >= 0));
+    const bool end_after = !right.single && (turned(side, orientation(c, d, a)) >= 0 ||
+                                             (!left.single && turned(side, orientation(c, d, b)) >= 0));
     if (start_before || end_after) {
       if (start_before) left.go_left();
       if (end_after) right.go_right();
