@@ -1,6 +1,6 @@
 """The kernel and its rivals, side by side in one run: a table, JSON and a chart.
 
-    python benchmarks/core.py           everything at 10^4, 10^5 and 10^6: about an hour
+    python benchmarks/core.py    everything at 10^4, 10^5 and 10^6: about an hour
     python benchmarks/core.py --sizes 1e6 --inputs uniform circle --works window locate
     python benchmarks/core.py --sizes 1e4 1e5 1e6 1e7 --works window --chart docs/images/core.png
 
@@ -335,9 +335,8 @@ def main() -> None:
     print(
         f"dynhull {dynhull.KERNEL}, Python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}\n"
     )
-    print(
-        "| work | input | n | who | median | least | greatest | unit |\n| --- | --- | ---: | --- | ---: | ---: | ---: | --- |"
-    )
+    print("| work | input | n | who | median | least | greatest | unit |")
+    print("| --- | --- | ---: | --- | ---: | ---: | ---: | --- |")
     results = measure(arguments)
     if arguments.json:
         arguments.json.write_text(json.dumps(results, indent=1))
