@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from dynhull.arrays import Points
 from dynhull.static import chan
-from dynhull.static.trace import Round, Trace
+from dynhull.static.trace import Round, Rounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Verification:
 
 def verify(points: Points, vertices: Points) -> Verification:
     """Compare `vertices`, a live hull's, with the hull of `points` computed anew."""
-    trace: Trace = []
+    trace = Rounds()
     recomputed = chan(points, trace=trace)
     rounds = [event for event in trace if isinstance(event, Round)]
     return Verification(len(points), len(vertices), rounds, first_difference(vertices, recomputed))
