@@ -45,6 +45,14 @@ def test_a_missing_extra_says_how_to_install_it(arguments: tuple[str, ...]) -> N
     assert "Traceback" not in result.stderr
 
 
+def test_something_missing_that_is_loaded_late() -> None:
+    result = run_without("pandas", "demo")
+    assert result.returncode == 1
+    assert "dynhull demo needs pandas" in result.stderr
+    assert "pip install 'dynhull[demo]'" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
 def test_help_works_without_the_extra() -> None:
     result = run_without("grpc", "--help")
     assert result.returncode == 0

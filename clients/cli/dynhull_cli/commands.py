@@ -1,5 +1,7 @@
 """Commands come from the entry points in the group "dynhull.commands", each loaded when it is wanted."""
 
+from collections.abc import Callable
+from functools import wraps
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -22,16 +24,29 @@ class InstalledCommands(TyperGroup):
 
 
 def _command(entry: EntryPoint) -> Any:
-    command = typer.Typer(add_completion=False)
+    command = typer.Typer(add_completion=False, rich_markup_mode="markdown")
     try:
-        command.command(entry.name)(entry.load())
+        command.command(entry.name)(_explaining(entry, entry.load()))
     except ModuleNotFoundError as error:
         anything = {"allow_extra_args": True, "ignore_unknown_options": True}
         command.command(entry.name, context_settings=anything)(_not_installed(entry, error))
     return typer.main.get_command(command)
 
 
-def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Any:
+def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..., None]:
+    """The command, which says what to install where something that it loads late is missing."""
+
+    @wraps(function)
+    def run(*arguments: Any, **options: Any) -> None:
+        try:
+            function(*arguments, **options)
+        except ModuleNotFoundError as error:
+            _not_installed(entry, error)()
+
+    return run
+
+
+def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[], None]:
     """A command that says what to install; `--help` of the group lists it like the others."""
     extras = ",".join(entry.extras)
 
