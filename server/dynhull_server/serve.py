@@ -52,5 +52,7 @@ async def _serve(settings: Settings) -> None:
     server = Server(settings)
     await server.start()
     print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
+    if server.metrics_address:
+        print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
     await stop.wait()
     await server.drain()

@@ -1,7 +1,6 @@
 """What a watcher holds of a hull: its vertices, or the extreme ones in some directions."""
 
 import asyncio
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -118,12 +117,14 @@ class SketchView:
 
     def __init__(self, hull: LiveHull, directions: Points, vertices: bool) -> None:
         self._hull = hull
-        self._look: Callable[[DynamicHull], tuple[Points, Points | None]] = lambda live: (
-            live.support(directions) if len(live) else np.empty((0, 2)),
-            live.vertices() if vertices else None,
-        )
+        self._directions = directions
+        self._with_vertices = vertices
         self._rows = len(directions) + (hull.vertex_count if vertices else 0)
         self._held: tuple[Points, Points | None] = np.empty((0, 2)), None
+
+    def _look(self, live: DynamicHull) -> tuple[Points, Points | None]:
+        extremes = live.support(self._directions) if len(live) else np.empty((0, 2))
+        return extremes, live.vertices() if self._with_vertices else None
 
     async def first(self, min_revision: int) -> Event:
         """A sketch."""

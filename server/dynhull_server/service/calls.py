@@ -1,4 +1,4 @@
-"""The calls under way: who calls, how many at a time, their refusals as statuses, and what a draining server cuts off."""
+"""The calls under way: who calls, how many there are, refusals as statuses, what a draining server cuts off."""
 
 import asyncio
 import logging
@@ -17,6 +17,8 @@ from .metrics import Metrics
 from .status import ANSWERED, DrainingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
+
+SUSPICIOUS = ("UNAUTHENTICATED", "PERMISSION_DENIED")
 
 log = logging.getLogger(__name__)
 
@@ -110,8 +112,10 @@ class Calls:
             with self._streaming() if stream else nullcontext():
                 yield call
         except ANSWERED as error:
-            status = rpc_status.to_status(error_status(error, call and call.batches))
+            status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
             code = status.code.name
+            if code in SUSPICIOUS:
+                log.warning(status.details, extra={"method": method, "code": code, "peer": context.peer()})
             await context.abort(status.code, status.details, status.trailing_metadata)
         except asyncio.CancelledError:
             code = "CANCELLED"

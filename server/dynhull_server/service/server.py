@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import grpc
@@ -45,6 +45,7 @@ class Server:
 
     Attributes:
         address: host:port it listens on, once started.
+        metrics_address: host:port for Prometheus; empty for none.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -68,8 +69,9 @@ class Server:
             ]
         )
         self._scrub: asyncio.Task[None] | None = None
-        self._stop_metrics = lambda: None
+        self._stop_metrics: Callable[[], None] = lambda: None
         self.address = ""
+        self.metrics_address = ""
 
     async def start(self) -> None:
         """Listen. Raises RuntimeError where the address is taken or is none of this machine's."""
@@ -131,7 +133,7 @@ class Server:
         registry = self._metrics.registry
         registry.register(StateCollector(self._engine, self._metrics, asyncio.get_running_loop()))
         server, thread = start_http_server(self._settings.metrics_port, self._settings.metrics_host, registry)
-        log.info("metrics", extra={"address": f"{self._settings.metrics_host}:{server.server_port}"})
+        self.metrics_address = f"{self._settings.metrics_host}:{server.server_port}"
 
         def stop() -> None:
             server.shutdown()
