@@ -1,4 +1,4 @@
-"""`dynhull serve`: run the server until SIGTERM or SIGINT. `dynhull config`: what it would run with."""
+"""`dynhull serve`: run the server until SIGTERM or SIGINT."""
 
 import asyncio
 import signal
@@ -7,7 +7,7 @@ import sys
 import typer
 
 from . import logs
-from .flags import as_toml, with_settings
+from .flags import with_settings
 from .service.server import Server
 from .settings import Settings
 
@@ -30,18 +30,6 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
         sys.exit(f"cannot listen on {settings.host}:{settings.port}: {error}")
     except (OSError, ValueError) as error:
         sys.exit(f"cannot serve: {error}")
-
-
-@with_settings
-def config(settings: Settings, origins: dict[str, str]) -> None:
-    """Show the settings `dynhull serve` would run with, as a file for --config, and where each comes from."""
-    lines = {}
-    for name in Settings.model_fields:
-        value = getattr(settings, name)
-        lines[name] = f"# {name} =" if value is None else f"{name} = {as_toml(value)}"
-    width = max(map(len, lines.values()))
-    for name, line in lines.items():
-        typer.echo(f"{line:{width}}  # {origins[name]}")
 
 
 async def _serve(settings: Settings) -> None:

@@ -64,7 +64,12 @@ class HullService:
         with self._written(call, request.name) as hull:
             if not request.HasField("batch"):
                 raise decode.InvalidFieldError("batch", "", "a batch is required")
-            applied = await hull.apply(decode_write(request, decode.decode_producer(request.producer)))
+            write = decode_write(request, decode.decode_producer(request.producer))
+            try:
+                applied = await hull.apply(write)
+            except Exception:
+                self._metrics.refused()
+                raise
         self._metrics.applied(applied, time.perf_counter() - begun)
         return pb.ApplyResponse(result=encode.encode_applied(applied))
 

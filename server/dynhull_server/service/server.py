@@ -132,8 +132,12 @@ class Server:
             return
         registry = self._metrics.registry
         registry.register(StateCollector(self._engine, self._metrics, asyncio.get_running_loop()))
-        server, thread = start_http_server(self._settings.metrics_port, self._settings.metrics_host, registry)
-        self.metrics_address = f"{self._settings.metrics_host}:{server.server_port}"
+        host, port = self._settings.metrics_host, self._settings.metrics_port
+        try:
+            server, thread = start_http_server(port, host, registry)
+        except OSError as error:
+            raise OSError(f"no metrics on {host}:{port}: {error.strerror}") from None
+        self.metrics_address = f"{host}:{server.server_port}"
 
         def stop() -> None:
             server.shutdown()
