@@ -4,12 +4,12 @@ BIN := .venv/bin
 KERNEL := $(wildcard dynhull/kernel/*)
 DAY ?= 2013-03-08
 
-.PHONY: demo test check fuzz proto clean
+.PHONY: demo test check proto contract fuzz fuzz-server robustness clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
 
-test: .venv/.test  ## the whole test suite, on both cores
+test: .venv/.test tests/strangers/node_modules  ## the whole test suite, on both cores
 	$(BIN)/pytest -n 2 --dist worksteal
 
 FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
@@ -31,10 +31,22 @@ check: .venv/.check  ## format, lint, types, import rules, proto rules
 	$(BIN)/lint-imports
 	$(BIN)/buf lint
 	$(BIN)/buf format --diff --exit-code
+	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/python proto/generate.py --check
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py
+
+contract: .venv/.check  ## with a release: the contract that later ones must not break
+	$(BIN)/buf breaking --against proto/contract.binpb
+	$(BIN)/buf build --exclude-source-info --output proto/contract.binpb
+
+fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
+	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics
+
+tests/strangers/node_modules: tests/strangers/package-lock.json
+	tests/peers.sh
+	touch $@
 
 .venv/.%: pyproject.toml CMakeLists.txt $(KERNEL)
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -43,4 +55,4 @@ proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	touch $@
 
 clean:
-	rm -rf .venv build dist
+	rm -rf .venv build dist tests/strangers/node_modules

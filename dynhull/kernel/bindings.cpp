@@ -1,8 +1,10 @@
 // dynhull._kernel: the kernel's HullTree and predicates for Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 
 #include "chains.hpp"
+#include "chan.hpp"
 #include "check.hpp"
 #include "lock.hpp"
 #include "static_hull.hpp"
@@ -230,6 +232,36 @@ nb::object orientations(const Rows& a, const Rows& b, const Rows& c) {
   return output.array({count});
 }
 
+nb::object convex_hull(const Rows& rows, std::optional<bool> discard, std::optional<bool> threads) {
+  std::optional<StaticHull> hull;
+  {
+    nb::gil_scoped_release release;
+    hull.emplace(static_hull(points_of(rows), rows.shape(0), {discard, threads}));
+  }
+  if (!hull->finite()) return nb::none();
+  const auto [lower, upper] = hull->chains();
+  const std::size_t between = upper.size() > 2 ? upper.size() - 2 : 0;
+  Output<double> output(2 * (lower.size() + between));
+  {
+    nb::gil_scoped_release release;
+    Point* end = std::copy(lower.begin(), lower.end(), reinterpret_cast<Point*>(output.data));
+    std::reverse_copy(upper.begin() + (between > 0), upper.begin() + (between > 0) + between, end);
+    hull.reset();
+  }
+  return output.array({lower.size() + between, 2});
+}
+
+nb::tuple chan(const Rows& rows) {
+  const Chan hull = [&] {
+    nb::gil_scoped_release release;
+    return Chan(points_of(rows), rows.shape(0));
+  }();
+  nb::list rounds;
+  for (const Chan::Round& round : hull.rounds)
+    rounds.append(nb::make_tuple(round.guess, round.groups, round.steps, round.closed));
+  return nb::make_tuple(array_of(hull.vertices), rounds);
+}
+
 Point point_of(nb::handle pair) {
   PyObject* tuple = pair.ptr();
   if (!PyTuple_CheckExact(tuple) || PyTuple_GET_SIZE(tuple) != 2) throw nb::type_error("a point is a tuple (x, y)");
@@ -305,17 +337,12 @@ NB_MODULE(_kernel, module) {
   module.def(
       "plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
       "a * b - c * d as the predicates' filters compute it: three roundings. For the test of the build's flags.");
-  module.def(
-      "convex_hull",
-      [](const Rows& rows) {
-        std::vector<Point> hull;
-        {
-          nb::gil_scoped_release release;
-          hull = static_hull(points_of(rows), rows.shape(0));
-        }
-        return array_of(hull);
-      },
-      "xy"_a, "The strict vertices of (n, 2) points, counter-clockwise from the least.");
+  module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
+             "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. Whether "
+             "to discard points by a sample's hull first, and to use two threads, the input decides where not told. "
+             "O(n log n).");
+  module.def("chan", &chan, "xy"_a,
+             "The same by Chan's algorithm, and its rounds: guess, groups, steps, closed. O(n log h).");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");
 
   module.def("_before_fork", &Turns::before_fork);

@@ -1,7 +1,7 @@
 """Static convex hulls: the judges of the dynamic one. All give the same vertices in the same order."""
 
 from .chan import chan
-from .fastest import convex_hull
+from .convex_hull import convex_hull
 from .graham import graham_scan
 from .hull_nd import HullND, hull_nd
 from .jarvis import jarvis_march

@@ -10,7 +10,7 @@ import pytest
 from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
-from server_process import COMMAND, PATIENCE, server_process
+from server_process import PATIENCE, run, server_process
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -103,22 +103,12 @@ def test_a_batch_under_way_is_finished_at_the_end() -> None:
             list(watch)
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([COMMAND, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)
-
-
 def test_a_port_in_use(address: str) -> None:
     port = address.rpartition(":")[2]
     result = run("serve", "--port", port)
     assert result.returncode == 1
     assert f"cannot listen on 127.0.0.1:{port}" in result.stderr
     assert "Traceback" not in result.stderr
-
-
-def test_other_machines_only_when_told() -> None:
-    result = run("serve", "--host", "0.0.0.0", "--port", "0")
-    assert result.returncode == 1
-    assert "--insecure" in result.stderr
 
 
 def test_python_m_is_the_same_and_says_that_memory_is_all_there_is() -> None:
