@@ -4,8 +4,8 @@
     python benchmarks/core.py --sizes 1e6 --inputs uniform circle --works window locate
     python benchmarks/core.py --sizes 1e4 1e5 1e6 1e7 --works window --chart docs/images/core.png
 
-Processor time, medians of --repeat repetitions, everything on one core. An update is one insert or one delete. Rivals in
-C++ are compiled on the fly; CGAL joins where its headers are installed (Debian's libcgal-dev).
+Processor time, medians of --repeat repetitions, everything on one core. An update is one insert or one delete. Rivals
+in C++ are compiled on the fly; CGAL joins where its headers are installed (Debian's libcgal-dev).
 """
 
 import argparse
