@@ -46,9 +46,11 @@ static void window(const std::vector<Point>& points, std::size_t n, std::size_t 
 #ifdef WITH_CGAL
   const std::size_t few = std::min<std::size_t>(k, 2000);
   CGAL::Delaunay_triangulation_2<Kernel> triangulation;
+  std::vector<CgalPoint> start;
+  for (std::size_t i = 0; i < n; ++i) start.emplace_back(points[i].first, points[i].second);
+  triangulation.insert(start.begin(), start.end());
   std::vector<decltype(triangulation)::Vertex_handle> handles;
-  for (std::size_t i = 0; i < n; ++i)
-    handles.push_back(triangulation.insert(CgalPoint(points[i].first, points[i].second)));
+  for (std::size_t i = 0; i < few; ++i) handles.push_back(triangulation.nearest_vertex(start[i]));
   report("CGAL Delaunay_triangulation_2", 2 * few, [&] {
     for (std::size_t i = 0; i < few; ++i) {
       triangulation.insert(CgalPoint(points[n + i].first, points[n + i].second));
