@@ -27,6 +27,7 @@ from dynhull import DynamicHull
 
 UPDATES = 131_072  # a repetition
 FEW = 5_000  # for the slow ones
+PATIENCE = 2  # seconds for the slowest
 BATCHES = (256, 8_192, 65_536)
 QUERIES = 200_000
 
@@ -158,20 +159,17 @@ def rebuild(n, rows) -> float:
     ring = rows[:n].copy()
     vertices = dynhull.convex_hull(ring)
     corners = set(map(tuple, vertices.tolist()))
-    steps = min(FEW, n) if n < 200_000 else 500
-
-    def work():
-        nonlocal vertices, corners
-        for i in range(steps):
-            new, old = rows[n + i], ring[i].copy()
-            ring[i] = new
-            a, b = vertices, np.roll(vertices, -1, axis=0)
-            outside = (dynhull.orient2d(a, b, new) < 0).any()
-            if outside or tuple(old.tolist()) in corners:
-                vertices = dynhull.convex_hull(ring)
-                corners = set(map(tuple, vertices.tolist()))
-
-    return clocked(work, 2 * steps)
+    done = 0
+    began = time.process_time()
+    while done < min(FEW, n) and time.process_time() < began + PATIENCE:
+        new, old = rows[n + done], ring[done].copy()
+        ring[done] = new
+        done += 1
+        outside = (dynhull.orient2d(vertices, np.roll(vertices, -1, axis=0), new) < 0).any()
+        if outside or tuple(old.tolist()) in corners:
+            vertices = dynhull.convex_hull(ring)
+            corners = set(map(tuple, vertices.tolist()))
+    return (time.process_time() - began) / (2 * done)
 
 
 def vertex(n, make, random, rivals) -> Iterator[Row]:
