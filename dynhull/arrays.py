@@ -32,6 +32,16 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     return np.ascontiguousarray(_finite(_as_double(array, name), name) + 0.0)
 
 
+def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
+    """Return `points` as a float64 array of shape (n, d), d at least 2, checked like `as_points`."""
+    array = _as_array(points, name)
+    if array.ndim == 1 and array.size == 0:
+        return np.empty((0, 2))
+    if array.ndim != 2 or array.shape[1] < 2:
+        raise ValueError(f"{name} must have shape (n, d), d at least 2, got {array.shape}")
+    return _finite(_as_double(array, name), name) + 0.0
+
+
 def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
     """Return `xy` as a float64 array of shape (..., 2), checked like `as_points`."""
     array = _as_array(xy, name)

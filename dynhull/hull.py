@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from . import measure
 from .arrays import Points, as_coordinate, as_operations, as_points
+from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
 
@@ -52,7 +53,7 @@ class DynamicHull:
 
     __slots__ = ("_tree",)
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
-    _tree_type: ClassVar[type[HullTree]] = HullTree
+    _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
         self._tree = self._tree_type(None if points is None else as_points(points))
@@ -61,15 +62,14 @@ class DynamicHull:
 
     def insert(self, x: float, y: float) -> bool:
         """Add a point. True where the hull changed. O(log² n)."""
-        return self._tree.insert(as_coordinate(x, "x"), as_coordinate(y, "y"))
+        return self._tree.insert(x, y)
 
     def delete(self, x: float, y: float) -> bool:
         """Remove a point once. True where the hull changed; KeyError where the point is not there. O(log² n)."""
-        p = as_coordinate(x, "x"), as_coordinate(y, "y")
         try:
-            return self._tree.delete(*p)
+            return self._tree.delete(x, y)
         except KeyError:
-            raise MissingPointError(p) from None
+            raise MissingPointError((as_coordinate(x, "x"), as_coordinate(y, "y"))) from None
 
     def insert_many(self, xy: npt.ArrayLike) -> int:
         """Add points as one batch. Returns how many. O(log² n) each, O((n + k) log k) for k >= n."""
@@ -132,7 +132,7 @@ class DynamicHull:
 
     def count(self, x: float, y: float) -> int:
         """How many times the point is there. O(log n)."""
-        return self._tree.count(as_coordinate(x, "x"), as_coordinate(y, "y"))
+        return self._tree.count(x, y)
 
     def __contains__(self, point: tuple[float, float]) -> bool:
         """Whether (x, y) is one of the points. O(log n)."""
@@ -219,8 +219,8 @@ class DynamicHull:
 
     def copy(self) -> Self:
         """An independent hull of the same points. O(n)."""
-        new = type(self)(self.points())
-        new._tree.changes = self.changes
+        new = type(self)()
+        new._tree = self._tree.copy()
         return new
 
     __copy__ = copy

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import finite_pairs
+from .arrays import Points, finite_pairs
+from .implementation import kernel
 
 Point = tuple[float, float]
 
@@ -122,6 +123,13 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
         one, two, three = ((float(x), float(y)) for x, y in pairs)
         return orientation(one, two, three)
     p, q, r = np.broadcast_arrays(*pairs)
+    if kernel is not None:
+        rows = (np.ascontiguousarray(pair).reshape(-1, 2) for pair in (p, q, r))
+        return kernel.orientations(*rows).reshape(p.shape[:-1])
+    return _orientations(p, q, r)
+
+
+def _orientations(p: Points, q: Points, r: Points) -> npt.NDArray[np.int8]:
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         left = (p[..., 0] - r[..., 0]) * (q[..., 1] - r[..., 1])
         right = (p[..., 1] - r[..., 1]) * (q[..., 0] - r[..., 0])

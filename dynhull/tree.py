@@ -8,12 +8,13 @@ chains and bridges from the leaf up and stops where its point is not on the hull
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from typing import Self
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Points
+from .arrays import Points, as_coordinate
 from .nodes import (
     HIGHEST,
     LOWER,
@@ -37,7 +38,9 @@ from .predicates import Point, direction_sign, orientation
 
 
 class HullTree:
-    """A multiset of points and its convex hull. Coordinates are finite floats, zeros are positive: callers see to it.
+    """A multiset of points and its convex hull.
+
+    Single coordinates are checked. In arrays they are finite floats and zeros are positive: callers see to it.
 
     O(log² n) an update, O(log n) a query, O(n) space.
     """
@@ -70,7 +73,9 @@ class HullTree:
 
     def count(self, x: float, y: float) -> int:
         """How many times the point is there. O(log n)."""
-        p = (x, y)
+        return self._count(_point(x, y))
+
+    def _count(self, p: Point) -> int:
         node = self._root
         if node is None:
             return 0
@@ -81,17 +86,24 @@ class HullTree:
             return self._copies.get(p, 1)
         return 0
 
+    def copy(self) -> Self:
+        """An independent tree of the same points. O(n)."""
+        new = type(self)()
+        new._build(Counter({p: self._copies.get(p, 1) for p in self._all_points()}))
+        new.changes = self.changes
+        return new
+
     # Updates
 
     def insert(self, x: float, y: float) -> bool:
         """Add a point. True where the hull changed. O(log² n)."""
-        changed = self._insert((x, y), 1)
+        changed = self._insert(_point(x, y), 1)
         self.changes += changed
         return changed
 
     def delete(self, x: float, y: float) -> bool:
         """Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n)."""
-        changed = self._delete((x, y), 1)
+        changed = self._delete(_point(x, y), 1)
         self.changes += changed
         return changed
 
@@ -107,7 +119,7 @@ class HullTree:
         applied, first_missing = len(points), -1
         for row in np.flatnonzero(ops < 0).tolist():
             p = points[row]
-            if net[p] + self.count(*p) > 0:
+            if net[p] + self._count(p) > 0:
                 net[p] -= 1
                 continue
             if first_missing < 0:
@@ -451,6 +463,10 @@ def _require(condition: bool, what: str) -> None:
     """An assert that python -O keeps."""
     if not condition:
         raise AssertionError(what)
+
+
+def _point(x: float, y: float) -> Point:
+    return as_coordinate(x, "x"), as_coordinate(y, "y")
 
 
 def _tuples(xy: Points) -> list[Point]:

@@ -1,7 +1,13 @@
 """The hulls that the core tests run on."""
 
 from dynhull import DynamicHull
+from dynhull.implementation import kernel
 from dynhull.tree import HullTree
+
+
+class PythonHull(DynamicHull):
+    __slots__ = ()
+    _tree_type = HullTree
 
 
 class TinyLeafTree(HullTree):
@@ -15,4 +21,12 @@ class TinyLeafHull(DynamicHull):
     _tree_type = TinyLeafTree
 
 
-HULLS = {"python": DynamicHull, "python, tiny leaves": TinyLeafHull}
+HULLS = {"python": PythonHull, "python, tiny leaves": TinyLeafHull}
+
+if kernel is not None:
+
+    class KernelHull(DynamicHull):
+        __slots__ = ()
+        _tree_type = kernel.HullTree
+
+    HULLS["cpp"] = KernelHull

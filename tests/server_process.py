@@ -21,7 +21,7 @@ class Server:
 @contextmanager
 def server_process(*options: str) -> Iterator[Server]:
     """`dynhull serve` on a free port. It must stop in peace, and have nothing to complain about."""
-    command = [COMMAND, "serve", "--port", "0", "--in-memory", *options]
+    command = [COMMAND, "serve", "--port", "0", "--in-memory", "--log-level", "warning", *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,

@@ -1,4 +1,8 @@
-"""The degenerate side of static hulls, in one place: points on the boundary that are not vertices."""
+"""The degenerate side of static hulls, in one place: points on the boundary that are not vertices.
+
+Duplicates are dropped by each algorithm when it reads its input; what remains are points on one line with others.
+"drop" needs no code of its own: a turn that is not a left turn never makes a vertex. "keep" is what stands here.
+"""
 
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -20,6 +24,21 @@ def with_boundary_points(hull: Sequence[Point], points: Sequence[Point]) -> list
     lower, upper = list(hull[: turning + 1]), [hull[0], *reversed(hull[turning:])]
     on_lower, on_upper = (sorted(p for p in set(points) if _on_chain(chain, p)) for chain in (lower, upper))
     return on_lower + on_upper[-2:0:-1]
+
+
+def farther_first_on_last_ray(order: list[Point]) -> None:
+    """Reverse the points at the last angle, for a Graham scan that keeps boundary points. O(n).
+
+    `order` is a pivot and then the others by angle around it, the nearer first. The scan goes out along its first ray
+    and comes back along its last; where all lie on one line there is only the way out.
+    """
+    if len(order) < 3 or orientation(order[0], order[1], order[-1]) == 0:
+        return
+    pivot, farthest = order[0], order[-1]
+    first = len(order) - 1
+    while orientation(pivot, order[first - 1], farthest) == 0:
+        first -= 1
+    order[first:] = order[first:][::-1]
 
 
 def _on_chain(chain: Sequence[Point], p: Point) -> bool:

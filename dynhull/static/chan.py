@@ -10,8 +10,9 @@ import numpy.typing as npt
 from ..arrays import Points, as_points
 from ..predicates import Point, orientation
 from .boundary import check_collinear, with_boundary_points
+from .jarvis import rightmost
 from .monotone_chain import half_chain
-from .trace import Collinear, Round, Trace
+from .trace import Collinear, Groups, Round, Trace, Wrap
 
 Chains = tuple[list[Point], list[Point]]  # lower and upper, left to right
 
@@ -27,7 +28,7 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     Args:
         xy: (n, 2) array-like of finite numbers.
         collinear: "drop" returns true vertices only, "keep" every distinct point on the boundary.
-        trace: a list to fill with a `Round` event a round.
+        trace: a list to fill, for each round, with a `Groups`, the `Wrap` steps and a `Round`.
 
     Returns:
         (h, 2) points, counter-clockwise from the lexicographically smallest. All points on one line: two under "drop",
@@ -36,10 +37,10 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     Raises:
         ValueError, TypeError: bad input; the message names the first bad row.
 
-    >>> rounds = []
-    >>> chan([[0, 0], [4, 0], [5, 2], [4, 4], [2, 3], [0, 4], [1, 2], [2, 1]], trace=rounds).tolist()
+    >>> trace = []
+    >>> chan([[0, 0], [4, 0], [5, 2], [4, 4], [2, 3], [0, 4], [1, 2], [2, 1]], trace=trace).tolist()
     [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]
-    >>> [(r.guess, r.steps, r.closed) for r in rounds]
+    >>> [(event.guess, event.steps, event.closed) for event in trace if isinstance(event, Round)]
     [(2, 2, False), (4, 4, False), (16, 5, True)]
     """
     check_collinear(collinear)
@@ -48,7 +49,9 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     guess = 2
     while hull is None:
         groups = [_chains(points[i : i + guess]) for i in range(0, len(points), guess)]
-        steps, closed = _wrap(min(points), groups, guess)
+        if trace is not None:
+            trace.append(Groups(guess, tuple(_cycle(*chains) for chains in groups)))
+        steps, closed = _wrap(min(points), groups, guess, trace)
         if trace is not None:
             trace.append(Round(guess, len(groups), len(steps), len(points) * log2(guess), closed))
         if closed:
@@ -64,19 +67,19 @@ def _chains(group: Sequence[Point]) -> Chains:
     return half_chain(points, -1), half_chain(points, 1)
 
 
-def _wrap(start: Point, groups: Sequence[Chains], limit: int) -> tuple[list[Point], bool]:
+def _cycle(lower: Sequence[Point], upper: Sequence[Point]) -> tuple[Point, ...]:
+    return (*lower, *upper[-2:0:-1])
+
+
+def _wrap(start: Point, groups: Sequence[Chains], limit: int, trace: Trace | None) -> tuple[list[Point], bool]:
     """Gift wrapping from the least point: the vertices found, at most `limit`, and whether they close the hull."""
     vertices = [start]
     while True:
         p = vertices[-1]
-        best = p
-        for lower, upper in groups:
-            q = _next(p, lower, upper)
-            if q == p:
-                continue
-            turn = -1 if best == p else orientation(p, best, q)
-            if turn < 0 or (turn == 0 and p < best < q) or (turn == 0 and p > best > q):
-                best = q
+        tangents = [_next(p, lower, upper) for lower, upper in groups]
+        best = rightmost(p, tangents)
+        if trace is not None:
+            trace.append(Wrap(p, tuple(tangents), best))
         if best in (start, p):
             return vertices, True
         if len(vertices) == limit:

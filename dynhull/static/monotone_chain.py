@@ -8,7 +8,7 @@ import numpy.typing as npt
 from ..arrays import Points, as_points
 from ..predicates import Point, orientation
 from .boundary import check_collinear
-from .trace import Collinear, Pop, Push, Trace, Turn
+from .trace import Collinear, Pop, Push, Scan, Trace, Turn
 
 
 def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None = None) -> Points:
@@ -19,7 +19,8 @@ def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trac
     Args:
         xy: (n, 2) array-like of finite numbers.
         collinear: "drop" returns true vertices only, "keep" every distinct point on the boundary.
-        trace: a list to fill with `Turn`, `Push` and `Pop` events: first the lower chain's, then the upper chain's.
+        trace: a list to fill with a `Scan` and then `Turn`, `Push` and `Pop` events, first of the lower chain, then of
+            the upper chain, both from left to right.
 
     Returns:
         (h, 2) points, counter-clockwise from the lexicographically smallest. All points on one line: two under "drop",
@@ -33,13 +34,14 @@ def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trac
     """
     check_collinear(collinear)
     points = sorted(set(map(tuple, as_points(xy).tolist())))
-    chains = []
-    for sign in (-1, 1):
-        if trace is None and collinear == "drop":
-            chains.append(half_chain(points, sign))
-        else:
-            chains.append(_traced_half_chain(points, sign, collinear, [] if trace is None else trace))
-    lower, upper = chains
+    if trace is None and collinear == "drop":
+        lower, upper = half_chain(points, -1), half_chain(points, 1)
+    else:
+        trace = [] if trace is None else trace
+        trace.append(Scan("lower chain", tuple(points)))
+        lower = _traced_half_chain(points, -1, collinear, trace)
+        trace.append(Scan("upper chain", tuple(points)))
+        upper = _traced_half_chain(points, 1, collinear, trace)
     hull = lower if lower == upper else lower + upper[-2:0:-1]
     return np.array(hull, dtype=np.float64).reshape(len(hull), 2)
 

@@ -1,9 +1,23 @@
 """What a static algorithm did, as data: pass a list as `trace` and it is filled with these."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Literal
 
 from ..predicates import Point
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """A pass over the points begins, with an empty chain.
+
+    Attributes:
+        name: what the pass finds: "hull", "lower chain" or "upper chain".
+        points: all points of the pass in the order in which it takes them.
+    """
+
+    name: str
+    points: tuple[Point, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +28,12 @@ class Turn:
     b: Point
     c: Point
     sign: int
+
+    @property
+    def cross(self) -> Fraction:
+        """The cross product (b - a) x (c - a), twice the triangle's signed area, without rounding."""
+        (ax, ay), (bx, by), (cx, cy) = ((Fraction(x), Fraction(y)) for x, y in (self.a, self.b, self.c))
+        return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +51,36 @@ class Pop:
 
 
 @dataclass(frozen=True, slots=True)
+class Groups:
+    """A round of Chan's algorithm begins, with an empty chain.
+
+    Attributes:
+        guess: the guessed number of vertices; groups have at most this many points.
+        hulls: the vertices of each group's hull, counter-clockwise from the lexicographically smallest.
+    """
+
+    guess: int
+    hulls: tuple[tuple[Point, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wrap:
+    """One step of Chan's gift wrapping.
+
+    Attributes:
+        vertex: the hull's vertex to go on from.
+        tangents: for each group, the point where its tangent from the vertex touches it.
+        best: the tangent point with all others to the left, the next vertex.
+    """
+
+    vertex: Point
+    tangents: tuple[Point, ...]
+    best: Point
+
+
+@dataclass(frozen=True, slots=True)
 class Round:
-    """One round of Chan's algorithm.
+    """The end of a round of Chan's algorithm.
 
     Attributes:
         guess: the guessed number of vertices; groups have at most this many points.
@@ -49,6 +97,6 @@ class Round:
     closed: bool
 
 
-Event = Turn | Push | Pop | Round
+Event = Scan | Turn | Push | Pop | Groups | Wrap | Round
 Trace = list[Event]
 Collinear = Literal["drop", "keep"]

@@ -85,4 +85,5 @@ def machine(make):
     return case
 
 
-TestHull, TestTinyLeafHull = map(machine, HULLS.values())
+for _make in HULLS.values():
+    globals()[f"Test{_make.__name__}"] = machine(_make)

@@ -272,7 +272,7 @@ def test_limits_are_told() -> None:
         assert dict(info.metadata) == {"limit": "max_hulls", "value": "1"}
         assert details[0].violations[0].subject == "max_hulls"
         batch = batch_pb2.Batch(inserts=points_pb2.Points(packed=bytes(16 * 4096)))
-        with pytest.raises(grpc.RpcError, match="4096") as caught:
-            stub.Apply(pb.ApplyRequest(name="one", batch=batch))
-        assert caught.value.code() == grpc.StatusCode.RESOURCE_EXHAUSTED
+        code, info, _ = refusal(lambda: stub.Apply(pb.ApplyRequest(name="one", batch=batch)))
+        assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
+        assert dict(info.metadata) == {"limit": "max_message_bytes", "value": "4096"}
         assert stub.GetHull(pb.GetHullRequest(name="one")).hull.revision == 0

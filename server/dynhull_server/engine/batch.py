@@ -23,10 +23,16 @@ class Batch:
     destinations: Points
     count_missing: bool
 
+    @property
+    def growth(self) -> int:
+        """How many more points there are afterwards, at most."""
+        grown = len(self.inserts) + len(self.destinations)
+        return grown if self.count_missing else grown - len(self.deletes) - len(self.origins)
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(slots=True)
 class Applied:
-    """What a batch did, and the counts after it."""
+    """What a batch did, and the counts after it. Of a `duplicate`, a revision that has it in it."""
 
     revision: int
     inserted: int
@@ -34,6 +40,7 @@ class Applied:
     missing: int
     hull_changed: bool
     points: int
+    duplicate: bool = False
 
 
 def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
@@ -44,17 +51,25 @@ def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
     """
     inserted = len(batch.inserts) + len(batch.destinations)
     to_delete = len(batch.deletes) + len(batch.origins)
-    points = np.concatenate((batch.inserts, batch.destinations, batch.deletes, batch.origins))
-    ops = np.repeat(np.array([1, -1], np.int8), [inserted, to_delete])
     changes = hull.changes
-    try:
-        applied = hull.apply(ops, points, missing="ignore" if batch.count_missing else "raise")
-    except MissingPointError as error:
-        if error.row is None:
-            raise
-        row = error.row - inserted
-        if row < len(batch.deletes):
-            raise PointMissingError("deletes", row, error.point) from None
-        raise PointMissingError("origins", row - len(batch.deletes), error.point) from None
-    deleted = applied - inserted
+    if to_delete == 0:
+        deleted = 0
+        if inserted == 1:  # what most messages of a live feed hold
+            x, y = batch.inserts[0].tolist()
+            hull.insert(x, y)
+        else:
+            hull.insert_many(batch.inserts)
+    else:
+        points = np.concatenate((batch.inserts, batch.destinations, batch.deletes, batch.origins))
+        ops = np.repeat(np.array([1, -1], np.int8), [inserted, to_delete])
+        try:
+            applied = hull.apply(ops, points, missing="ignore" if batch.count_missing else "raise")
+        except MissingPointError as error:
+            if error.row is None:
+                raise
+            row = error.row - inserted
+            if row < len(batch.deletes):
+                raise PointMissingError("deletes", row, error.point) from None
+            raise PointMissingError("origins", row - len(batch.deletes), error.point) from None
+        deleted = applied - inserted
     return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))

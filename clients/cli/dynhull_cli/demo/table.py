@@ -1,6 +1,5 @@
 """Anybody's points: a CSV file with a header, columns chosen by name."""
 
-import csv
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
@@ -8,13 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..csv_points import Row, read_points
 from .scene import Frame, Points
 
-SHOWN_BAD_ROWS = 5
 MILESTONES = 24
-PAIRS = [("x", "y"), ("lon", "lat"), ("longitude", "latitude")]
-
-Row = tuple[str, str, tuple[float, float]]  # time, name, position
 
 
 class Table:
@@ -35,23 +31,7 @@ class Table:
     ) -> None:
         self.title = path.name
         self.hull_name = "points"
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            columns = reader.fieldnames or []
-            if not columns:
-                raise ValueError(f"{path} is empty: it needs a header line with the names of its columns")
-            x, y = _coordinate_columns(path, columns, x, y)
-            for option, name in (("--id", identity), ("--time", time)):
-                _require(path, columns, option, name)
-            rows, bad = _read(reader, x, y, identity, time)
-        self.notes = [f"{path}: {len(rows):,} points from columns {x} and {y}"]
-        if bad:
-            self.notes.append(f"{len(bad):,} bad rows left out:")
-            self.notes += [f"  {reason}" for reason in bad[:SHOWN_BAD_ROWS]]
-            if len(bad) > SHOWN_BAD_ROWS:
-                self.notes.append(f"  ... and {len(bad) - SHOWN_BAD_ROWS:,} more")
-        if not rows:
-            raise ValueError("\n".join([f"{path} has no points", *self.notes[1:]]))
+        rows, self.notes = read_points(path, x, y, identity, time)
         self._batches = _by_time(rows) if time else _equal_parts(rows, batches)
         self._moves = identity is not None
         self.length = len(self._batches)
@@ -71,59 +51,6 @@ class Table:
             names = list(there) if self._moves else [f"row {name}" for name in there]
             milestone = i % every == 0 or i == self.length - 1
             yield Frame(clock, _array(deleted), _array(inserted), _array(there.values()), names, milestone)
-
-
-def _coordinate_columns(path: Path, columns: Sequence[str], x: str | None, y: str | None) -> tuple[str, str]:
-    if x is None and y is None:
-        lowered = {column.lower(): column for column in columns}
-        for pair in PAIRS:
-            if lowered.keys() >= set(pair):
-                return lowered[pair[0]], lowered[pair[1]]
-    for option, name in (("--x", x), ("--y", y)):
-        if name is None:
-            raise ValueError(f"{path}: name its {option[2:]} column with {option}; it has {', '.join(columns)}")
-        _require(path, columns, option, name)
-    assert x is not None
-    assert y is not None
-    return x, y
-
-
-def _require(path: Path, columns: Sequence[str], option: str, name: str | None) -> None:
-    if name is not None and name not in columns:
-        raise ValueError(f"{path} has no column {name!r} ({option}); it has {', '.join(columns)}")
-
-
-def _read(
-    reader: "csv.DictReader[str]", x: str, y: str, identity: str | None, time: str | None
-) -> tuple[list[Row], list[str]]:
-    """Good rows, and a reason for each bad one."""
-    rows, bad = [], []
-    for record in reader:
-        line = reader.line_num
-        try:
-            position = _coordinate(record, x), _coordinate(record, y)
-            for column in (identity, time):
-                if column is not None and not record[column]:
-                    raise ValueError(f"{column} is missing")
-        except ValueError as reason:
-            bad.append(f"line {line}: {reason}")
-            continue
-        name = str(record[identity]) if identity else str(line)
-        rows.append((str(record[time]) if time else "", name, position))
-    return rows, bad
-
-
-def _coordinate(record: dict[str, str], column: str) -> float:
-    text = record[column]
-    if not text:
-        raise ValueError(f"{column} is missing")
-    try:
-        value = float(text)
-    except ValueError:
-        raise ValueError(f"{column} is {text!r}, not a number") from None
-    if not math.isfinite(value):
-        raise ValueError(f"{column} is {text!r}, not finite")
-    return value + 0.0
 
 
 def _by_time(rows: Iterable[Row]) -> list[tuple[str, list[Row]]]:

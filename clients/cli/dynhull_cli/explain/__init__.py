@@ -1,0 +1,1 @@
+"""`dynhull explain`: a static algorithm's trace, drawn step by step."""

@@ -1,0 +1,27 @@
+"""Which implementation runs: the C++ kernel where it is built, or the reference in Python.
+
+The environment variable DYNHULL_KERNEL, read at import, forces one: "python" or "cpp".
+"""
+
+import os
+from types import ModuleType
+from typing import Literal
+
+
+def _load() -> ModuleType | None:
+    wanted = os.environ.get("DYNHULL_KERNEL") or "any"
+    if wanted not in ("any", "cpp", "python"):
+        raise ValueError(f'DYNHULL_KERNEL must be "cpp" or "python", got {wanted!r}')
+    if wanted == "python":
+        return None
+    try:
+        from . import _kernel
+    except ModuleNotFoundError:
+        if wanted == "cpp":
+            raise
+        return None
+    return _kernel
+
+
+kernel = _load()
+KERNEL: Literal["cpp", "python"] = "python" if kernel is None else "cpp"

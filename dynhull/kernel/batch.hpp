@@ -1,0 +1,214 @@
+// Applying a batch: split it along the tree, repair each touched leaf and bridge once on the way back.
+//
+// A few changes that share a small subtree run one by one in it, as if it were the whole tree; a leaf with many is
+// merged and its chains computed once. Up in the tree only candidates matter: for each side, inserted points that are
+// on the new chain and deleted points that were on the old one. Candidates may include points that came and went while
+// changes ran one by one (deletes first, so that nothing of the old or new chain is missed); such a point lies below an
+// edge of the chain that has a true candidate at one end, and the two pass the same nodes, so that candidates reach the
+// root exactly when the hull changed.
+#pragma once
+
+#include "plan.hpp"
+
+namespace dynhull {
+
+class Commit {
+ public:
+  // All memory is taken here, with a reserve in nodes; apply() cannot fail.
+  Commit(Nodes& nodes, const Plan& plan) : nodes_(nodes), changes_(plan.changes.data()), count_(plan.changes.size()) {
+    nodes.reserve(plan.extra_leaves);
+    for (Side side : SIDES) candidates_[side].resize(count_);
+    if (count_ > FEW) {
+      points_.resize(LEAF + count_);
+      repeated_.resize(LEAF + count_);
+      leaves_.resize(leaves_for(LEAF + count_));
+    }
+    small_.reserve(count_);
+  }
+
+  // True where the hull changed.
+  bool apply() {
+    const Found found = run(nodes_.root, 0, count_);
+    nodes_.root = found.tree;
+    if (found.tree != NONE) nodes_.set_parent(found.tree, NONE);
+    for (Ref leaf : small_)
+      if (nodes_.leaf(leaf).size > 0 && nodes_.leaf(leaf).size < LOW) merge(nodes_, leaf);
+    return found.candidates[UPPER] + found.candidates[LOWER] > 0;
+  }
+
+ private:
+  // Up to so many changes run one by one in the subtree that they share: measured, see docs/performance.md.
+  static constexpr std::size_t FEW = 8;
+  static constexpr std::size_t LOOKAHEAD = 4;
+
+  // A subtree after its changes, detached, and how many candidates there are, a side: numbers of changes, stored in
+  // candidates_ from the place of the subtree's first change on.
+  struct Found {
+    Ref tree;
+    std::size_t candidates[2] = {0, 0};
+  };
+
+  Found run(Ref tree, std::size_t from, std::size_t to) {
+    if (to - from <= FEW) return one_by_one(tree, from, to);
+    if (is_leaf(tree)) return merge_into_leaf(tree, from, to);
+    const Node& node = nodes_.node(tree);
+    const Point separator = node.separator;
+    const Change* middle = std::partition_point(changes_ + from, changes_ + to,
+                                                [&](const Change& change) { return change.p < separator; });
+    const auto cut = static_cast<std::size_t>(middle - changes_);
+    Found left{node.child[0]}, right{node.child[1]};
+    if (from < cut) left = run(left.tree, from, cut);
+    if (cut < to) right = run(right.tree, cut, to);
+    return combine(tree, left, right, from, cut);
+  }
+
+  Found one_by_one(Ref tree, std::size_t from, std::size_t to) {
+    Found found{tree};
+    nodes_.set_parent(tree, NONE);
+    nodes_.root = tree;
+    for (const bool insert : {false, true}) {
+      for (std::size_t i = from; i < to; ++i) {
+        const Change& change = changes_[i];
+        if (!insert && i + LOOKAHEAD < count_) nodes_.leaf(changes_[i + LOOKAHEAD].leaf).fetch();
+        if (change.insert != insert) continue;
+        const Place place = find(nodes_, change.p);
+        const unsigned changed =
+            insert ? insert_point(nodes_, place, change.p) : remove_point(nodes_, place, change.p);
+        for (Side side : SIDES)
+          if (changed & (1u << side)) propose(found, side, from, i);
+      }
+    }
+    found.tree = nodes_.root;
+    if (found.tree != NONE && is_leaf(found.tree)) note_small(found.tree);
+    return found;
+  }
+
+  Found merge_into_leaf(Ref tree, std::size_t from, std::size_t to) {
+    Found found{tree};
+    const Leaf& leaf = nodes_.leaf(tree);
+    std::size_t total = 0;
+    unsigned entry = 0;
+    const auto keep = [&](Point p, bool repeated) {
+      points_[total] = p;
+      repeated_[total++] = repeated;
+    };
+    for (std::size_t i = from; i < to; ++i) {
+      const Change& change = changes_[i];
+      for (; entry < leaf.size && leaf[entry] < change.p; ++entry) keep(leaf[entry], leaf.repeated & bit(entry));
+      if (change.insert) {
+        keep(change.p, false);
+        continue;
+      }
+      for (Side side : SIDES)
+        if (leaf.chain[side] & bit(entry)) propose(found, side, from, i);
+      ++entry;
+    }
+    for (; entry < leaf.size; ++entry) keep(leaf[entry], leaf.repeated & bit(entry));
+
+    nodes_.give_back(tree);
+    if (total == 0) return found.tree = NONE, found;
+    found.tree = build(nodes_, points_.data(), total, leaves_.data());
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < leaves_for(total); ++i) {
+      Leaf& part = nodes_.leaf(leaves_[i]);
+      for (unsigned k = 0; k < part.size; ++k)
+        if (repeated_[next++]) part.repeated |= bit(k);
+    }
+    for (std::size_t i = from; i < to; ++i)
+      for (Side side : SIDES)
+        if (changes_[i].insert && on_chain(nodes_, found.tree, side, changes_[i].p)) propose(found, side, from, i);
+    if (is_leaf(found.tree)) note_small(found.tree);
+    return found;
+  }
+
+  // Join two subtrees again under the node that they had, and let pass the candidates that matter further up.
+  Found combine(Ref v, Found left, Found right, std::size_t from, std::size_t cut) {
+    const Bridges old = {{nodes_.bridge(v, UPPER), nodes_.bridge(v, LOWER)}};
+    Found found{v};
+    for (Side side : SIDES) {
+      auto* all = candidates_[side].data();
+      std::copy_n(all + cut, right.candidates[side], all + from + left.candidates[side]);
+      found.candidates[side] = left.candidates[side] + right.candidates[side];
+    }
+    if (left.tree == NONE || right.tree == NONE) {
+      nodes_.give_back(v);
+      found.tree = left.tree == NONE ? right.tree : left.tree;
+      for (Side side : SIDES)
+        filter(found, side, from, [&](const Change& change, bool on_left) {
+          return change.insert || reaches(old.side[side], change.p, on_left);
+        }, cut);
+      return found;
+    }
+    const int difference = static_cast<int>(nodes_.height(left.tree)) - static_cast<int>(nodes_.height(right.tree));
+    if (std::abs(difference) > 1) {
+      found.tree = join(nodes_, left.tree, right.tree, v);
+      for (Side side : SIDES)
+        filter(found, side, from, [&](const Change& change, bool on_left) {
+          return change.insert ? on_chain(nodes_, found.tree, side, change.p)
+                               : reaches(old.side[side], change.p, on_left);
+        }, cut);
+      return found;
+    }
+    nodes_.link(v, 0, left.tree);
+    nodes_.link(v, 1, right.tree);
+    refresh_height(nodes_, v);
+    for (Side side : SIDES) {
+      if (found.candidates[side] == 0) continue;
+      Edge& edge = nodes_.bridge(v, side);
+      if (broken(edge, side, found, from, cut))
+        edge = bridge_of(nodes_, left.tree, right.tree, side, nodes_.node(v).separator);
+      filter(found, side, from, [&](const Change& change, bool on_left) {
+        return reaches(change.insert ? edge : old.side[side], change.p, on_left);
+      }, cut);
+    }
+    return found;
+  }
+
+  // Whether a point of a child's chain is on its parent's.
+  static bool reaches(const Edge& bridge, Point p, bool on_left) { return on_left ? p <= bridge.a : p >= bridge.b; }
+
+  // Whether a bridge lost an end, or a new point lies outside of it, or on its line beyond an end.
+  bool broken(const Edge& edge, Side side, const Found& found, std::size_t from, std::size_t cut) const {
+    for (std::size_t i = 0; i < found.candidates[side]; ++i) {
+      const std::size_t number = candidates_[side][from + i];
+      const Change& change = changes_[number];
+      if (!change.insert) {
+        if (change.p == edge.a || change.p == edge.b) return true;
+        continue;
+      }
+      const int turn = turned(side, orientation(edge.a, edge.b, change.p));
+      const bool beyond = number < cut ? change.p < edge.a : change.p > edge.b;
+      if (turn > 0 || (turn == 0 && beyond)) return true;
+    }
+    return false;
+  }
+
+  template <class Passes>
+  void filter(Found& found, Side side, std::size_t from, Passes passes, std::size_t cut) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < found.candidates[side]; ++i) {
+      const std::uint32_t number = candidates_[side][from + i];
+      if (passes(changes_[number], number < cut)) candidates_[side][from + kept++] = number;
+    }
+    found.candidates[side] = kept;
+  }
+
+  void propose(Found& found, Side side, std::size_t from, std::size_t change) {
+    candidates_[side][from + found.candidates[side]++] = static_cast<std::uint32_t>(change);
+  }
+
+  void note_small(Ref leaf) {
+    if (nodes_.leaf(leaf).size < LOW) small_.push_back(leaf);
+  }
+
+  Nodes& nodes_;
+  const Change* changes_;
+  std::size_t count_;
+  std::vector<std::uint32_t> candidates_[2];
+  std::vector<Point> points_;        // of a leaf that is merged
+  std::vector<std::uint8_t> repeated_;
+  std::vector<Ref> leaves_;
+  std::vector<Ref> small_;  // leaves to merge with their neighbours at the end
+};
+
+}  // namespace dynhull

@@ -1,0 +1,309 @@
+// dynhull._kernel: the kernel's HullTree and predicates for Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include "chains.hpp"
+#include "check.hpp"
+#include "lock.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace dynhull {
+namespace {
+
+using Rows = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using Ops = nb::ndarray<const std::int8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+
+const Point* points_of(const Rows& rows) {
+  static_assert(sizeof(Point) == 2 * sizeof(double));
+  return reinterpret_cast<const Point*>(rows.data());
+}
+
+// A new array for numpy, of `count` items of `width` scalars.
+template <class Scalar>
+struct Output {
+  Scalar* data;
+  nb::capsule owner;
+
+  explicit Output(std::size_t size)
+      : data(new Scalar[size]), owner(data, [](void* memory) noexcept { delete[] static_cast<Scalar*>(memory); }) {}
+
+  nb::object array(std::initializer_list<std::size_t> shape) const {
+    return nb::cast(nb::ndarray<nb::numpy, Scalar>(data, shape.size(), shape.begin(), owner));
+  }
+};
+
+nb::object array_of(const std::vector<Point>& points) {
+  Output<double> output(2 * points.size());
+  std::copy(points.begin(), points.end(), reinterpret_cast<Point*>(output.data));
+  return output.array({points.size(), 2});
+}
+
+// One coordinate, checked: what is not plainly a double goes the way of dynhull.arrays, which converts or refuses.
+double coordinate(nb::handle value, const char* name) {
+  constexpr long long LARGEST_EXACT_INTEGER = 1LL << 53;
+  if (PyFloat_CheckExact(value.ptr())) {
+    const double number = PyFloat_AS_DOUBLE(value.ptr());
+    if (std::isfinite(number)) return number + 0.0;  // -0.0 is 0.0
+  } else if (PyLong_CheckExact(value.ptr())) {
+    int overflow = 0;
+    const long long number = PyLong_AsLongLongAndOverflow(value.ptr(), &overflow);
+    if (overflow == 0 && -LARGEST_EXACT_INTEGER <= number && number <= LARGEST_EXACT_INTEGER)
+      return static_cast<double>(number);
+  }
+  return nb::cast<double>(nb::module_::import_("dynhull.arrays").attr("as_coordinate")(value, name));
+}
+
+class Hull {
+ public:
+  Hull() = default;
+  explicit Hull(const Rows& rows) {
+    nb::gil_scoped_release release;
+    tree_ = HullTree(points_of(rows), rows.shape(0));
+  }
+
+  std::size_t size() { return settled().size(); }
+  std::size_t distinct() { return settled().distinct(); }
+  std::uint64_t changes() { return settled().changes; }
+  void set_changes(std::uint64_t changes) { writable().changes = changes; }
+  void clear() { writable().clear(); }
+  std::uint64_t count(nb::handle x, nb::handle y) {
+    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
+    return settled().count(p);
+  }
+
+  bool insert(nb::handle x, nb::handle y) {
+    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
+    return writable().insert(p);
+  }
+
+  bool remove(nb::handle x, nb::handle y) {
+    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
+    const HullTree::Removal removal = writable().remove(p);
+    if (removal == HullTree::Removal::MISSING) {
+      PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y).ptr());
+      throw nb::python_error();
+    }
+    return removal == HullTree::Removal::HULL_CHANGED;
+  }
+
+  nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing) {
+    if (ops.shape(0) != rows.shape(0)) throw nb::value_error("ops and xy differ in length");
+    const Applied applied = [&] {
+      const Writing turn(turns_);
+      return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing);
+    }();
+    return nb::make_tuple(applied.rows, applied.first_missing);
+  }
+
+  nb::object points() {
+    std::vector<Point> all;
+    {
+      const Reading turn(turns_);
+      all.reserve(tree_.size());
+      tree_.for_each([&](Point p, std::uint64_t copies) { all.insert(all.end(), copies, p); });
+    }
+    return array_of(all);
+  }
+
+  nb::object chain(int side) {
+    if (side != UPPER && side != LOWER) throw nb::value_error("side must be 0 (upper) or 1 (lower)");
+    std::vector<Point> chain;
+    {
+      const Reading turn(turns_);
+      chain = tree_.chain(static_cast<Side>(side));
+    }
+    return array_of(chain);
+  }
+
+  nb::object vertices() {
+    std::vector<Point> vertices;
+    {
+      const Reading turn(turns_);
+      vertices = tree_.chain(LOWER);
+      const std::vector<Point> upper = tree_.chain(UPPER);
+      if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
+    }
+    return array_of(vertices);
+  }
+
+  nb::object locate(const Rows& rows) {
+    const std::size_t count = rows.shape(0);
+    const Output<std::int8_t> output(count);
+    flatten_for(count);
+    {
+      const Reading turn(turns_);
+      if (chains_.fresh(tree_)) {
+        chains_.locate(tree_, points_of(rows), count, output.data);
+      } else {
+        for (std::size_t i = 0; i < count; ++i)
+          output.data[i] = static_cast<std::int8_t>(dynhull::locate(tree_.nodes(), points_of(rows)[i]).where);
+      }
+    }
+    return output.array({count});
+  }
+
+  nb::object support(const Rows& directions) {
+    const std::size_t count = directions.shape(0);
+    const Output<double> output(2 * count);
+    {
+      const Reading turn(turns_);
+      auto* rows = reinterpret_cast<Point*>(output.data);
+      if (tree_.distinct() > 0)
+        for (std::size_t i = 0; i < count; ++i) rows[i] = dynhull::support(tree_.nodes(), points_of(directions)[i]);
+      else
+        std::fill_n(output.data, 2 * count, std::numeric_limits<double>::quiet_NaN());
+    }
+    return output.array({count, 2});
+  }
+
+  nb::object tangents(const Rows& points) {
+    const std::size_t count = points.shape(0);
+    const Output<double> output(4 * count);
+    {
+      const Reading turn(turns_);
+      constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
+      auto* rows = reinterpret_cast<Edge*>(output.data);
+      for (std::size_t i = 0; i < count; ++i)
+        rows[i] = dynhull::tangents(tree_.nodes(), points_of(points)[i])
+                      .value_or(Edge{{NOTHING, NOTHING}, {NOTHING, NOTHING}});
+    }
+    return output.array({count, 2, 2});
+  }
+
+  nb::object copy() {
+    nb::object other = nb::cast(new Hull, nb::rv_policy::take_ownership);
+    Hull& hull = *nb::inst_ptr<Hull>(other);
+    const Reading turn(turns_);
+    hull.tree_ = HullTree(tree_);
+    return other;
+  }
+
+  void check() {
+    const Reading turn(turns_);
+    Check checked(tree_);
+  }
+
+  nb::tuple memory() {
+    const HullTree& tree = settled();
+    return nb::make_tuple(tree.used_bytes(), tree.reserved_bytes());
+  }
+
+ private:
+  // The tree for a moment under the GIL: to read, or to write.
+  const HullTree& settled() {
+    turns_.await_readable();
+    return tree_;
+  }
+  HullTree& writable() {
+    turns_.await_writable();
+    return tree_;
+  }
+
+  // Refresh the flat chains where that pays for the queries since the hull last changed.
+  void flatten_for(std::size_t queries) {
+    if (settled().version() != asked_version_) queries_ = 0;
+    asked_version_ = tree_.version();
+    queries_ += queries;
+    if (chains_.fresh(tree_) || !chains_.worthwhile(queries_)) return;
+    const Writing turn(turns_);
+    if (!chains_.fresh(tree_)) chains_.refresh(tree_);
+  }
+
+  HullTree tree_;
+  FlatChains chains_;
+  std::uint64_t asked_version_ = 0, queries_ = 0;
+  Turns turns_;
+};
+
+nb::object orientations(const Rows& a, const Rows& b, const Rows& c) {
+  const std::size_t count = a.shape(0);
+  if (b.shape(0) != count || c.shape(0) != count) throw nb::value_error("arrays differ in length");
+  const Output<std::int8_t> output(count);
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < count; ++i)
+      output.data[i] = static_cast<std::int8_t>(orientation(points_of(a)[i], points_of(b)[i], points_of(c)[i]));
+  }
+  return output.array({count});
+}
+
+Point point_of(nb::handle pair) {
+  PyObject* tuple = pair.ptr();
+  if (!PyTuple_CheckExact(tuple) || PyTuple_GET_SIZE(tuple) != 2) throw nb::type_error("a point is a tuple (x, y)");
+  const Point p = {PyFloat_AsDouble(PyTuple_GET_ITEM(tuple, 0)), PyFloat_AsDouble(PyTuple_GET_ITEM(tuple, 1))};
+  if (PyErr_Occurred()) throw nb::python_error();
+  return p;
+}
+
+}  // namespace
+}  // namespace dynhull
+
+NB_MODULE(_kernel, module) {
+  using namespace dynhull;
+  module.doc() = "The hull tree in C++: what dynhull.tree does, with the same results.";
+
+  nb::register_exception_translator([](const std::exception_ptr& error, void*) {
+    try {
+      std::rethrow_exception(error);
+    } catch (const std::logic_error& broken) {
+      PyErr_SetString(PyExc_AssertionError, broken.what());
+    }
+  });
+
+  nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
+      .def(nb::init<>())
+      .def("__init__",
+           [](Hull* hull, nb::object xy) {
+             if (xy.is_none())
+               new (hull) Hull();
+             else
+               new (hull) Hull(nb::cast<Rows>(xy));
+           }, "xy"_a.none())
+      .def("__len__", &Hull::size)
+      .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
+      .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
+      .def("clear", &Hull::clear, "Remove every point.")
+      .def("count", &Hull::count, "x"_a.none(), "y"_a.none(), "How many times the point is there. O(log n).")
+      .def("insert", &Hull::insert, "x"_a.none(), "y"_a.none(), "Add a point. True where the hull changed. O(log² n).")
+      .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
+           "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
+      .def("apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a,
+           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the first "
+           "row that deletes what is not there, or -1.")
+      .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
+      .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
+      .def("chain", &Hull::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
+      .def("locate", &Hull::locate, "xy"_a, "+1 inside, 0 on the boundary, -1 outside, a row each. O(log n) a row.")
+      .def("support", &Hull::support, "directions"_a,
+           "The vertex farthest in each direction; of two the lexicographically smaller. O(log n) a row.")
+      .def("tangents", &Hull::tangents, "xy"_a,
+           "The left and the right tangent point seen from each row, NaN where it is not outside. O(log n) a row.")
+      .def("copy", &Hull::copy, "An independent tree of the same points. O(n).")
+      .def("check", &Hull::check, "Raise AssertionError where an invariant is broken. O(n log n).")
+      .def_prop_ro("memory", &Hull::memory, "Bytes used and bytes reserved by the tree.");
+
+  module.def("orientation",
+             [](nb::handle a, nb::handle b, nb::handle c) {
+               return orientation(point_of(a), point_of(b), point_of(c));
+             }, "a"_a, "b"_a, "c"_a, "+1 where three points turn left, -1 right, 0 on one line.");
+  module.def("direction_sign",
+             [](nb::handle d, nb::handle a, nb::handle b) {
+               return direction_sign(point_of(d), point_of(a), point_of(b));
+             }, "d"_a, "a"_a, "b"_a, "+1 where b lies further than a in direction d, -1 less far, 0 neither.");
+  module.def("crossing",
+             [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
+               return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
+             }, "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
+  module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");
+
+  module.def("_before_fork", &Turns::before_fork);
+  module.def("_after_fork_in_parent", &Turns::after_fork_in_parent);
+  module.def("_after_fork_in_child", &Turns::after_fork_in_child);
+  const nb::module_ os = nb::module_::import_("os");
+  if (nb::hasattr(os, "register_at_fork"))
+    os.attr("register_at_fork")("before"_a = module.attr("_before_fork"),
+                                "after_in_parent"_a = module.attr("_after_fork_in_parent"),
+                                "after_in_child"_a = module.attr("_after_fork_in_child"));
+}

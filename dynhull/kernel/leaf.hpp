@@ -1,0 +1,167 @@
+// A leaf: a few points in order, and for each side the set of those that are on the chain of the leaf's own hull.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+
+#include "predicates.hpp"
+
+#ifndef DYNHULL_LEAF
+#define DYNHULL_LEAF 62  // entries: 1,024 bytes
+#endif
+
+namespace dynhull {
+
+constexpr unsigned LEAF = DYNHULL_LEAF;
+static_assert(4 <= LEAF && LEAF <= 64);
+constexpr unsigned FILL = LEAF * 27 / 32;                  // entries of a leaf built in bulk
+constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);     // a leaf with fewer entries is merged with its neighbour
+constexpr unsigned MERGE_STEP = 4;                         // a try at every fourth size: its neighbour may be full
+constexpr std::uint32_t NONE = ~std::uint32_t{0};
+
+using Mask = std::uint64_t;
+inline Mask bit(unsigned i) { return Mask{1} << i; }
+inline Mask below(unsigned i) { return i < 64 ? bit(i) - 1 : ~Mask{0}; }
+inline unsigned lowest(Mask mask) { return static_cast<unsigned>(std::countr_zero(mask)); }
+inline unsigned highest(Mask mask) { return 63 - static_cast<unsigned>(std::countl_zero(mask)); }
+
+inline void prefetch(const void* address) {
+#if defined(__GNUC__)
+  __builtin_prefetch(address);
+#else
+  (void)address;
+#endif
+}
+
+struct alignas(8) Leaf {
+  std::uint32_t parent;
+  std::uint32_t size;
+  Mask chain[2];
+  Mask repeated;  // points that are there more than once: the tree knows how often
+  double x[LEAF], y[LEAF];
+
+  Point operator[](unsigned i) const { return {x[i], y[i]}; }
+  Point first() const { return (*this)[0]; }
+
+  void fetch() const {
+    for (unsigned i = 0; i < sizeof(Leaf); i += 64) prefetch(reinterpret_cast<const char*>(this) + i);
+  }
+
+  // The first entry that is not less than p. A binary search without branches.
+  unsigned find(Point p) const {
+    unsigned from = 0;
+    for (unsigned rest = size; rest > 0;) {
+      const unsigned half = (rest + 1) / 2;
+      from += half & -static_cast<unsigned>((*this)[from + half - 1] < p);
+      rest -= half;
+    }
+    return from;
+  }
+  bool holds(unsigned i, Point p) const { return i < size && (*this)[i] == p; }
+
+  void assign(const Point* points, unsigned count) {
+    size = count;
+    repeated = 0;
+    for (unsigned i = 0; i < count; ++i) {
+      x[i] = points[i].x;
+      y[i] = points[i].y;
+    }
+    for (Side side : SIDES) chain[side] = scan(side, 0, count - 1);
+  }
+
+  // Add p as entry i. Returns the sides on whose chain it is, as bits.
+  unsigned add(unsigned i, Point p) {
+    std::copy_backward(x + i, x + size, x + size + 1);
+    std::copy_backward(y + i, y + size, y + size + 1);
+    x[i] = p.x;
+    y[i] = p.y;
+    ++size;
+    repeated = opened(repeated, i);
+    unsigned sides = 0;
+    for (Side side : SIDES) {
+      chain[side] = opened(chain[side], i);
+      if (cover(side, i)) sides |= 1u << side;
+    }
+    return sides;
+  }
+
+  // Remove entry i. Returns the sides on whose chain it was, as bits.
+  unsigned remove(unsigned i) {
+    unsigned sides = 0;
+    for (Side side : SIDES)
+      if (chain[side] & bit(i)) sides |= 1u << side;
+    std::copy(x + i + 1, x + size, x + i);
+    std::copy(y + i + 1, y + size, y + i);
+    --size;
+    repeated = closed(repeated, i);
+    for (Side side : SIDES) {
+      chain[side] = closed(chain[side], i);
+      if (sides & (1u << side) && size > 0) {
+        const Mask before = chain[side] & below(i), after = chain[side] & ~below(i);
+        const unsigned from = before ? highest(before) : 0, to = after ? lowest(after) : size - 1;
+        chain[side] |= scan(side, from, to);
+      }
+    }
+    return sides;
+  }
+
+  // The strict chain of the entries from..to, as a mask. The scan keeps to entries outside the chord: all vertices are.
+  Mask scan(Side side, unsigned from, unsigned to) const {
+    Mask mask = bit(from) | bit(to);
+    const Point a = (*this)[from], b = (*this)[to];
+    for (unsigned i = from + 1; i < to; ++i) {
+      const Point p = (*this)[i];
+      if (turned(side, orientation(a, b, p)) <= 0) continue;
+      Mask kept = mask & below(i);
+      unsigned top = highest(kept);
+      while (top > from) {
+        const unsigned under = highest(kept & below(top));
+        if (turned(side, orientation((*this)[under], (*this)[top], p)) < 0) break;
+        kept &= ~bit(top);
+        top = under;
+      }
+      mask = kept | bit(i) | bit(to);
+    }
+    return settled(side, mask, to);
+  }
+
+ private:
+  static Mask opened(Mask mask, unsigned i) { return (mask & below(i)) | (mask & ~below(i)) << 1; }
+  static Mask closed(Mask mask, unsigned i) { return (mask & below(i)) | ((mask >> 1) & ~below(i)); }
+
+  // Drop what the last point of a scanned chain covers.
+  Mask settled(Side side, Mask mask, unsigned to) const {
+    Mask kept = mask & below(to);
+    while (std::popcount(kept) > 1) {
+      const unsigned top = highest(kept), under = highest(kept & below(top));
+      if (turned(side, orientation((*this)[under], (*this)[top], (*this)[to])) < 0) break;
+      kept &= ~bit(top);
+    }
+    return kept | bit(to);
+  }
+
+  // Put entry i on the chain where it lies outside, and take off what it covers.
+  bool cover(Side side, unsigned i) {
+    const Point p = (*this)[i];
+    Mask before = chain[side] & below(i), after = chain[side] & ~below(i + 1);
+    if (before && after && turned(side, orientation((*this)[highest(before)], (*this)[lowest(after)], p)) <= 0)
+      return false;
+    while (std::popcount(after) > 1) {
+      const unsigned next = lowest(after), beyond = lowest(after & (after - 1));
+      if (turned(side, orientation(p, (*this)[next], (*this)[beyond])) < 0) break;
+      after &= after - 1;
+    }
+    while (std::popcount(before) > 1) {
+      const unsigned last = highest(before), under = highest(before & below(last));
+      if (turned(side, orientation((*this)[under], (*this)[last], p)) < 0) break;
+      before &= ~bit(last);
+    }
+    chain[side] = before | bit(i) | after;
+    return true;
+  }
+};
+
+static_assert(LEAF != 62 || sizeof(Leaf) == 1024);
+
+}  // namespace dynhull

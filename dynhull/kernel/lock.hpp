@@ -1,0 +1,125 @@
+// Many readers or one writer of a hull, among Python threads.
+//
+// Everything here happens under the GIL, which is what guards the counters: single updates run under it from end to
+// end and only look, and a batch notes what it does before it lets go of it. Waiting threads let go of it too.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+
+namespace dynhull {
+
+class Turns {
+ public:
+  // Wait until nobody writes, or until nobody reads or writes.
+  void await_readable() { await([this] { return !writing_; }); }
+  void await_writable() {
+    if (writing_ || readers_ > 0) await([this] { return !writing_ && readers_ == 0; });
+  }
+
+  // Before a fork, wait until no batch runs in any hull and let none begin; the child's hulls are whole.
+  static void before_fork() {
+    wait([] { return running_ == 0; });
+    forking_ = true;
+  }
+  static void after_fork_in_parent() {
+    forking_ = false;
+    wake();
+  }
+  static void after_fork_in_child() {
+    signal_ = new Signal;  // some thread of the parent may hold the old one
+    waiting_ = 0;
+    forking_ = false;
+  }
+
+ private:
+  friend class Reading;
+  friend class Writing;
+
+  struct Signal {
+    std::mutex mutex;
+    std::condition_variable changed;
+  };
+
+  template <class Holds>
+  void await(Holds holds) {
+    wait([&] { return !forking_ && holds(); });
+  }
+
+  // The mutex is taken before the GIL is let go of, so that no signal is missed, and never held while taking the GIL.
+  template <class Holds>
+  static void wait(Holds holds) {
+    while (!holds()) {
+      ++waiting_;
+      {
+        std::unique_lock lock(signal_->mutex);
+        nanobind::gil_scoped_release release;
+        signal_->changed.wait(lock);
+        lock.unlock();
+      }
+      --waiting_;
+    }
+  }
+
+  static void wake() {
+    if (waiting_ == 0) return;
+    const std::lock_guard lock(signal_->mutex);
+    signal_->changed.notify_all();
+  }
+
+  bool writing_ = false;
+  int readers_ = 0;
+
+  static inline Signal* signal_ = new Signal;
+  static inline int waiting_ = 0, running_ = 0;
+  static inline bool forking_ = false;
+};
+
+// A batch that reads, with the GIL let go of.
+class Reading {
+ public:
+  explicit Reading(Turns& turns) : turns_(turns) {
+    turns.await([&] { return !turns.writing_; });
+    ++turns.readers_;
+    ++Turns::running_;
+    release_.emplace();
+  }
+  ~Reading() {
+    release_.reset();
+    --turns_.readers_;
+    --Turns::running_;
+    Turns::wake();
+  }
+  Reading(const Reading&) = delete;
+
+ private:
+  Turns& turns_;
+  std::optional<nanobind::gil_scoped_release> release_;
+};
+
+// A batch that writes, with the GIL let go of.
+class Writing {
+ public:
+  explicit Writing(Turns& turns) : turns_(turns) {
+    turns.await([&] { return !turns.writing_ && turns.readers_ == 0; });
+    turns.writing_ = true;
+    ++Turns::running_;
+    release_.emplace();
+  }
+  ~Writing() {
+    release_.reset();
+    turns_.writing_ = false;
+    --Turns::running_;
+    Turns::wake();
+  }
+  Writing(const Writing&) = delete;
+
+ private:
+  Turns& turns_;
+  std::optional<nanobind::gil_scoped_release> release_;
+};
+
+}  // namespace dynhull

@@ -1,0 +1,115 @@
+// The parts of a tree: leaves, inner nodes, and their links, by number in growing arrays.
+#pragma once
+
+#include "leaf.hpp"
+#include "store.hpp"
+
+namespace dynhull {
+
+// A subtree: the number of a node, or of a leaf with the highest bit set; NONE for no points.
+using Ref = std::uint32_t;
+constexpr Ref LEAF_BIT = Ref{1} << 31;
+inline bool is_leaf(Ref tree) { return tree >= LEAF_BIT; }
+inline Ref leaf_ref(std::uint32_t leaf) { return leaf | LEAF_BIT; }
+inline std::uint32_t leaf_number(Ref tree) { return tree & ~LEAF_BIT; }
+
+// What a descent reads: left < separator <= right. Two nodes a cache line.
+struct Node {
+  Ref child[2];
+  Point separator;
+  std::uint32_t parent;
+  std::uint32_t height;
+};
+static_assert(sizeof(Node) == 32);
+
+// What a climb reads: for each side the bridge, the common tangent of the children's chains.
+struct Bridges {
+  Edge side[2];
+};
+
+class Nodes {
+ public:
+  Leaf& leaf(Ref tree) { return leaves_[leaf_number(tree)]; }
+  const Leaf& leaf(Ref tree) const { return leaves_[leaf_number(tree)]; }
+  Node& node(Ref tree) { return nodes_[tree]; }
+  const Node& node(Ref tree) const { return nodes_[tree]; }
+  Edge& bridge(Ref tree, Side side) { return bridges_[tree].side[side]; }
+  const Edge& bridge(Ref tree, Side side) const { return bridges_[tree].side[side]; }
+
+  unsigned height(Ref tree) const { return is_leaf(tree) ? 0 : node(tree).height; }
+  Ref parent(Ref tree) const { return is_leaf(tree) ? leaf(tree).parent : node(tree).parent; }
+  void set_parent(Ref tree, Ref parent) { (is_leaf(tree) ? leaf(tree).parent : node(tree).parent) = parent; }
+
+  // The leaf where p belongs.
+  Ref descend(Ref tree, Point p) const {
+    while (!is_leaf(tree)) tree = node(tree).child[p >= node(tree).separator];
+    return tree;
+  }
+  Ref first_leaf(Ref tree) const {
+    while (!is_leaf(tree)) tree = node(tree).child[0];
+    return tree;
+  }
+  Point first_point(Ref tree) const { return leaf(first_leaf(tree)).first(); }
+
+  // Which child of its parent a subtree is.
+  int rank(Ref parent, Ref tree) const { return node(parent).child[1] == tree; }
+
+  void link(Ref parent, int rank, Ref tree) {
+    node(parent).child[rank] = tree;
+    set_parent(tree, parent);
+  }
+  // Put a subtree, or NONE, in another's place below `parent`, or at the root.
+  void replace(Ref parent, Ref old, Ref tree) {
+    if (parent != NONE) {
+      link(parent, rank(parent, old), tree);
+    } else {
+      root = tree;
+      if (tree != NONE) set_parent(tree, NONE);
+    }
+  }
+
+  // Room for so many more leaves and nodes; the rest of this class never throws.
+  void reserve(std::size_t extra) {
+    leaves_.reserve(extra);
+    nodes_.reserve(extra);
+    bridges_.reserve(extra);
+  }
+  Ref take_leaf() {
+    const Ref tree = leaf_ref(leaves_.take());
+    leaf(tree).parent = NONE;
+    return tree;
+  }
+  Ref take_node() {
+    const Ref tree = nodes_.take();
+    bridges_.take();
+    node(tree).parent = NONE;
+    return tree;
+  }
+  void give_back(Ref tree) {
+    if (is_leaf(tree)) {
+      leaf(tree).size = 0;
+      leaves_.give_back(leaf_number(tree));
+    } else {
+      nodes_.give_back(tree);
+      bridges_.give_back(tree);
+    }
+  }
+
+  std::size_t leaf_count() const { return leaves_.used(); }
+  std::size_t node_count() const { return nodes_.used(); }
+  std::size_t used_bytes() const {
+    return leaves_.used() * sizeof(Leaf) + nodes_.used() * (sizeof(Node) + sizeof(Bridges));
+  }
+  std::size_t reserved_bytes() const {
+    return leaves_.reserved_bytes() + nodes_.reserved_bytes() + bridges_.reserved_bytes();
+  }
+
+  Ref root = NONE;
+
+ private:
+  Store<Leaf> leaves_;
+  Store<Node> nodes_;
+  Store<Bridges> bridges_;
+};
+
+}  // namespace dynhull

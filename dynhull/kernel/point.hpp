@@ -1,0 +1,28 @@
+// Points and their order.
+#pragma once
+
+#include <cstdint>
+
+namespace dynhull {
+
+struct Point {
+  double x, y;
+};
+
+// The lexicographic order, without branches: & and | on purpose.
+inline bool operator==(Point p, Point q) { return (p.x == q.x) & (p.y == q.y); }
+inline bool operator<(Point p, Point q) { return (p.x < q.x) | ((p.x == q.x) & (p.y < q.y)); }
+inline bool operator>(Point p, Point q) { return q < p; }
+inline bool operator<=(Point p, Point q) { return (p.x < q.x) | ((p.x == q.x) & (p.y <= q.y)); }
+inline bool operator>=(Point p, Point q) { return q <= p; }
+
+struct Edge {
+  Point a, b;
+};
+
+// Both sides share all code: turned(side, orientation(a, b, p)) > 0 says that p lies outside the edge from a to b.
+enum Side : int { UPPER = 0, LOWER = 1 };
+constexpr Side SIDES[] = {UPPER, LOWER};
+inline int turned(Side side, int sign) { return side == UPPER ? sign : -sign; }
+
+}  // namespace dynhull

@@ -1,0 +1,122 @@
+// Which way three points turn, and its relatives: signs that are right for every finite double.
+//
+// Each first evaluates its determinant in floating point together with a bound on the rounding error (Shewchuk 1997,
+// stage A, with slack for underflow), and where that cannot tell, exactly. Compile with -ffp-contract=off: the bounds
+// hold for the operations as they are written.
+#pragma once
+
+#include <cmath>
+
+#include "exact.hpp"
+#include "point.hpp"
+
+namespace dynhull {
+
+constexpr double EPSILON = 0x1p-53;
+constexpr double ORIENT_BOUND = (3.0 + 16.0 * EPSILON) * EPSILON;
+// Two more products and a difference than an orientation: eight roundings at most, doubled to be safe.
+constexpr double CROSSING_BOUND = 16.0 * EPSILON;
+// A product that underflows is wrong by up to 2^-1075, whatever its size; far above that, far below everything usual.
+constexpr double UNDERFLOW_SLACK = 1e-300;
+// The same for a product that another difference of up to 2^1024 multiplies.
+constexpr double UNDERFLOW_FACTOR = 1e-280;
+// Above this, the rounding error of a product is a double.
+constexpr double EXACT_ERROR = 1e-250;
+
+inline int sign_of(double value) { return (value > 0) - (value < 0); }
+
+// Whether the rounded difference is a - b itself.
+inline bool exact_difference(double a, double b, double difference) {
+  const double b_part = a - difference;
+  const double a_part = difference + b_part;
+  return (a - a_part) + (b_part - b) == 0;
+}
+
+[[gnu::noinline, gnu::cold]] inline int orientation_exact(Point a, Point b, Point c) {
+  const double ux = a.x - c.x, uy = a.y - c.y, vx = b.x - c.x, vy = b.y - c.y;
+  if (exact_difference(a.x, c.x, ux) && exact_difference(a.y, c.y, uy) && exact_difference(b.x, c.x, vx) &&
+      exact_difference(b.y, c.y, vy)) {
+    const double left = ux * vy, right = uy * vx;  // rounding never turns an order round
+    if (left != right && std::isfinite(left) && std::isfinite(right)) return sign_of(left - right);
+    if (left == right && std::abs(left) > EXACT_ERROR && std::isfinite(left))
+      return sign_of(std::fma(ux, vy, -left) - std::fma(uy, vx, -right));
+    if ((ux == 0 || vy == 0) && (uy == 0 || vx == 0)) return 0;
+  }
+  ExactSum<2> sum;
+  sum.add(+1, {a.x, b.y});
+  sum.add(-1, {a.x, c.y});
+  sum.add(-1, {c.x, b.y});
+  sum.add(-1, {a.y, b.x});
+  sum.add(+1, {a.y, c.x});
+  sum.add(+1, {c.y, b.x});
+  return sum.sign();
+}
+
+// The sign of the turn, or 0 where floating point cannot tell.
+inline int orientation_filter(Point a, Point b, Point c) {
+  const double left = (a.x - c.x) * (b.y - c.y);
+  const double right = (a.y - c.y) * (b.x - c.x);
+  const double det = left - right;
+  // Overflow makes the bound infinite or the determinant NaN: both comparisons fail.
+  const double bound = ORIENT_BOUND * (std::abs(left) + std::abs(right)) + UNDERFLOW_SLACK;
+  return (det > bound) - (-det > bound);
+}
+
+// +1 where a, b, c turn left, -1 where they turn right, 0 where they lie on one line.
+inline int orientation(Point a, Point b, Point c) {
+  const int sign = orientation_filter(a, b, c);
+  return sign != 0 ? sign : orientation_exact(a, b, c);
+}
+
+// +1 where b lies further than a in direction d, -1 where it lies less far, 0 where neither.
+inline int direction_sign(Point d, Point a, Point b) {
+  const double along = d.x * (b.x - a.x);
+  const double up = d.y * (b.y - a.y);
+  const double dot = along + up;
+  const double bound = ORIENT_BOUND * (std::abs(along) + std::abs(up)) + UNDERFLOW_SLACK;
+  if (dot > bound) return 1;
+  if (-dot > bound) return -1;
+  ExactSum<2> sum;
+  sum.add(+1, {d.x, b.x});
+  sum.add(-1, {d.x, a.x});
+  sum.add(+1, {d.y, b.y});
+  sum.add(-1, {d.y, a.y});
+  return sum.sign();
+}
+
+// det(c, d, z) (b.x - a.x) - det(a, b, z) (d.x - c.x), of degree three.
+[[gnu::noinline, gnu::cold]] inline int crossing_exact(Point a, Point b, Point c, Point d, Point z) {
+  ExactSum<3> sum;
+  const auto add = [&](int sign, Point p, Point q, double factor) {  // sign * factor * det(p, q, z)
+    sum.add(+sign, {p.x, q.y, factor});
+    sum.add(-sign, {p.x, z.y, factor});
+    sum.add(-sign, {z.x, q.y, factor});
+    sum.add(-sign, {p.y, q.x, factor});
+    sum.add(+sign, {p.y, z.x, factor});
+    sum.add(+sign, {z.y, q.x, factor});
+  };
+  add(+1, c, d, b.x);
+  add(-1, c, d, a.x);
+  add(-1, a, b, d.x);
+  add(+1, a, b, c.x);
+  return sum.sign();
+}
+
+// The sign of height(ab) - height(cd) at the vertical line through z, for a < b < z <= c < d; a vertical edge is as
+// steep as the shear makes it.
+inline int crossing(Point a, Point b, Point c, Point d, Point z) {
+  if (a.x == z.x) return orientation(c, d, z);
+  if (d.x == z.x) return -orientation(a, b, z);
+  const double width_ab = b.x - a.x, width_cd = d.x - c.x;
+  const double left_ab = (a.x - z.x) * (b.y - z.y), right_ab = (a.y - z.y) * (b.x - z.x);
+  const double left_cd = (c.x - z.x) * (d.y - z.y), right_cd = (c.y - z.y) * (d.x - z.x);
+  const double value = (left_cd - right_cd) * width_ab - (left_ab - right_ab) * width_cd;
+  const double size_ab = std::abs(left_ab) + std::abs(right_ab) + UNDERFLOW_FACTOR;
+  const double size_cd = std::abs(left_cd) + std::abs(right_cd) + UNDERFLOW_FACTOR;
+  const double bound = CROSSING_BOUND * (size_cd * width_ab + size_ab * width_cd) + UNDERFLOW_SLACK;
+  if (value > bound) return 1;
+  if (-value > bound) return -1;
+  return crossing_exact(a, b, c, d, z);
+}
+
+}  // namespace dynhull

@@ -1,0 +1,151 @@
+// Searches along chains: a cursor, the bridge of two subtrees, tangents from a point.
+#pragma once
+
+#include <limits>
+
+#include "nodes.hpp"
+
+namespace dynhull {
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+constexpr Point LOWEST = {-INFINITE, -INFINITE}, HIGHEST = {INFINITE, INFINITE};
+
+// A binary search along the chain of a subtree, or its part between two of its vertices. At every step (a, b) is an
+// edge of the chain, and the caller says on which side of it the sought vertex lies; once one vertex is left, it is a.
+class Cursor {
+ public:
+  Point a, b;
+  bool single = false;
+
+  Cursor(const Nodes& nodes, Ref tree, Side side, Point lowest = LOWEST, Point highest = HIGHEST)
+      : nodes_(nodes), side_(side), tree_(tree), lowest_(lowest), highest_(highest) {
+    descend();
+  }
+
+  void go_left() {  // the sought vertex is a, or left of it
+    if (is_leaf(tree_)) {
+      last_ = middle_;
+      halve();
+    } else {
+      highest_ = a;
+      tree_ = nodes_.node(tree_).child[0];
+      descend();
+    }
+  }
+  void go_right() {  // the sought vertex is b, or right of it
+    if (is_leaf(tree_)) {
+      first_ = middle_ + 1;
+      halve();
+    } else {
+      lowest_ = b;
+      tree_ = nodes_.node(tree_).child[1];
+      descend();
+    }
+  }
+
+ private:
+  // Pass the bridges that lie under the chain: those that reach beyond its ends.
+  void descend() {
+    while (!is_leaf(tree_)) {
+      const Edge& edge = nodes_.bridge(tree_, side_);
+      if (edge.b > highest_) {
+        tree_ = nodes_.node(tree_).child[0];
+      } else if (edge.a < lowest_) {
+        tree_ = nodes_.node(tree_).child[1];
+      } else {
+        a = edge.a;
+        b = edge.b;
+        return;
+      }
+    }
+    const Leaf& leaf = nodes_.leaf(tree_);
+    Mask mask = leaf.chain[side_];
+    if (lowest_ > leaf.first()) mask &= ~below(leaf.find(lowest_));
+    if (highest_ < leaf[leaf.size - 1]) mask &= below(leaf.find(highest_) + 1);
+    first_ = last_ = 0;
+    for (; mask; mask &= mask - 1) slots_[last_++] = static_cast<std::uint8_t>(lowest(mask));
+    --last_;
+    halve();
+  }
+  void halve() {
+    const Leaf& leaf = nodes_.leaf(tree_);
+    middle_ = (first_ + last_) / 2;
+    single = middle_ == last_;
+    a = leaf[slots_[middle_]];
+    b = single ? a : leaf[slots_[middle_ + 1]];
+  }
+
+  const Nodes& nodes_;
+  Side side_;
+  Ref tree_;
+  Point lowest_, highest_;
+  unsigned first_, last_, middle_;
+  std::uint8_t slots_[LEAF];
+};
+
+// Where the tangent from p, right of the chain and outside of it, touches the chain; the farther of two.
+inline Point tangent_to_left(Cursor cursor, Point p, Side side) {
+  while (!cursor.single) {
+    if (turned(side, orientation(cursor.a, cursor.b, p)) >= 0)
+      cursor.go_left();
+    else
+      cursor.go_right();
+  }
+  return cursor.a;
+}
+
+// Where the tangent from p, left of the chain and outside of it, touches the chain; the farther of two.
+inline Point tangent_to_right(Cursor cursor, Point p, Side side) {
+  while (!cursor.single) {
+    if (turned(side, orientation(cursor.a, cursor.b, p)) >= 0)
+      cursor.go_right();
+    else
+      cursor.go_left();
+  }
+  return cursor.a;
+}
+
+// The edge that joins two chains, all of the left one < separator <= all of the right one. O(log n) orientations.
+//
+// With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
+// lies outside or on the line through a and b; likewise on the right. Where both edges have each other's ends inside,
+// their lines cross between the chains, and the side of the separator on which they do decides.
+inline Edge find_bridge(Cursor left, Cursor right, Side side, Point separator) {
+  while (true) {
+    const Point a = left.a, b = left.b, c = right.a, d = right.b;
+    if (left.single && right.single) return {a, c};
+    const bool start_before =
+        !left.single && (turned(side, orientation(a, b, c)) >= 0 ||
+                         (!right.single && turned(side, orientation(a, b, d)) >= 0));
+    const bool end_after =
+        !right.single && (turned(side, orientation(c, d, a)) >= 0 ||
+                          (!left.single && turned(side, orientation(c, d, b)) >= 0));
+    if (start_before || end_after) {
+      if (start_before) left.go_left();
+      if (end_after) right.go_right();
+    } else if (right.single) {
+      left.go_right();
+    } else if (left.single) {
+      right.go_left();
+    } else if (turned(side, crossing(a, b, c, d, separator)) >= 0) {
+      left.go_right();
+    } else {
+      right.go_left();
+    }
+  }
+}
+
+// Whether p, a point of the subtree, is on its chain. O(log n).
+inline bool on_chain(const Nodes& nodes, Ref tree, Side side, Point p) {
+  while (!is_leaf(tree)) {
+    const Edge& edge = nodes.bridge(tree, side);
+    if (p == edge.a || p == edge.b) return true;
+    if (p > edge.a && p < edge.b) return false;
+    tree = nodes.node(tree).child[p > edge.a];
+  }
+  const Leaf& leaf = nodes.leaf(tree);
+  const unsigned i = leaf.find(p);
+  return leaf.holds(i, p) && (leaf.chain[side] & bit(i));
+}
+
+}  // namespace dynhull

@@ -1,0 +1,238 @@
+// HullTree: a multiset of points and its convex hull, as in dynhull/tree.py, which explains the algorithm.
+#pragma once
+
+#include "batch.hpp"
+
+namespace dynhull {
+
+struct Applied {
+  std::int64_t rows;
+  std::int64_t first_missing;
+};
+
+// Coordinates are finite and no zero is negative: callers see to it. Where an update throws (std::bad_alloc), nothing
+// has changed.
+class HullTree {
+ public:
+  std::uint64_t changes = 0;
+
+  HullTree() = default;
+  HullTree(const Point* points, std::size_t count) {
+    std::vector<Bare> sorted(count), scratch(count);
+    for (std::size_t i = 0; i < count; ++i) sorted[i] = {points[i]};
+    sort_by_point(sorted.data(), scratch.data(), count);
+    std::size_t kept = 0;
+    for (std::size_t i = 0, next; i < count; i = next) {
+      for (next = i + 1; next < count && sorted[next].p == sorted[i].p; ++next) {
+      }
+      if (next - i > 1) copies_.emplace(sorted[i].p, next - i);
+      sorted[kept++] = sorted[i];
+    }
+    static_assert(sizeof(Bare) == sizeof(Point));
+    nodes_ = built(reinterpret_cast<const Point*>(sorted.data()), kept);
+    size_ = count;
+    distinct_ = kept;
+    mark_repeated();
+  }
+
+  std::size_t size() const { return size_; }
+  std::size_t distinct() const { return distinct_; }
+  std::uint64_t version() const { return version_; }  // grows whenever the hull changes
+  const Nodes& nodes() const { return nodes_; }
+  const Copies& copies() const { return copies_; }
+
+  std::uint64_t count(Point p) const { return count_of(nodes_, copies_, find(nodes_, p)); }
+
+  void clear() {
+    if (nodes_.root == NONE) return;
+    Nodes empty;
+    nodes_ = std::move(empty);
+    copies_.clear();
+    size_ = distinct_ = 0;
+    changed();
+  }
+
+  // True where the hull changed.
+  bool insert(Point p) {
+    nodes_.reserve(1);
+    const Place place = find(nodes_, p);
+    if (place.there) {
+      ++copies_.try_emplace(p, 1).first->second;
+      nodes_.leaf(place.leaf).repeated |= bit(place.entry);
+      ++size_;
+      return false;
+    }
+    ++size_;
+    ++distinct_;
+    return insert_point(nodes_, place, p) != 0 && changed();
+  }
+
+  enum class Removal { MISSING, HULL_STANDS, HULL_CHANGED };
+
+  Removal remove(Point p) {
+    const Place place = find(nodes_, p);
+    if (!place.there) return Removal::MISSING;
+    --size_;
+    Leaf& leaf = nodes_.leaf(place.leaf);
+    if (leaf.repeated & bit(place.entry)) {
+      recount({p, count_of(nodes_, copies_, place) - 1});
+      return Removal::HULL_STANDS;
+    }
+    --distinct_;
+    if (remove_point(nodes_, place, p) == 0) return Removal::HULL_STANDS;
+    changed();
+    return Removal::HULL_CHANGED;
+  }
+
+  // Insert the rows with +1 and delete those with -1, as a set. With a row that deletes what is not there nothing is
+  // applied, unless missing points are to be ignored.
+  Applied apply(const std::int8_t* ops, const Point* points, std::size_t count, bool ignore_missing) {
+    const Plan plan(nodes_, copies_, ops, points, count);
+    if (plan.first_missing >= 0 && !ignore_missing) return {0, plan.first_missing};
+    make_room_for_copies(plan);
+    try {
+      if (plan.inserts > 0 && plan.inserts >= distinct_)
+        rebuild(plan);
+      else if (!plan.changes.empty() && Commit(nodes_, plan).apply())
+        changed();
+    } catch (...) {
+      drop_room_for_copies();
+      throw;
+    }
+    size_ += plan.growth;
+    distinct_ += 2 * plan.inserts - plan.changes.size();
+    for (const Recount& entry : plan.recounts) recount(entry);
+    return {plan.rows_applied, plan.first_missing};
+  }
+
+  // Every distinct point in order, with its number of copies.
+  template <class Visit>
+  void for_each(Visit visit) const {
+    visit_points(nodes_.root, visit);
+  }
+
+  // The vertices of one side, left to right. O(h log n).
+  std::vector<Point> chain(Side side) const {
+    std::vector<Point> points;
+    collect(nodes_.root, side, LOWEST, HIGHEST, points);
+    return points;
+  }
+
+  std::size_t used_bytes() const { return nodes_.used_bytes(); }
+  std::size_t reserved_bytes() const { return nodes_.reserved_bytes(); }
+
+ private:
+  struct Bare {
+    Point p;
+  };
+
+  bool changed() {
+    ++changes;
+    ++version_;
+    return true;
+  }
+
+  static Nodes built(const Point* points, std::size_t count) {
+    Nodes nodes;
+    if (count == 0) return nodes;
+    const std::size_t parts = leaves_for(count);
+    std::vector<Ref> leaves(parts);
+    nodes.reserve(parts);
+    nodes.root = build(nodes, points, count, leaves.data());
+    return nodes;
+  }
+
+  void mark_repeated() {
+    for (const auto& [p, copies] : copies_) {
+      const Place place = find(nodes_, p);
+      if (place.there && copies > 1) nodes_.leaf(place.leaf).repeated |= bit(place.entry);
+    }
+  }
+
+  // A batch as large as the tree: merge it with the points and build anew.
+  void rebuild(const Plan& plan) {
+    std::vector<Point> merged;
+    merged.reserve(distinct_ + plan.inserts);
+    auto next = plan.changes.begin();
+    const auto last = plan.changes.end();
+    for_each([&](Point p, std::uint64_t) {
+      for (; next != last && next->p < p; ++next) merged.push_back(next->p);
+      if (next != last && next->p == p)
+        ++next;  // goes
+      else
+        merged.push_back(p);
+    });
+    for (; next != last; ++next) merged.push_back(next->p);
+    const std::vector<Point> before[] = {chain(UPPER), chain(LOWER)};
+    Nodes fresh = built(merged.data(), merged.size());
+    std::vector<Point> after[2];
+    for (Side side : SIDES) collect(fresh, fresh.root, side, LOWEST, HIGHEST, after[side]);
+    nodes_ = std::move(fresh);
+    mark_repeated();
+    if (before[UPPER] != after[UPPER] || before[LOWER] != after[LOWER]) changed();
+  }
+
+  // So that recount() cannot fail. An entry of one says that it is only room.
+  void make_room_for_copies(const Plan& plan) {
+    try {
+      for (const Recount& entry : plan.recounts)
+        if (entry.copies > 1) copies_.try_emplace(entry.p, 1);
+    } catch (...) {
+      drop_room_for_copies();
+      throw;
+    }
+  }
+  void drop_room_for_copies() {
+    std::erase_if(copies_, [](const auto& entry) { return entry.second == 1; });
+  }
+
+  void recount(const Recount& entry) {
+    if (entry.copies > 1)
+      copies_.find(entry.p)->second = entry.copies;
+    else
+      copies_.erase(entry.p);
+    const Place place = find(nodes_, entry.p);
+    if (!place.there) return;
+    Mask& repeated = nodes_.leaf(place.leaf).repeated;
+    repeated = entry.copies > 1 ? repeated | bit(place.entry) : repeated & ~bit(place.entry);
+  }
+
+  template <class Visit>
+  void visit_points(Ref tree, Visit& visit) const {
+    if (tree == NONE) return;
+    if (!is_leaf(tree)) {
+      for (Ref child : nodes_.node(tree).child) visit_points(child, visit);
+      return;
+    }
+    const Leaf& leaf = nodes_.leaf(tree);
+    for (unsigned i = 0; i < leaf.size; ++i)
+      visit(leaf[i], leaf.repeated & bit(i) ? copies_.find(leaf[i])->second : std::uint64_t{1});
+  }
+
+  void collect(Ref tree, Side side, Point lowest, Point highest, std::vector<Point>& points) const {
+    collect(nodes_, tree, side, lowest, highest, points);
+  }
+  static void collect(const Nodes& nodes, Ref tree, Side side, Point lowest, Point highest,
+                      std::vector<Point>& points) {
+    if (tree == NONE) return;
+    if (!is_leaf(tree)) {
+      const Edge& edge = nodes.bridge(tree, side);
+      const Node& node = nodes.node(tree);
+      if (edge.a >= lowest) collect(nodes, node.child[0], side, lowest, std::min(edge.a, highest), points);
+      if (edge.b <= highest) collect(nodes, node.child[1], side, std::max(edge.b, lowest), highest, points);
+      return;
+    }
+    const Leaf& leaf = nodes.leaf(tree);
+    for (Mask mask = leaf.chain[side]; mask; mask &= mask - 1) {
+      const Point p = leaf[dynhull::lowest(mask)];
+      if (p >= lowest && p <= highest) points.push_back(p);
+    }
+  }
+
+  Nodes nodes_;
+  Copies copies_;
+  std::size_t size_ = 0, distinct_ = 0;
+  std::uint64_t version_ = 0;
+};
+
+}  // namespace dynhull

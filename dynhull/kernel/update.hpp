@@ -1,0 +1,94 @@
+// Updates one by one, on the tree at nodes.root: repair the leaf, then climb while the hull changes.
+#pragma once
+
+#include "shape.hpp"
+
+namespace dynhull {
+
+// Where a point is, or belongs.
+struct Place {
+  Ref leaf;
+  unsigned entry;
+  bool there;
+};
+
+inline Place find(const Nodes& nodes, Point p) {
+  if (nodes.root == NONE) return {NONE, 0, false};
+  const Ref tree = nodes.descend(nodes.root, p);
+  const Leaf& leaf = nodes.leaf(tree);
+  leaf.fetch();
+  const unsigned i = leaf.find(p);
+  return {tree, i, leaf.holds(i, p)};
+}
+
+// Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
+inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side) {
+  for (; v != NONE; v = nodes.node(v).parent) {
+    const Node& node = nodes.node(v);
+    Edge& edge = nodes.bridge(v, side);
+    const bool on_left = p < node.separator;
+    const bool beyond = on_left ? p < edge.a : p > edge.b;
+    const int turn = turned(side, orientation(edge.a, edge.b, p));
+    if (turn > 0 || (turn == 0 && beyond)) {
+      if (on_left)
+        edge = {p, tangent_to_right(Cursor(nodes, node.child[1], side), p, side)};
+      else
+        edge = {tangent_to_left(Cursor(nodes, node.child[0], side), p, side), p};
+    } else if (!beyond) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Repair the bridges from v up for p, gone from the chain below, as far as p was on it. True where to the root.
+inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side) {
+  for (; v != NONE; v = nodes.node(v).parent) {
+    Edge& edge = nodes.bridge(v, side);
+    if (p == edge.a || p == edge.b) {
+      const Node& node = nodes.node(v);
+      edge = bridge_of(nodes, node.child[0], node.child[1], side, node.separator);
+    } else if (p > edge.a && p < edge.b) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Insert a point that is not there. Returns the sides, as bits, on which the hull changed.
+// Needs room for one more leaf and node.
+inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
+  if (place.leaf == NONE) {
+    nodes.root = nodes.take_leaf();
+    nodes.leaf(nodes.root).assign(&p, 1);
+    return 0b11;
+  }
+  if (nodes.leaf(place.leaf).size == LEAF) {
+    split(nodes, place.leaf);
+    place = find(nodes, p);
+  }
+  Leaf& leaf = nodes.leaf(place.leaf);
+  const unsigned on_leaf = leaf.add(place.entry, p);
+  unsigned changed = 0;
+  for (Side side : SIDES)
+    if (on_leaf & (1u << side) && climb_added(nodes, leaf.parent, p, side)) changed |= 1u << side;
+  return changed;
+}
+
+// Remove a point that is there. Returns the sides, as bits, on which the hull changed.
+inline unsigned remove_point(Nodes& nodes, Place place, Point p) {
+  Leaf& leaf = nodes.leaf(place.leaf);
+  const unsigned on_leaf = leaf.remove(place.entry);
+  const bool empty = leaf.size == 0;
+  const Ref above = empty ? drop(nodes, place.leaf) : leaf.parent;
+  unsigned changed = 0;
+  for (Side side : SIDES)
+    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side)) changed |= 1u << side;
+  if (empty)
+    rebalance(nodes, above);
+  else if (leaf.size < LOW && leaf.size % MERGE_STEP == 1)
+    merge(nodes, place.leaf);
+  return changed;
+}
+
+}  // namespace dynhull

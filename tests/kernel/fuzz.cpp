@@ -1,0 +1,282 @@
+// Random lives of a hull under AddressSanitizer and UndefinedBehaviorSanitizer.
+//
+//     fuzz [--seconds S] [seed ...]
+//
+// Without seeds, random ones until the time is up. After every step the tree is checked against its definitions, and
+// its points and `changed` flags against a std::map and a monotone chain. Some allocations fail on purpose: then the
+// hull has to be as it was. Compile with -DDYNHULL_LEAF=4 to split, merge and rotate all the time.
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <random>
+
+#include "../../dynhull/kernel/check.hpp"
+
+namespace {
+
+long allocations_left = -1;  // until one fails; negative: none does
+bool fails() { return allocations_left >= 0 && allocations_left-- == 0; }
+
+}  // namespace
+
+bool dynhull::allocation_fails() { return fails(); }
+
+void* operator new(std::size_t size) {
+  void* memory = fails() ? nullptr : std::malloc(size);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return fails() ? nullptr : std::malloc(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace {
+
+using namespace dynhull;
+
+using Model = std::map<Point, std::uint64_t>;
+
+std::vector<Point> chain_of(const Model& model, Side side) {
+  std::vector<Point> chain;
+  for (const auto& [p, copies] : model) {
+    while (chain.size() > 1 && turned(side, orientation(chain[chain.size() - 2], chain.back(), p)) >= 0) chain.pop_back();
+    chain.push_back(p);
+  }
+  return chain;
+}
+
+class Life {
+ public:
+  explicit Life(std::uint64_t seed) : random_(seed), kind_(below(8)), calm_(below(3) == 0) {}
+
+  void live() {
+    const int steps = 10 + static_cast<int>(below(60));
+    for (int step = 0; step < steps; ++step) {
+      switch (below(calm_ ? 3 : 8)) {
+        case 0: insert(); break;
+        case 1: remove(); break;
+        case 2: remove_vertex(); break;
+        case 3: batch(below(12), below(3)); break;
+        case 4: batch(below(40), below(3)); break;
+        case 5: batch(below(200), below(3)); break;
+        case 6: batch(model_.size() / 2 + below(50), 1); break;
+        default: below(30) == 0 ? clear() : copy(); break;
+      }
+      check();
+    }
+  }
+
+ private:
+  std::uint64_t below(std::uint64_t n) { return n > 0 ? random_() % n : 0; }
+
+  double coordinate() {
+    static const double EXTREME[] = {0.0, 5e-324, -5e-324, 1e-323, 2.2250738585072014e-308, 1e-160, -1e-160,
+                                     1.0, -3.0,   9e15,    1e160,  -1e160,                  1.7e308, -1.7e308};
+    switch (kind_) {
+      case 0: return static_cast<double>(below(4));
+      case 1: return static_cast<double>(below(40)) - 20;
+      case 2: return 0.5 + static_cast<double>(below(9)) * 0x1p-53;
+      case 3: return EXTREME[below(std::size(EXTREME))];
+      case 4: {
+        const std::uint64_t bits = random_();
+        double value;
+        std::memcpy(&value, &bits, sizeof value);
+        return std::isfinite(value) ? value + 0.0 : 1.0;
+      }
+      default: return static_cast<double>(random_()) * 0x1p-64;
+    }
+  }
+
+  Point point() {
+    if (kind_ == 6) {  // near a circle
+      const double angle = static_cast<double>(random_()) * 0x1p-61;
+      return {std::cos(angle), std::sin(angle)};
+    }
+    if (kind_ == 7) {  // a parabola, all of them vertices
+      const double x = static_cast<double>(below(100000)) - 50000;
+      return {x, x * x};
+    }
+    const double x = coordinate();
+    return {x, coordinate()};
+  }
+
+  Point present() {
+    const Point near = point();
+    auto it = model_.lower_bound(near);
+    if (it == model_.end()) it = model_.begin();
+    return it->first;
+  }
+
+  // Run an update, sometimes with too little memory at first.
+  template <class Update>
+  void with_failures(Update update) {
+    if (below(4) == 0) {
+      const std::vector<Point> before[] = {tree_.chain(UPPER), tree_.chain(LOWER)};
+      const std::uint64_t changes = tree_.changes;
+      allocations_left = static_cast<long>(below(12));
+      bool failed = false;
+      try {
+        update();
+      } catch (const std::bad_alloc&) {
+        failed = true;
+      }
+      allocations_left = -1;
+      if (!failed) return;
+      require(tree_.changes == changes && tree_.chain(UPPER) == before[UPPER] && tree_.chain(LOWER) == before[LOWER],
+              "a failed allocation changed the hull");
+      check();
+    }
+    update();
+  }
+
+  void insert() {
+    const Point p = below(4) == 0 && !model_.empty() ? present() : point();
+    with_failures([&] { changed_ = tree_.insert(p); });
+    ++model_[p];
+    expect_change();
+  }
+
+  void remove(Point p) {
+    const bool there = model_.contains(p);
+    const HullTree::Removal removal = tree_.remove(p);
+    require((removal == HullTree::Removal::MISSING) == !there, "a delete found what is not there, or did not find");
+    changed_ = removal == HullTree::Removal::HULL_CHANGED;
+    take(p);
+    expect_change();
+  }
+  void remove() { remove(model_.empty() || below(8) == 0 ? point() : present()); }
+  void remove_vertex() {
+    if (model_.empty()) return;
+    const std::vector<Point> chain = tree_.chain(below(2) == 0 ? UPPER : LOWER);
+    remove(chain[below(chain.size())]);
+  }
+
+  void take(Point p) {
+    const auto it = model_.find(p);
+    if (it != model_.end() && --it->second == 0) model_.erase(it);
+  }
+
+  // `mood`: 0 only deletes, 1 both, 2 only inserts.
+  void batch(std::size_t count, std::uint64_t mood) {
+    std::vector<std::int8_t> ops(count);
+    std::vector<Point> points(count);
+    const bool strip = below(3) == 0 && !model_.empty();
+    auto walk = model_.begin();
+    if (strip) std::advance(walk, static_cast<long>(below(model_.size())));
+    for (std::size_t i = 0; i < count; ++i) {
+      ops[i] = mood == 0 || (mood == 1 && below(2) == 0) ? -1 : 1;
+      if (strip && walk != model_.end()) {
+        points[i] = (walk++)->first;
+        if (ops[i] > 0 && kind_ >= 5) points[i].y += 0x1p-20;
+      } else {
+        points[i] = model_.empty() || (ops[i] > 0 ? below(8) != 0 : below(16) == 0) ? point() : present();
+      }
+    }
+    const bool ignore = below(2) == 0;
+    // The model: what is inserted comes first.
+    Model after = model_;
+    std::int64_t applied = static_cast<std::int64_t>(count), missing = -1;
+    for (std::size_t i = 0; i < count; ++i)
+      if (ops[i] > 0) ++after[points[i]];
+    for (std::size_t i = 0; i < count; ++i) {
+      if (ops[i] > 0) continue;
+      const auto it = after.find(points[i]);
+      if (it != after.end()) {
+        if (--it->second == 0) after.erase(it);
+        continue;
+      }
+      --applied;
+      if (missing < 0) missing = static_cast<std::int64_t>(i);
+    }
+    const std::uint64_t changes = tree_.changes;
+    Applied result{};
+    with_failures([&] { result = tree_.apply(ops.data(), points.data(), count, ignore); });
+    if (missing >= 0 && !ignore)
+      applied = 0;
+    else
+      model_ = std::move(after);
+    require(result.rows == applied && result.first_missing == missing, "a batch miscounted its rows");
+    require(tree_.changes - changes <= 1, "a batch counted as several changes");
+    changed_ = tree_.changes > changes;
+    expect_change();
+  }
+
+  void clear() {
+    changed_ = !model_.empty();
+    tree_.clear();
+    model_.clear();
+    expect_change();
+  }
+
+  void copy() {
+    std::vector<Point> points;
+    for (const auto& [p, copies] : model_) points.insert(points.end(), copies, p);
+    std::shuffle(points.begin(), points.end(), random_);
+    HullTree other(points.data(), points.size());
+    other.changes = tree_.changes;
+    tree_ = std::move(other);
+  }
+
+  void expect_change() {
+    std::vector<Point> now[] = {chain_of(model_, UPPER), chain_of(model_, LOWER)};
+    for (Side side : SIDES) require(tree_.chain(side) == now[side], "the hull is wrong");
+    require(changed_ == (now[UPPER] != chains_[UPPER] || now[LOWER] != chains_[LOWER]), "`changed` is wrong");
+    for (Side side : SIDES) chains_[side] = std::move(now[side]);
+  }
+
+  void check() {
+    const Check checked(tree_);
+    auto expected = model_.begin();
+    tree_.for_each([&](Point p, std::uint64_t copies) {
+      require(expected != model_.end() && expected->first == p && expected->second == copies, "a point or count is off");
+      ++expected;
+    });
+    require(expected == model_.end(), "a point is missing");
+  }
+
+  static void require(bool holds, const char* message) {
+    if (!holds) throw std::logic_error(message);
+  }
+
+  std::mt19937_64 random_;
+  std::uint64_t kind_;
+  bool calm_;
+  bool changed_ = false;
+  HullTree tree_;
+  Model model_;
+  std::vector<Point> chains_[2];
+};
+
+bool survives(std::uint64_t seed) {
+  try {
+    Life(seed).live();
+    return true;
+  } catch (const std::exception& error) {
+    std::printf("seed %llu: %s\n", static_cast<unsigned long long>(seed), error.what());
+    return false;
+  }
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  double seconds = 10;
+  std::vector<std::uint64_t> seeds;
+  for (int i = 1; i < count; ++i) {
+    if (std::strcmp(words[i], "--seconds") == 0 && i + 1 < count)
+      seconds = std::atof(words[++i]);
+    else
+      seeds.push_back(std::strtoull(words[i], nullptr, 10));
+  }
+  for (std::uint64_t seed : seeds)
+    if (!survives(seed)) return 1;
+  if (!seeds.empty()) return 0;
+  std::random_device entropy;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  unsigned lives = 0;
+  for (; std::chrono::steady_clock::now() < end; ++lives)
+    if (!survives((std::uint64_t{entropy()} << 32) | entropy())) return 1;
+  std::printf("%u lives, leaves of %u\n", lives, LEAF);
+  return 0;
+}

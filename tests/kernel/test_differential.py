@@ -1,0 +1,189 @@
+"""The kernel and the reference live the same lives and answer the same, to the last bit."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import oracle
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from inputs import point, points
+
+from dynhull import _kernel, predicates, tree
+
+
+def rows(pairs):
+    return np.array(pairs, dtype=np.float64).reshape(len(pairs), 2) + 0.0
+
+
+def outcome(action, *arguments):
+    try:
+        return action(*arguments)
+    except (KeyError, ValueError, TypeError) as error:
+        return type(error)
+
+
+@dataclass
+class Both:
+    """Two trees that are asked the same."""
+
+    reference: tree.HullTree
+    kernel: _kernel.HullTree
+
+    def __call__(self, method, *arguments):
+        expected = outcome(getattr(self.reference, method), *arguments)
+        answer = outcome(getattr(self.kernel, method), *arguments)
+        np.testing.assert_array_equal(answer, expected)
+        assert type(answer) is type(expected)
+        return answer
+
+    def agree(self):
+        assert len(self.kernel) == len(self.reference)
+        assert self.kernel.distinct == self.reference.distinct
+        assert self.kernel.changes == self.reference.changes
+        for method in ("points", "vertices"):
+            self(method)
+        for side in (0, 1):
+            self("chain", side)
+        self.kernel.check()
+
+
+class Twins(RuleBasedStateMachine):
+    @initialize(pairs=points(100))
+    def start(self, pairs):
+        self.both = Both(tree.HullTree(rows(pairs)), _kernel.HullTree(rows(pairs)))
+
+    def some_present(self, data, most):
+        present = sorted(set(map(tuple, self.both.reference.points().tolist())))
+        return data.draw(st.lists(st.sampled_from(present), max_size=most)) if present else []
+
+    @rule(p=point)
+    def insert(self, p):
+        self.both("insert", *p)
+
+    @rule(p=point)
+    def delete(self, p):
+        self.both("delete", *p)
+
+    @rule(p=point)
+    def count(self, p):
+        self.both("count", *p)
+
+    @rule(data=st.data())
+    def delete_present(self, data):
+        for p in self.some_present(data, 5):
+            self.both("delete", *p)
+
+    @rule(data=st.data(), new=points(40), ignore=st.booleans())
+    def batch(self, data, new, ignore):
+        old = self.some_present(data, 40)
+        pairs = data.draw(st.permutations(new + old))
+        ops = data.draw(st.lists(st.sampled_from([1, -1]), min_size=len(pairs), max_size=len(pairs)))
+        self.both("apply", np.array(ops, np.int8), rows(pairs), ignore)
+
+    @rule(new=points(150))
+    def insert_many(self, new):
+        self.both("apply", np.ones(len(new), np.int8), rows(new), False)
+
+    @rule()
+    def delete_half(self):
+        half = self.both.reference.points()[::2].copy()
+        self.both("apply", np.full(len(half), -1, np.int8), half, False)
+
+    @rule(queries=points(30), repeat=st.sampled_from([1, 20]))
+    def locate(self, queries, repeat):
+        corners = self.both.reference.vertices().tolist()
+        self.both("locate", np.tile(rows(queries + corners), (repeat, 1)))
+
+    @rule(queries=points(10))
+    def tangents(self, queries):
+        self.both("tangents", rows(queries))
+
+    @precondition(lambda self: len(self.both.reference))
+    @rule(directions=points(10))
+    def support(self, directions):
+        vectors = rows(directions)
+        self.both("support", np.ascontiguousarray(vectors[vectors.any(axis=1)]))
+
+    @rule()
+    def copy(self):
+        self.both = Both(self.both.reference.copy(), self.both.kernel.copy())
+
+    @rule()
+    def clear(self):
+        self.both("clear")
+
+    @invariant()
+    def same(self):
+        if hasattr(self, "both"):
+            self.both.agree()
+
+
+TestTwins = Twins.TestCase
+TestTwins.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+
+
+def cloud(kind, count, random):
+    if kind == "uniform":
+        return random.random((count, 2))
+    if kind == "circle":
+        angle = random.random(count) * 2 * np.pi
+        return np.column_stack([np.cos(angle), np.sin(angle)])
+    if kind == "grid":
+        return random.integers(0, 40, (count, 2)).astype(float)
+    if kind == "columns":
+        return np.column_stack([random.integers(0, 3, count).astype(float), random.random(count)])
+    clusters = np.exp2(random.integers(-60, 60, count).astype(float))
+    return np.column_stack([clusters * random.random(count), clusters])
+
+
+@pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])
+def test_a_window_that_moves(kind):
+    """Leaves fill, split, empty and merge; batches of every size, from one row to more than there are points."""
+    random = np.random.default_rng(7)
+    window = cloud(kind, 3000, random)
+    both = Both(tree.HullTree(window), _kernel.HullTree(window))
+    for size in (1, 5, 30, 200, 1500, 40, 2500, 6000, 300):
+        fresh = cloud(kind, size, random)
+        old = window[:size]
+        ops = np.concatenate([np.ones(len(fresh), np.int8), np.full(len(old), -1, np.int8)])
+        order = random.permutation(len(ops))
+        both("apply", ops[order], np.concatenate([fresh, old])[order], False)
+        window = np.concatenate([window[size:], fresh])
+        both.agree()
+        both("locate", cloud(kind, 500, random))
+    strip = window[np.argsort(window[:, 0])][: len(window) // 3]
+    both("apply", np.full(len(strip), -1, np.int8), strip, True)
+    both.agree()
+    both("apply", np.ones(300, np.int8), np.ascontiguousarray(strip[:300]), False)
+    both.agree()
+    both("apply", np.full(len(window), -1, np.int8), window, True)
+    both.agree()
+
+
+@given(a=point, b=point, c=point)
+def test_orientation(a, b, c):
+    assert _kernel.orientation(a, b, c) == oracle.turn(a, b, c)
+    assert _kernel.orientations(rows([a]), rows([b]), rows([c])).tolist() == [oracle.turn(a, b, c)]
+
+
+@given(d=point, a=point, b=point)
+def test_direction_sign(d, a, b):
+    difference = oracle.dot(d, b) - oracle.dot(d, a)
+    assert _kernel.direction_sign(d, a, b) == (difference > 0) - (difference < 0)
+
+
+@given(st.lists(point, min_size=5, max_size=5))
+def test_crossing(five):
+    a, b, z, c, d = sorted((x + 0.0, y + 0.0) for x, y in five)
+    # What the search asks: both edges have a width, and the line through z comes between them.
+    if a[0] < b[0] < z[0] <= c[0] < d[0]:
+        assert _kernel.crossing(a, b, c, d, z) == predicates.crossing(a, b, c, d, z)
+        slope_ab, slope_cd = (
+            (Fraction(q[1]) - Fraction(p[1])) / (Fraction(q[0]) - Fraction(p[0])) for p, q in ((a, b), (c, d))
+        )
+        x = Fraction(z[0])
+        gap = Fraction(a[1]) + slope_ab * (x - Fraction(a[0])) - Fraction(c[1]) - slope_cd * (x - Fraction(c[0]))
+        assert _kernel.crossing(a, b, c, d, z) == (gap > 0) - (gap < 0)
