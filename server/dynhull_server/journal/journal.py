@@ -12,7 +12,9 @@ from .folder import Folder
 from .records import Points, Record, checksum, encode
 from .recovery import Recovered
 from .wal import check_log
-from .writer import Durability, Writer
+from .writer import Durability, Statement, Writer
+
+NEWEST = 2**62
 
 CHECKPOINT_BYTES = 16 * 2**20  # of log, before it is copied into the database
 LONGEST_LOG_BYTES = 256 * 2**20  # then writers wait for the copy
@@ -85,14 +87,16 @@ class Journal:
             query = "SELECT (SELECT total(length(payload)) FROM batches) + (SELECT total(length(points)) FROM chunks)"
             return int(connection.execute(query).fetchone()[0])
 
-    def recover(self, number: int) -> Recovered:
-        """A hull's newest good snapshot and the batches after it. What had to be left out is in `notes`.
+    def recover(self, number: int, until: int = NEWEST) -> Recovered:
+        """A hull's newest good snapshot and the batches after it, up to a revision.
+
+        What had to be left out is in `notes`.
 
         Raises:
             JournalDamagedError: something in the middle is damaged.
         """
         with self._reading() as connection:
-            recovered = recovery.recover(connection, number)
+            recovered = recovery.recover(connection, number, until)
         self.notes += recovered.notes
         if recovered.cut_from is not None:
             self._writer.write(
@@ -100,17 +104,25 @@ class Journal:
             ).result()
         return recovered
 
+    def oldest(self, number: int) -> int:
+        """The oldest revision of a hull that `recover` can go back to."""
+        query = "SELECT revision FROM snapshots WHERE hull = ? ORDER BY revision DESC LIMIT 1 OFFSET ?"
+        with self._reading() as connection:
+            row = connection.execute(query, (number, snapshots.KEPT - 1)).fetchone()
+        return 0 if row is None else int(row[0])
+
     # Writing
 
-    def create(self, name: str, created: float, config: bytes) -> tuple[int, "Future[None]"]:
-        """Note a new hull. Returns its number, and a future of the commit."""
+    def new_row(self, name: str, created: float, config: bytes) -> HullRow:
+        """A row for a new hull, not yet written."""
         with self._numbering:
             number = self._next_hull
             self._next_hull += 1
-        values = (number, name, created, config)
-        return number, self._writer.write(
-            [("INSERT INTO hulls (id, name, created, config) VALUES (?, ?, ?, ?)", values)]
-        )
+        return HullRow(number, name, created, config)
+
+    def create(self, row: HullRow) -> "Future[None]":
+        """Commit a new hull. A row that is there already is left as it is."""
+        return self._writer.write([_creation(row)])
 
     def delete(self, number: int) -> "Future[None]":
         """Forget a hull. Its batches and snapshots go with it."""
@@ -118,13 +130,16 @@ class Journal:
         tables = ["DELETE FROM snapshots WHERE hull = ?", "DELETE FROM batches WHERE hull = ?"]
         return self._writer.write([(sql, (number,)) for sql in [chunks, *tables, "DELETE FROM hulls WHERE id = ?"]])
 
-    def append(self, number: int, records: Sequence[Record]) -> "Future[None]":
-        """Commit batches of consecutive revisions. The future fails with JournalFullError where there is no room."""
+    def append(self, number: int, records: Sequence[Record], new: HullRow | None = None) -> "Future[None]":
+        """Commit batches of consecutive revisions, of a `new` hull together with its row.
+
+        The future fails with JournalFullError where there is no room on the disk.
+        """
         first, last = records[0].revision, records[-1].revision
         payload = encode(records)
         values = (number, first, last, checksum(payload, number, first, last), payload)
         sql = "INSERT INTO batches (hull, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?)"
-        return self._writer.write([(sql, values)])
+        return self._writer.write([*([] if new is None else [_creation(new)]), (sql, values)])
 
     def snapshot(self, number: int, revision: int, points: Points, state: bytes) -> None:
         """Write a snapshot beside the traffic, then trim what two snapshots make superfluous. Returns when it is done.
@@ -170,6 +185,11 @@ class Journal:
                 if size > CHECKPOINT_BYTES:
                     mode = "PASSIVE" if size < LONGEST_LOG_BYTES else "TRUNCATE"
                     connection.execute(f"PRAGMA wal_checkpoint({mode})").fetchall()
+
+
+def _creation(row: HullRow) -> Statement:
+    sql = "INSERT OR IGNORE INTO hulls (id, name, created, config) VALUES (?, ?, ?, ?)"
+    return sql, (row.number, row.name, row.created, row.config)
 
 
 class _Reading:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 Points = npt.NDArray[np.float64]
 
-# Inserts, deletes, the batch's number among its producer's, length of the producer's name.
-HEADER = struct.Struct("<IIQH")
+# Inserts, deletes, the batch's number among its producer's, length of the producer's name, whether lenient.
+HEADER = struct.Struct("<IIQHB")
 POINT_BYTES = 16
 
 
@@ -22,9 +22,10 @@ class Record:
     Attributes:
         revision: the revision that it made.
         inserts: (n, 2) points inserted.
-        deletes: (m, 2) points deleted; points that were not there are passed over, as they were the first time.
+        deletes: (m, 2) points deleted.
         producer: who wrote it; empty for a writer without a name.
         sequence: the batch's number among the producer's.
+        lenient: whether some of the deletes were passed over, because the point was not there.
     """
 
     revision: int
@@ -32,6 +33,7 @@ class Record:
     deletes: Points
     producer: str = ""
     sequence: int = 0
+    lenient: bool = False
 
 
 def encode(records: Iterable[Record]) -> bytes:
@@ -39,7 +41,8 @@ def encode(records: Iterable[Record]) -> bytes:
     parts = []
     for record in records:
         producer = record.producer.encode()
-        parts.append(HEADER.pack(len(record.inserts), len(record.deletes), record.sequence, len(producer)))
+        sizes = len(record.inserts), len(record.deletes)
+        parts.append(HEADER.pack(*sizes, record.sequence, len(producer), record.lenient))
         parts += [producer, _bytes(record.inserts), _bytes(record.deletes)]
     return b"".join(parts)
 
@@ -50,14 +53,15 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
     while position < len(payload):
         if position + HEADER.size > len(payload):
             raise ValueError(f"a header is cut at byte {position}")
-        inserts, deletes, sequence, name = HEADER.unpack_from(payload, position)
+        inserts, deletes, sequence, name, lenient = HEADER.unpack_from(payload, position)
         start = position + HEADER.size + name
         middle = start + inserts * POINT_BYTES
         end = middle + deletes * POINT_BYTES
         if end > len(payload):
             raise ValueError(f"a record is cut at byte {position}")
         producer = payload[position + HEADER.size : start].decode()
-        yield Record(revision, _points(payload[start:middle]), _points(payload[middle:end]), producer, sequence)
+        inserted, deleted = _points(payload[start:middle]), _points(payload[middle:end])
+        yield Record(revision, inserted, deleted, producer, sequence, bool(lenient))
         position, revision = end, revision + 1
 
 

@@ -31,24 +31,27 @@ class Recovered:
     cut_from: int | None = None
 
 
-def recover(connection: sqlite3.Connection, number: int) -> Recovered:
-    """Read one hull.
+def recover(connection: sqlite3.Connection, number: int, until: int) -> Recovered:
+    """Read one hull as it was at revision `until`, or at the last one before.
 
     Raises:
         JournalDamagedError: a batch that others follow is missing or damaged, or every snapshot is.
     """
     try:
-        recovered = _snapshot(connection, number)
-        _batches(connection, number, recovered)
+        recovered = _snapshot(connection, number, until)
+        _batches(connection, number, until, recovered)
     except sqlite3.DatabaseError as error:
         raise JournalDamagedError(f"the database is damaged ({error}): restore a backup") from error
     return recovered
 
 
-def _snapshot(connection: sqlite3.Connection, number: int) -> Recovered:
-    query = "SELECT id, revision, chunks, state, checksum FROM snapshots WHERE hull = ? ORDER BY revision DESC"
+def _snapshot(connection: sqlite3.Connection, number: int, until: int) -> Recovered:
+    query = (
+        "SELECT id, revision, chunks, state, checksum FROM snapshots WHERE hull = ? AND revision <= ? "
+        "ORDER BY revision DESC"
+    )
     notes: list[str] = []
-    for snapshot, revision, chunks, state, expected in connection.execute(query, (number,)):
+    for snapshot, revision, chunks, state, expected in connection.execute(query, (number, until)):
         if checksum(state, snapshot, number, revision, chunks) == expected:
             parts = list(_good_chunks(connection, snapshot))
             if len(parts) == chunks:
@@ -66,13 +69,15 @@ def _good_chunks(connection: sqlite3.Connection, snapshot: int) -> Iterator[Poin
         yield np.frombuffer(data, "<f8").reshape(-1, 2)
 
 
-def _batches(connection: sqlite3.Connection, number: int, recovered: Recovered) -> None:
+def _batches(connection: sqlite3.Connection, number: int, until: int, recovered: Recovered) -> None:
     """Append the good batches after the snapshot; a damaged last row is cut off."""
     start = recovered.revision
     reached = start
     bad: str | None = None
-    query = "SELECT first, last, checksum, payload FROM batches WHERE hull = ? AND last > ? ORDER BY first"
-    for first, last, expected, payload in connection.execute(query, (number, start)):
+    query = (
+        "SELECT first, last, checksum, payload FROM batches WHERE hull = ? AND last > ? AND first <= ? ORDER BY first"
+    )
+    for first, last, expected, payload in connection.execute(query, (number, start, until)):
         if bad is None and first > reached + 1:
             bad = f"revisions {reached + 1} to {first - 1} of hull {number} are missing"
         if bad is not None:
@@ -81,7 +86,7 @@ def _batches(connection: sqlite3.Connection, number: int, recovered: Recovered) 
             bad = f"revisions {first} to {last} of hull {number} are damaged"
             recovered.cut_from = first
             continue
-        recovered.records += [record for record in decode(payload, first) if record.revision > start]
+        recovered.records += [record for record in decode(payload, first) if start < record.revision <= until]
         reached = last
     if bad is not None:
         recovered.notes.append(f"{bad}: cut off at revision {reached}, the last whole batch")

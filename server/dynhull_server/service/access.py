@@ -123,7 +123,7 @@ class TokenFile:
             self._version = version
             self._tokens = self._load()
         except (OSError, ValueError) as error:
-            log.error("the tokens stay as they were: %s", error)  # noqa: TRY400  # the message says it all
+            log.error("the tokens stay as they were: %s", error)  # the message says it all
         else:
             log.info("tokens read again", extra={"tokens": len(self._tokens)})
 

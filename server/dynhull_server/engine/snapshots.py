@@ -1,0 +1,28 @@
+"""Snapshots in the background: a restart replays a bounded number of batches."""
+
+import asyncio
+import logging
+
+from .errors import HullNotFoundError, StorageError
+from .hulls import Engine
+
+# A hull is due once its batches since the last snapshot hold as many points as it does itself, and at least so many.
+LEAST_POINTS = 250_000
+PAUSE = 1.0  # seconds between two looks
+
+log = logging.getLogger(__name__)
+
+
+async def keep_snapshots(engine: Engine) -> None:
+    """Write a snapshot of every hull that is due, one after the other."""
+    while True:
+        await asyncio.sleep(PAUSE)
+        for hull in engine:
+            if hull.unsaved < max(LEAST_POINTS, hull.counts.points):
+                continue
+            try:
+                await hull.snapshot()
+            except HullNotFoundError:
+                continue
+            except StorageError as error:
+                log.warning("no snapshot", extra={"hull": hull.name, "reason": str(error)})
