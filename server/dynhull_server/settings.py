@@ -31,6 +31,9 @@ class Settings(BaseSettings):
         "of the process, however sudden.",
     )
     create_on_write: bool = Field(False, description="Create a hull when the first batch for it comes.")
+    snapshot_points: int = Field(
+        250_000, ge=1, description="A hull gets a snapshot when it took so many points, and as many as it has."
+    )
 
     tls_cert: Path | None = Field(None, description="PEM file: the server's certificate and those up to the root.")
     tls_key: Path | None = Field(None, description="PEM file: the certificate's private key.")

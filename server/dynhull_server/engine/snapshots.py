@@ -6,19 +6,20 @@ import logging
 from .errors import HullNotFoundError, StorageError
 from .hulls import Engine
 
-# A hull is due once its batches since the last snapshot hold as many points as it does itself, and at least so many.
-LEAST_POINTS = 250_000
 PAUSE = 1.0  # seconds between two looks
 
 log = logging.getLogger(__name__)
 
 
-async def keep_snapshots(engine: Engine) -> None:
-    """Write a snapshot of every hull that is due, one after the other."""
+async def keep_snapshots(engine: Engine, least_points: int) -> None:
+    """Write a snapshot of every hull that is due, one after the other.
+
+    A hull is due once its batches since the last one hold as many points as it does itself, and at least so many.
+    """
     while True:
         await asyncio.sleep(PAUSE)
         for hull in engine:
-            if hull.unsaved < max(LEAST_POINTS, hull.counts.points):
+            if hull.unsaved < max(least_points, hull.counts.points):
                 continue
             try:
                 await hull.snapshot()

@@ -106,7 +106,7 @@ class Server:
         for name in ("", SERVICE, SCRUB):
             await self._health.set(name, SERVING)
         if not self._settings.in_memory:
-            self._snapshots = asyncio.create_task(keep_snapshots(self._engine))
+            self._snapshots = asyncio.create_task(keep_snapshots(self._engine, self._settings.snapshot_points))
         if self._settings.scrub_cpu:
             self._scrub = asyncio.create_task(
                 scrub(
