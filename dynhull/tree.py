@@ -8,8 +8,8 @@ chains and bridges from the leaf up and stops where its point is not on the hull
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Self
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt

@@ -7,12 +7,12 @@ import subprocess
 import grpc
 import numpy as np
 import pytest
-from dynhull_client import HullClient, LimitExceededError
-from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from server_process import COMMAND, PATIENCE, server_process
 
 import dynhull
+from dynhull_client import HullClient, LimitExceededError
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 
 def random_points(n, seed):

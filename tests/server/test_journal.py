@@ -6,6 +6,8 @@ import threading
 
 import numpy as np
 import pytest
+
+from dynhull_server.journal.copies import back_up
 from dynhull_server.journal.errors import JournalDamagedError, JournalError, JournalFormatError, JournalLockedError
 from dynhull_server.journal.folder import DATABASE
 from dynhull_server.journal.journal import Durability, Journal
@@ -215,7 +217,9 @@ def test_a_damaged_end_is_cut_at_the_last_whole_batch(journal, folder):
     journal = Journal(folder)
     recovered = journal.recover(number)
     same(recovered.records, [record(revision) for revision in range(1, 9)])
-    assert journal.notes == [f"revisions 9 to 9 of hull {number} are damaged: cut off at revision 8, the last whole batch"]
+    assert journal.notes == [
+        f"revisions 9 to 9 of hull {number} are damaged: cut off at revision 8, the last whole batch"
+    ]
     journal.append(number, [record(9)]).result()
     journal = reopened(journal, folder)
     same(journal.recover(number).records, [record(revision) for revision in range(1, 10)])
@@ -275,7 +279,7 @@ def test_damage_in_the_middle_of_the_log_is_refused(journal, folder, tmp_path):
 def test_a_backup_is_a_folder_like_any_other(journal, folder, tmp_path):
     number = create(journal)
     journal.append(number, [record(1)]).result()
-    journal.backup(tmp_path / "backup")
+    back_up(folder, tmp_path / "backup", lambda *_: None)
     journal.append(number, [record(2)]).result()
     backup = Journal(tmp_path / "backup")
     same(backup.recover(number).records, [record(1)])

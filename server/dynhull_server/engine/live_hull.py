@@ -208,7 +208,7 @@ class LiveHull:
             await _committed(self._store.create())
 
     async def delete(self) -> None:
-        """Refuse all further work; whoever waits gets HullNotFoundError. StorageError where that cannot be committed."""
+        """Refuse all further work; whoever waits gets HullNotFoundError. StorageError where it cannot be committed."""
         await self._serial.run(lambda: self._close(closed=True), small=True)  # after the batches under way
         if self._store is not None:
             try:
@@ -257,7 +257,7 @@ class LiveHull:
             self.unsaved += len(inserts) + len(deletes)
         return applied
 
-    def _commit(self) -> "Future[None] | None":
+    def _commit(self) -> Future[None] | None:
         if self._store is None or not self._uncommitted:
             return None
         records, self._uncommitted = self._uncommitted, []
@@ -289,7 +289,7 @@ class LiveHull:
             self._moved = None
 
 
-async def _committed(commit: "Future[None]") -> None:
+async def _committed(commit: Future[None]) -> None:
     try:
         await asyncio.wrap_future(commit)
     except JournalError as error:

@@ -38,7 +38,7 @@ class SerialExecutor:
     def __init__(
         self,
         pool: Executor,
-        commit: Callable[[], "Future[None] | None"],
+        commit: Callable[[], Future[None] | None],
         roll_back: Callable[[BaseException], Exception],
         after: Callable[[], None],
     ) -> None:
@@ -104,9 +104,9 @@ class SerialExecutor:
         self._pool.submit(trip)
 
     def _await(
-        self, loop: asyncio.AbstractEventLoop, jobs: list[Job], outcomes: list[Outcome], pending: "Future[None]"
+        self, loop: asyncio.AbstractEventLoop, jobs: list[Job], outcomes: list[Outcome], pending: Future[None]
     ) -> None:
-        def committed(pending: "Future[None]") -> None:
+        def committed(pending: Future[None]) -> None:
             failure = pending.exception()
             if failure is None:
                 loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)

@@ -13,6 +13,7 @@ from dynhull.arrays import Points
 from ..journal.errors import JournalFullError
 from ..journal.journal import NEWEST, HullRow, Journal
 from ..journal.records import Record
+from ..journal.recovery import Recovered
 from .errors import StorageError, StorageFullError
 
 # Batches are replayed together up to so many points: as a set, which is many times faster.
@@ -36,31 +37,21 @@ class HullStore:
         self._row = row
         self._known = known
 
-    def create(self) -> "Future[None]":
+    def create(self) -> Future[None]:
         """Commit the hull itself. A hull that is not created is committed with its first batch."""
         return self._now_known(self._journal.create(self._row))
 
-    def append(self, records: list[Record]) -> "Future[None]":
+    def append(self, records: list[Record]) -> Future[None]:
         """Commit batches."""
         return self._now_known(self._journal.append(self._row.number, records, None if self._known else self._row))
 
-    def delete(self) -> "Future[None]":
+    def delete(self) -> Future[None]:
         """Commit that the hull is gone."""
         return self._journal.delete(self._row.number)
 
     def restore(self, until: int = NEWEST) -> Restored:
         """The hull as it was at a revision, as of the last commit. O(n log n)."""
-        recovered = self._journal.recover(self._row.number, until)
-        hull = DynamicHull(recovered.points)
-        producers: dict[str, int] = json.loads(recovered.state or "{}")
-        revision = recovered.revision
-        for record in recovered.records:
-            revision = record.revision
-            if record.producer:
-                producers[record.producer] = record.sequence
-        for records in _together(recovered.records):
-            _replay(hull, records)
-        return Restored(hull, revision, producers)
+        return replayed(self._journal.recover(self._row.number, until))
 
     def snapshot(self, revision: int, points: Points, producers: Mapping[str, int]) -> None:
         """Write a snapshot beside the traffic. Returns when it is done."""
@@ -73,8 +64,8 @@ class HullStore:
         """The oldest revision that `restore` can go back to."""
         return self._journal.oldest(self._row.number)
 
-    def _now_known(self, commit: "Future[None]") -> "Future[None]":
-        def committed(commit: "Future[None]") -> None:
+    def _now_known(self, commit: Future[None]) -> Future[None]:
+        def committed(commit: Future[None]) -> None:
             self._known = self._known or commit.exception() is None
 
         commit.add_done_callback(committed)
@@ -84,6 +75,20 @@ class HullStore:
 def storage_error(error: BaseException) -> StorageError:
     """What to tell callers of a commit that failed."""
     return StorageFullError(str(error)) if isinstance(error, JournalFullError) else StorageError(str(error))
+
+
+def replayed(recovered: Recovered) -> Restored:
+    """The hull that a snapshot and the batches after it make. O(n log n)."""
+    hull = DynamicHull(recovered.points)
+    producers: dict[str, int] = json.loads(recovered.state or "{}")
+    revision = recovered.revision
+    for record in recovered.records:
+        revision = record.revision
+        if record.producer:
+            producers[record.producer] = record.sequence
+    for records in _together(recovered.records):
+        _replay(hull, records)
+    return Restored(hull, revision, producers)
 
 
 def _together(records: Iterable[Record]) -> Iterable[list[Record]]:

@@ -120,17 +120,17 @@ class Journal:
             self._next_hull += 1
         return HullRow(number, name, created, config)
 
-    def create(self, row: HullRow) -> "Future[None]":
+    def create(self, row: HullRow) -> Future[None]:
         """Commit a new hull. A row that is there already is left as it is."""
         return self._writer.write([_creation(row)])
 
-    def delete(self, number: int) -> "Future[None]":
+    def delete(self, number: int) -> Future[None]:
         """Forget a hull. Its batches and snapshots go with it."""
         chunks = "DELETE FROM chunks WHERE snapshot IN (SELECT id FROM snapshots WHERE hull = ?)"
         tables = ["DELETE FROM snapshots WHERE hull = ?", "DELETE FROM batches WHERE hull = ?"]
         return self._writer.write([(sql, (number,)) for sql in [chunks, *tables, "DELETE FROM hulls WHERE id = ?"]])
 
-    def append(self, number: int, records: Sequence[Record], new: HullRow | None = None) -> "Future[None]":
+    def append(self, number: int, records: Sequence[Record], new: HullRow | None = None) -> Future[None]:
         """Commit batches of consecutive revisions, of a `new` hull together with its row.
 
         The future fails with JournalFullError where there is no room on the disk.
@@ -156,16 +156,6 @@ class Journal:
     def bytes_used(self) -> int:
         """What the journal takes on the disk."""
         return self._folder.bytes_used()
-
-    def backup(self, target: Path) -> None:
-        """A consistent copy of the journal as a new folder, beside the traffic."""
-        target.mkdir(parents=True)
-        with self._reading() as connection:
-            copy = sqlite3.connect(target / self._folder.database.name)
-            try:
-                connection.backup(copy, pages=256)
-            finally:
-                copy.close()
 
     def close(self) -> None:
         """Commit what waits, and let others have the folder."""

@@ -78,7 +78,7 @@ class Writer:
         if self._unsynced_since is not None:
             self._sync()
 
-    def _commit(self, group: list[tuple[list[Statement], "Future[None]"]]) -> None:
+    def _commit(self, group: list[tuple[list[Statement], Future[None]]]) -> None:
         try:
             self._transaction(statement for statements, _ in group for statement in statements)
         except sqlite3.Error as error:
