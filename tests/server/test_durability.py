@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+from pathlib import Path
 
 import grpc
 import numpy as np
@@ -121,21 +122,27 @@ def test_a_full_disk_refuses_writes_and_recovers(tmp_path):
     folder.mkdir()
     wrap = ["unshare", "--map-root-user", "--mount", "sh", "-c", FULL_DISK, str(folder)]
     points = random_points(2000, 3)
-    with server_process("--data", str(folder / "data"), wrap=wrap, complaints=True) as server:
-        with HullClient(server.address) as client:
-            client.create_hull("fleet")
-            ballast = f"/proc/{server.process.pid}/root{folder}/ballast"
-            apply(server.address, "fleet", points, "p", 1)
-            with open(ballast, "wb") as file:  # noqa: PTH123  (a path inside another process's mounts)
-                file.write(bytes(os.statvfs(ballast).f_bavail * os.statvfs(ballast).f_frsize))
-            with pytest.raises(LimitExceededError, match="the disk is full"):
-                for shift in range(1, 50):
-                    client.apply("fleet", insert=points + shift)
-            held = client.get_hull("fleet")
-            assert held.info.points == 2000 * held.revision
-            assert client.locate("fleet", [[0.5, 0.5]]).sides.tolist() == [1]
-            assert client.verify("fleet").equal
-            os.unlink(ballast)  # noqa: PTH108
-            more = apply(server.address, "fleet", points + 99, "p", 2)
-            assert (more.revision, more.point_count) == (held.revision + 1, 2000 * (held.revision + 1))
-            assert client.verify("fleet").equal
+    with (
+        server_process("--data", str(folder / "data"), wrap=wrap, complaints=True) as server,
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("fleet")
+        ballast = Path(f"/proc/{server.process.pid}/root{folder}/ballast")
+        apply(server.address, "fleet", points, "p", 1)
+        with ballast.open("wb") as file:
+            file.write(bytes(os.statvfs(ballast).f_bavail * os.statvfs(ballast).f_frsize))
+        with pytest.raises(LimitExceededError, match="the disk is full"):
+            fill(client, points)
+        held = client.get_hull("fleet")
+        assert held.info.points == 2000 * held.revision
+        assert client.locate("fleet", [[0.5, 0.5]]).sides.tolist() == [1]
+        assert client.verify("fleet").equal
+        ballast.unlink()
+        more = apply(server.address, "fleet", points + 99, "p", 2)
+        assert (more.revision, more.point_count) == (held.revision + 1, 2000 * (held.revision + 1))
+        assert client.verify("fleet").equal
+
+
+def fill(client, points):
+    for shift in range(1, 50):
+        client.apply("fleet", insert=points + shift)

@@ -1,4 +1,4 @@
-"""Torture of a real server, after etcd's robustness suite: writers, readers and watchers, and a process that keeps dying.
+"""Torture of a real server, after etcd's robustness suite: writers, readers, watchers, and a process that keeps dying.
 
     python tests/robustness/server/torture.py --faults 50
 
