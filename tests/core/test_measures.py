@@ -60,9 +60,7 @@ def test_diameter(rows):
 
 @given(any_points)
 def test_width(rows):
-    widths = [
-        Fraction(max(cross(a, b, exact(p)) for p in rows)) ** 2 / squared(a, b) for a, b in edges(rows)
-    ]
+    widths = [Fraction(max(cross(a, b, exact(p)) for p in rows)) ** 2 / squared(a, b) for a, b in edges(rows)]
     assert_rounded(DynamicHull(rows).width(), root(min(widths, default=Fraction(0))))
 
 

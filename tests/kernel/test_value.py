@@ -64,7 +64,7 @@ def test_which_implementation():
     wrong = subprocess.run(
         [sys.executable, "-c", "import dynhull"], env={"DYNHULL_KERNEL": "rust"}, capture_output=True, text=True
     )
-    assert "DYNHULL_KERNEL must be \"cpp\" or \"python\", got 'rust'" in wrong.stderr
+    assert 'DYNHULL_KERNEL must be "cpp" or "python", got \'rust\'' in wrong.stderr
 
 
 def test_a_number_that_is_not_a_double_is_still_checked(hull):
