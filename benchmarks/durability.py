@@ -14,11 +14,12 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import grpc
 import numpy as np
+
 from dynhull_proto.v1 import batch_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -86,7 +87,8 @@ def streams(folder: Path, repeat: int) -> None:
         f"medians of {repeat}; 100 batches of {LARGE:,} points, 10,000 of one point with {SINGLE_IN_FLIGHT} in flight"
     )
     print(
-        f"{'durability':12}{'points/s, large batches':>26}{'of in memory':>14}{'acks/s, one point':>20}{'of in memory':>14}"
+        f"{'durability':12}{'points/s, large batches':>26}{'of in memory':>14}"
+        f"{'acks/s, one point':>20}{'of in memory':>14}"
     )
     for mode, values in rates.items():
         many, one = (statistics.median(each) for each in values)
@@ -117,7 +119,7 @@ def restart(folder: Path, repeat: int) -> None:
         empty = time.perf_counter() - begun
     print(
         f"ready after {statistics.median(times):.2f} s (median of {repeat}) with {points:,} points: a snapshot of "
-        f"{RESTART_POINTS:,} and {len(operations):,} operations in the journal; an empty server in memory: {empty:.2f} s"
+        f"{RESTART_POINTS:,}, {len(operations):,} operations in the journal; an empty server in memory: {empty:.2f} s"
     )
 
 
@@ -127,7 +129,7 @@ def used(data: Path) -> int:
 
 
 def wait_for_snapshot(data: Path) -> None:
-    with sqlite3.connect(f"file:{data / 'dynhull.db'}?mode=ro", uri=True) as database:
+    with closing(sqlite3.connect(f"file:{data / 'dynhull.db'}?mode=ro", uri=True)) as database:
         while database.execute("SELECT count(*) FROM snapshots").fetchone()[0] == 0:
             time.sleep(0.2)
 
