@@ -22,9 +22,16 @@ def area(vertices: Points) -> float:
 
 
 def perimeter(vertices: Points) -> float:
-    """Length of the boundary, within one unit in the last place an edge; two vertices count there and back."""
+    """Length of the boundary, within one unit in the last place an edge; two vertices count there and back.
+
+    inf where that is beyond every double.
+    """
     rows = vertices.tolist()
-    return fsum(hypot(x - px, y - py) for (x, y), (px, py) in zip(rows, rows[-1:] + rows[:-1], strict=True))
+    lengths = [hypot(x - px, y - py) for (x, y), (px, py) in zip(rows, rows[-1:] + rows[:-1], strict=True)]
+    try:
+        return fsum(lengths)
+    except OverflowError:
+        return inf
 
 
 def centroid(vertices: Points) -> tuple[float, float]:

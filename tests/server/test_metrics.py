@@ -109,9 +109,7 @@ def test_a_real_prometheus_scrapes_it(tmp_path: Path) -> None:
                 found = {}
                 while found.get("dynhull_points") != 5:
                     answer = json.loads(fetch(f"http://{api}/api/v1/query?query=%7Bjob%3D%22dynhull%22%7D"))
-                    found = {
-                        each["metric"]["__name__"]: float(each["value"][1]) for each in answer["data"]["result"]
-                    }
+                    found = {each["metric"]["__name__"]: float(each["value"][1]) for each in answer["data"]["result"]}
                 assert found["up"] == 1
                 assert found["dynhull_hulls"] == 1
             finally:

@@ -59,9 +59,7 @@ def test_an_acknowledgement_does_not_wait_for_the_next_batch(stub: HullServiceSt
     assert list(responses) == []
 
 
-def test_a_refused_batch_ends_the_stream_after_the_acknowledgements_before_it(
-    stub: HullServiceStub, hull: str
-) -> None:
+def test_a_refused_batch_ends_the_stream_after_the_acknowledgements_before_it(stub: HullServiceStub, hull: str) -> None:
     batches = [insert([[1, 2]]), insert(np.ones((1000, 2))), delete([[1, 2], [8, 8]]), insert([[3, 4]])]
     responses = stub.Stream(pb.StreamRequest(name=hull, batch=batch) for batch in batches)
     acknowledged = []
