@@ -59,9 +59,7 @@ def test_an_acknowledgement_does_not_wait_for_the_next_batch(stub: HullServiceSt
     assert list(responses) == []
 
 
-def test_a_refused_batch_ends_the_stream_after_the_acknowledgements_before_it(
-    stub: HullServiceStub, hull: str
-) -> None:
+def test_a_refused_batch_ends_the_stream_after_the_acknowledgements_before_it(stub: HullServiceStub, hull: str) -> None:
     batches = [insert([[1, 2]]), insert(np.ones((1000, 2))), delete([[1, 2], [8, 8]]), insert([[3, 4]])]
     responses = stub.Stream(pb.StreamRequest(name=hull, batch=batch) for batch in batches)
     acknowledged = []
@@ -153,7 +151,7 @@ def test_exactly_once_over_broken_connections(address: str, name: str, seed: int
                         if acknowledged == cut_at:
                             way.cut()
                 except grpc.RpcError as error:
-                    assert error.code() == grpc.StatusCode.UNAVAILABLE
+                    assert error.code() == grpc.StatusCode.UNAVAILABLE  # noqa: PT017  # the last one ends in peace
         live = direct.get_hull(name)
         everything = np.concatenate(batches)
         assert (live.revision, live.info.points) == (total, len(everything))
@@ -194,7 +192,7 @@ def test_a_full_hull_and_producers_without_room() -> None:
         assert limit("a", insert([[0, 0]]), producer="q", sequence=1) == ("max_producers", "1")
         watch = stub.Watch(pb.WatchRequest(name="a"))
         next(watch)
-        code, info, _ = refusal(lambda: list(stub.Watch(pb.WatchRequest(name="a"))))
+        _, info, _ = refusal(lambda: list(stub.Watch(pb.WatchRequest(name="a"))))
         assert dict(info.metadata) == {"limit": "max_streams", "value": "1"}
         watch.cancel()
         assert stub.GetHull(pb.GetHullRequest(name="a")).hull.point_count == 3
