@@ -12,6 +12,7 @@ from dynhull import DynamicHull
 from dynhull.arrays import Points
 
 from .batch import Applied, apply_batch
+from .difference import Differences
 from .errors import HullEmptyError, HullNotFoundError, HullReplacedError, LimitExceededError
 from .history import History
 from .limits import Limits
@@ -53,6 +54,7 @@ class LiveHull:
         uid: tells it from other hulls of its name.
         created: when.
         counts: as of the latest revision.
+        differences: between the vertices it has told.
     """
 
     def __init__(self, name: str, config: Config, pool: Executor, limits: Limits) -> None:
@@ -61,6 +63,7 @@ class LiveHull:
         self.uid = secrets.token_hex(8)
         self.created = datetime.now(UTC)
         self.counts = Counts(0, 0, 0)
+        self.differences = Differences()
         self._hull = DynamicHull()
         self._most_points = min(config.max_points or limits.max_points, limits.max_points)
         self._serial = SerialExecutor(pool, self._wake)
