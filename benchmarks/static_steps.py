@@ -76,13 +76,14 @@ def counted() -> Iterator[dict[str, int]]:
         return bisect_left(chain, p)
 
     chan = static.chan.__globals__
+    kernel, chan["kernel"] = chan["kernel"], None  # what it does cannot be counted from here
     chan["bisect_left"] = counting_bisect
     for module in names:
         module["orientation"], module["sorted"] = counting_orientation, counting_sorted
     try:
         yield counts
     finally:
-        chan["bisect_left"] = bisect_left
+        chan["bisect_left"], chan["kernel"] = bisect_left, kernel
         for module in names:
             module["orientation"] = orientation
             del module["sorted"]

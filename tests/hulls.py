@@ -1,6 +1,9 @@
-"""The hulls that the core tests run on."""
+"""The hulls that the tests run on: dynamic, and static."""
 
-from dynhull import DynamicHull
+from itertools import product
+
+from dynhull import DynamicHull, convex_hull, static
+from dynhull.arrays import as_points
 from dynhull.implementation import kernel
 from dynhull.tree import HullTree
 
@@ -30,3 +33,24 @@ if kernel is not None:
         _tree_type = kernel.HullTree
 
     HULLS["cpp"] = KernelHull
+
+
+def chan_step_by_step(xy, collinear="drop"):
+    """In Python, whether there is a kernel or not."""
+    return static.chan(xy, collinear, trace=[])
+
+
+# These take `collinear`.
+ALGORITHMS = {
+    f.__name__: f
+    for f in (static.graham_scan, static.jarvis_march, static.monotone_chain, static.chan, chan_step_by_step)
+}
+ONE_SHOT = {"convex_hull": convex_hull}
+
+if kernel is not None:
+
+    def told(discard, threads):
+        return lambda xy: kernel.convex_hull(as_points(xy), discard, threads)
+
+    for discard, threads in product((False, True), repeat=2):
+        ONE_SHOT[f"convex_hull, discard {discard}, threads {threads}"] = told(discard, threads)

@@ -1,9 +1,10 @@
 """A real server, in a process of its own."""
 
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,26 +20,30 @@ class Server:
 
 
 @contextmanager
-def server_process(*options: str, complaints: str = "") -> Iterator[Server]:
-    """`dynhull serve` on a free port. It must stop in peace, and have nothing to complain about but what is expected.
+def server_process(
+    *options: str, wrap: Sequence[str] = (), killed: bool = False, complaints: str = ""
+) -> Iterator[Server]:
+    """`dynhull serve` on a free port, in memory unless the options name a folder.
 
-    Its log is of warnings and worse, unless the options say otherwise.
+    It must stop in peace, unless it was `killed`, and have nothing to complain about but what is expected. Its log is
+    of warnings and worse, unless the options say otherwise.
     """
-    command = [COMMAND, "serve", "--port", "0", "--in-memory", "--log-level", "warning", *options]
+    memory = [] if "--data" in options else ["--in-memory"]
+    command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *memory, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
     ):
         try:
             first_line = process.stdout.readline()
-            assert first_line.startswith("dynhull serving on "), first_line
+            assert first_line.startswith("dynhull serving on "), errors.seek(0) or errors.read()
             yield Server(first_line.split()[-1], process)
         finally:
             process.terminate()
             code = process.wait(PATIENCE)
             errors.seek(0)
             said = errors.read()
-            assert code == 0, said
+            assert code == (-signal.SIGKILL if killed else 0), said
             assert complaints in said if complaints else not said, said
 
 

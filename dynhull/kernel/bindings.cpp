@@ -1,10 +1,13 @@
 // dynhull._kernel: the kernel's HullTree and predicates for Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 
 #include "chains.hpp"
+#include "chan.hpp"
 #include "check.hpp"
 #include "lock.hpp"
+#include "static_hull.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -229,6 +232,36 @@ nb::object orientations(const Rows& a, const Rows& b, const Rows& c) {
   return output.array({count});
 }
 
+nb::object convex_hull(const Rows& rows, std::optional<bool> discard, std::optional<bool> threads) {
+  std::optional<StaticHull> hull;
+  {
+    nb::gil_scoped_release release;
+    hull.emplace(static_hull(points_of(rows), rows.shape(0), {discard, threads}));
+  }
+  if (!hull->finite()) return nb::none();
+  const auto [lower, upper] = hull->chains();
+  const std::size_t between = upper.size() > 2 ? upper.size() - 2 : 0;
+  Output<double> output(2 * (lower.size() + between));
+  {
+    nb::gil_scoped_release release;
+    Point* end = std::copy(lower.begin(), lower.end(), reinterpret_cast<Point*>(output.data));
+    std::reverse_copy(upper.begin() + (between > 0), upper.begin() + (between > 0) + between, end);
+    hull.reset();
+  }
+  return output.array({lower.size() + between, 2});
+}
+
+nb::tuple chan(const Rows& rows) {
+  const Chan hull = [&] {
+    nb::gil_scoped_release release;
+    return Chan(points_of(rows), rows.shape(0));
+  }();
+  nb::list rounds;
+  for (const Chan::Round& round : hull.rounds)
+    rounds.append(nb::make_tuple(round.guess, round.groups, round.steps, round.closed));
+  return nb::make_tuple(array_of(hull.vertices), rounds);
+}
+
 Point point_of(nb::handle pair) {
   PyObject* tuple = pair.ptr();
   if (!PyTuple_CheckExact(tuple) || PyTuple_GET_SIZE(tuple) != 2) throw nb::type_error("a point is a tuple (x, y)");
@@ -254,13 +287,15 @@ NB_MODULE(_kernel, module) {
 
   nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
       .def(nb::init<>())
-      .def("__init__",
-           [](Hull* hull, nb::object xy) {
-             if (xy.is_none())
-               new (hull) Hull();
-             else
-               new (hull) Hull(nb::cast<Rows>(xy));
-           }, "xy"_a.none())
+      .def(
+          "__init__",
+          [](Hull* hull, nb::object xy) {
+            if (xy.is_none())
+              new (hull) Hull();
+            else
+              new (hull) Hull(nb::cast<Rows>(xy));
+          },
+          "xy"_a.none())
       .def("__len__", &Hull::size)
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
       .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
@@ -270,7 +305,8 @@ NB_MODULE(_kernel, module) {
       .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
            "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
       .def("apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a,
-           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the first "
+           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the "
+           "first "
            "row that deletes what is not there, or -1.")
       .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
@@ -284,18 +320,29 @@ NB_MODULE(_kernel, module) {
       .def("check", &Hull::check, "Raise AssertionError where an invariant is broken. O(n log n).")
       .def_prop_ro("memory", &Hull::memory, "Bytes used and bytes reserved by the tree.");
 
-  module.def("orientation",
-             [](nb::handle a, nb::handle b, nb::handle c) {
-               return orientation(point_of(a), point_of(b), point_of(c));
-             }, "a"_a, "b"_a, "c"_a, "+1 where three points turn left, -1 right, 0 on one line.");
-  module.def("direction_sign",
-             [](nb::handle d, nb::handle a, nb::handle b) {
-               return direction_sign(point_of(d), point_of(a), point_of(b));
-             }, "d"_a, "a"_a, "b"_a, "+1 where b lies further than a in direction d, -1 less far, 0 neither.");
-  module.def("crossing",
-             [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
-               return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
-             }, "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
+  module.def(
+      "orientation",
+      [](nb::handle a, nb::handle b, nb::handle c) { return orientation(point_of(a), point_of(b), point_of(c)); },
+      "a"_a, "b"_a, "c"_a, "+1 where three points turn left, -1 right, 0 on one line.");
+  module.def(
+      "direction_sign",
+      [](nb::handle d, nb::handle a, nb::handle b) { return direction_sign(point_of(d), point_of(a), point_of(b)); },
+      "d"_a, "a"_a, "b"_a, "+1 where b lies further than a in direction d, -1 less far, 0 neither.");
+  module.def(
+      "crossing",
+      [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
+        return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
+      },
+      "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
+  module.def(
+      "plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
+      "a * b - c * d as the predicates' filters compute it: three roundings. For the test of the build's flags.");
+  module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
+             "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. Whether "
+             "to discard points by a sample's hull first, and to use two threads, the input decides where not told. "
+             "O(n log n).");
+  module.def("chan", &chan, "xy"_a,
+             "The same by Chan's algorithm, and its rounds: guess, groups, steps, closed. O(n log h).");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");
 
   module.def("_before_fork", &Turns::before_fork);

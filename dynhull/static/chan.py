@@ -8,11 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Points, as_points
+from ..implementation import kernel
 from ..predicates import Point, orientation
 from .boundary import check_collinear, with_boundary_points
 from .jarvis import rightmost
 from .monotone_chain import half_chain
-from .trace import Collinear, Groups, Round, Trace, Wrap
+from .trace import Collinear, Groups, Round, Rounds, Trace, Wrap
 
 Chains = tuple[list[Point], list[Point]]  # lower and upper, left to right
 
@@ -23,12 +24,14 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     Chan, "Optimal output-sensitive convex hull algorithms in two and three dimensions" (1996). Each round guesses the
     number of vertices: 2, then the square of the last guess. Points are cut into groups of that size, each group's hull
     is computed, and gift wrapping runs across the groups, finding each group's tangent by binary search. A round that
-    does not close within `guess` steps is thrown away.
+    does not close within `guess` steps is thrown away. The kernel does it where no trace of single steps is wanted, and
+    lets other Python threads run meanwhile.
 
     Args:
         xy: (n, 2) array-like of finite numbers.
         collinear: "drop" returns true vertices only, "keep" every distinct point on the boundary.
-        trace: a list to fill, for each round, with a `Groups`, the `Wrap` steps and a `Round`.
+        trace: a list to fill, for each round, with a `Groups`, the `Wrap` steps and a `Round`. A `Rounds` is filled
+            with the `Round` only.
 
     Returns:
         (h, 2) points, counter-clockwise from the lexicographically smallest. All points on one line: two under "drop",
@@ -44,14 +47,17 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     [(2, 2, False), (4, 4, False), (16, 5, True)]
     """
     check_collinear(collinear)
+    if kernel is not None and (trace is None or isinstance(trace, Rounds)):
+        return _by_kernel(as_points(xy), collinear, trace)
+    steps_trace = None if isinstance(trace, Rounds) else trace
     points: list[Point] = list(map(tuple, as_points(xy).tolist()))
     hull: list[Point] | None = None if points else []
     guess = 2
     while hull is None:
         groups = [_chains(points[i : i + guess]) for i in range(0, len(points), guess)]
-        if trace is not None:
-            trace.append(Groups(guess, tuple(_cycle(*chains) for chains in groups)))
-        steps, closed = _wrap(min(points), groups, guess, trace)
+        if steps_trace is not None:
+            steps_trace.append(Groups(guess, tuple(_cycle(*chains) for chains in groups)))
+        steps, closed = _wrap(min(points), groups, guess, steps_trace)
         if trace is not None:
             trace.append(Round(guess, len(groups), len(steps), len(points) * log2(guess), closed))
         if closed:
@@ -60,6 +66,20 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     if collinear == "keep":
         hull = with_boundary_points(hull, points)
     return np.array(hull, dtype=np.float64).reshape(len(hull), 2)
+
+
+def _by_kernel(points: Points, collinear: Collinear, trace: Trace | None) -> Points:
+    assert kernel is not None
+    hull: Points
+    hull, rounds = kernel.chan(points)
+    if trace is not None:
+        trace += [
+            Round(guess, groups, steps, len(points) * log2(guess), closed) for guess, groups, steps, closed in rounds
+        ]
+    if collinear == "keep":
+        kept = with_boundary_points(list(map(tuple, hull.tolist())), list(map(tuple, points.tolist())))
+        return np.array(kept, dtype=np.float64).reshape(len(kept), 2)
+    return hull
 
 
 def _chains(group: Sequence[Point]) -> Chains:

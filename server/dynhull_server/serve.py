@@ -3,11 +3,15 @@
 import asyncio
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
-import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from . import logs
 from .flags import with_settings
+from .journal.errors import JournalError
 from .service.server import Server
 from .settings import Settings
 
@@ -22,13 +26,11 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
     logs.configure(settings.log_level, settings.log_format)
-    if not settings.in_memory:
-        typer.echo("Hulls are kept in memory: they are gone when the server stops.", err=True)
     try:
         asyncio.run(_serve(settings))
     except RuntimeError as error:
         sys.exit(f"cannot listen on {settings.host}:{settings.port}: {error}")
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, JournalError) as error:
         sys.exit(f"cannot serve: {error}")
 
 
@@ -38,9 +40,20 @@ async def _serve(settings: Settings) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     server = Server(settings)
-    await server.start()
+    with _restoring() as progress:
+        await server.start(progress)
     print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
     if server.metrics_address:
         print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
     await stop.wait()
     await server.drain()
+
+
+@contextmanager
+def _restoring() -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on a terminal for the hulls read from the disk, once there are any."""
+    console = Console(stderr=True)
+    columns = [TextColumn("reading hulls"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", visible=False)
+        yield lambda done, total: bar.update(task, completed=done, total=total, visible=total > 0)

@@ -10,6 +10,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, TomlConfigSettingsSource
 
+from .journal.writer import Durability
+
 PREFIX = "DYNHULL_"
 
 
@@ -20,8 +22,18 @@ class Settings(BaseSettings):
 
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(50051, ge=0, le=65535, description="Port to listen on; 0 for a free one.")
-    in_memory: bool = Field(False, description="Keep hulls in memory, and do not say so.")
+    data: Path = Field(Path("dynhull-data"), description="Folder where everything is kept.")
+    in_memory: bool = Field(False, description="Keep nothing: hulls are gone when the server stops.")
+    durability: Durability = Field(
+        Durability.SYNC,
+        description="What an acknowledgement promises. sync: the batch survives a power failure. interval: a power "
+        "failure after a tenth of a second. none: one that the operating system has had time for. All survive the end "
+        "of the process, however sudden.",
+    )
     create_on_write: bool = Field(False, description="Create a hull when the first batch for it comes.")
+    snapshot_points: int = Field(
+        250_000, ge=1, description="A hull gets a snapshot when it took so many points, and as many as it has."
+    )
 
     tls_cert: Path | None = Field(None, description="PEM file: the server's certificate and those up to the root.")
     tls_key: Path | None = Field(None, description="PEM file: the certificate's private key.")

@@ -6,11 +6,9 @@ from itertools import combinations, permutations, product
 import numpy as np
 import oracle
 import pytest
-from hulls import HULLS
+from hulls import ALGORITHMS, HULLS, ONE_SHOT
 from inputs import ULP
 from killers import KILLERS, PUBLISHED, nearly_collinear
-
-from dynhull import convex_hull, static
 
 
 def tuples(array):
@@ -40,8 +38,7 @@ def half_deleted(make, rows):
     return hull
 
 
-STATIC = {f.__name__: f for f in (static.graham_scan, static.jarvis_march, static.chan, static.monotone_chain)}
-STATIC["convex_hull"] = convex_hull
+STATIC = ALGORITHMS | ONE_SHOT
 DYNAMIC = {
     f"{name}, {build.__name__}": (make, build)
     for (name, make), build in product(HULLS.items(), (bulk, one_by_one, half_deleted))
@@ -74,7 +71,7 @@ def orders(rows):
 def test_static(algorithm, name):
     for rows in orders(KILLERS[name]):
         assert tuples(algorithm(rows)) == vertices(name)
-        if algorithm is not convex_hull:
+        if algorithm in ALGORITHMS.values():
             assert tuples(algorithm(rows, collinear="keep")) == boundary(name)
 
 

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import grpc
 import numpy as np
@@ -111,10 +112,10 @@ def test_a_port_in_use(address: str) -> None:
     assert "Traceback" not in result.stderr
 
 
-def test_python_m_is_the_same_and_says_that_memory_is_all_there_is() -> None:
+def test_python_m_is_the_same_and_keeps_its_data_here(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dynhull_server", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stdout.readline().startswith("dynhull serving on 127.0.0.1:")
         process.terminate()
         assert process.wait(PATIENCE) == 0
-        assert "in memory" in process.stderr.read()
+    assert (tmp_path / "dynhull-data" / "dynhull.db").exists()

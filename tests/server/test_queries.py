@@ -45,6 +45,30 @@ def test_tangents(client: HullClient, filled: str) -> None:
     assert np.array_equal(answer.tangents, expected, equal_nan=True)
 
 
+def test_distance(client: HullClient, filled: str) -> None:
+    answer = client.distance(filled, QUESTIONS)
+    assert answer.revision == 1
+    assert answer.distances.tolist() == DynamicHull(POINTS).distance(QUESTIONS).tolist()
+
+
+def test_intersect_lines(client: HullClient, filled: str) -> None:
+    answer = client.intersect_lines(filled, QUESTIONS[:-1], QUESTIONS[1:])
+    expected = DynamicHull(POINTS).intersect_lines(QUESTIONS[:-1], QUESTIONS[1:])
+    assert answer.revision == 1
+    assert np.isnan(expected).any()
+    assert np.array_equal(answer.crossings, expected, equal_nan=True)
+
+
+def test_a_line_needs_two_points(stub: HullServiceStub, filled: str) -> None:
+    one, two = (points_pb2.Points(coordinates=each) for each in ([1, 2], [3, 4, 1, 2]))
+    same = pb.IntersectLinesRequest(name=filled, origins=two, targets=points_pb2.Points(coordinates=[0, 0, 1, 2]))
+    _, info, _ = refusal(lambda: stub.IntersectLines(same))
+    assert dict(info.metadata) == {"field": "targets", "row": "1", "value": "(1.0, 2.0)"}
+    fewer = pb.IntersectLinesRequest(name=filled, origins=two, targets=one)
+    _, info, _ = refusal(lambda: stub.IntersectLines(fewer))
+    assert dict(info.metadata) == {"field": "targets", "value": "1 points"}
+
+
 def test_count(client: HullClient, filled: str) -> None:
     reference = DynamicHull(POINTS)
     asked = np.concatenate((POINTS[:50], QUESTIONS))
@@ -70,7 +94,7 @@ def test_counts_alone(stub: HullServiceStub, filled: str) -> None:
     assert not response.HasField("measures")
 
 
-@pytest.mark.parametrize("ask", ["locate", "support", "tangents", "count"])
+@pytest.mark.parametrize("ask", ["locate", "support", "tangents", "distance", "count"])
 def test_questions_wait_for_their_revision(client: HullClient, filled: str, ask: str) -> None:
     with pytest.raises(TimeoutError):
         getattr(client, ask)(filled, [[1, 2]], min_revision=2, timeout=0.05)

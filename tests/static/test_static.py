@@ -5,14 +5,14 @@ from itertools import pairwise
 import numpy as np
 import oracle
 import pytest
+from hulls import ALGORITHMS
 from hypothesis import example, given, settings
 from inputs import CIRCLE, points
 
-from dynhull import DynamicHull, convex_hull, static
-from dynhull.static.trace import Groups, Pop, Push, Round, Scan, Turn, Wrap
+from dynhull import static
+from dynhull.static.trace import Groups, Pop, Push, Round, Rounds, Scan, Turn, Wrap
 
-ALGORITHMS = [static.monotone_chain, static.graham_scan, static.jarvis_march, static.chan]
-every = pytest.mark.parametrize("algorithm", ALGORITHMS, ids=lambda f: f.__name__)
+every = pytest.mark.parametrize("algorithm", ALGORITHMS.values(), ids=ALGORITHMS.keys())
 
 
 def tuples(array):
@@ -28,7 +28,6 @@ def tuples(array):
 def test_hull(algorithm, rows):
     assert tuples(algorithm(rows)) == oracle.hull(rows)
     assert tuples(algorithm(rows, collinear="keep")) == oracle.boundary(rows)
-    assert tuples(convex_hull(rows)) == tuples(DynamicHull(rows).vertices()) == oracle.hull(rows)
 
 
 @every
@@ -89,17 +88,28 @@ def hull_of_size(n, h):
 
 
 @pytest.mark.parametrize("n", [1000, 100_000])
-def test_chan_rounds_square_the_guess(n):
+@pytest.mark.parametrize("trace_type", [list, Rounds])
+def test_chan_rounds_square_the_guess(n, trace_type):
     """For 100 vertices the rounds cost n, 2n, 4n, 8n, and the fourth closes, whatever n."""
-    trace = []
+    trace = trace_type()
     hull = static.chan(hull_of_size(n, 100), trace=trace)
     assert len(hull) == 100
+    assert trace_type is list or all(isinstance(event, Round) for event in trace)
     assert [event for event in trace if isinstance(event, Round)] == [
         Round(2, -(-n // 2), 2, n * 1.0, False),
         Round(4, -(-n // 4), 4, n * 2.0, False),
         Round(16, -(-n // 16), 16, n * 4.0, False),
         Round(256, -(-n // 256), 100, n * 8.0, True),
     ]
+
+
+@given(rows=points(80))
+@example(rows=[])
+@example(rows=[(1.0, 1.0)] * 20)
+def test_chan_without_steps_has_the_same_rounds(rows):
+    steps, rounds = [], Rounds()
+    assert tuples(static.chan(rows, trace=steps)) == tuples(static.chan(rows, trace=rounds)) == oracle.hull(rows)
+    assert rounds == [event for event in steps if isinstance(event, Round)]
 
 
 def test_chan_trace_shows_groups_and_tangents():

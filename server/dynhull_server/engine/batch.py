@@ -24,6 +24,16 @@ class Batch:
     count_missing: bool
 
     @property
+    def all_inserts(self) -> Points:
+        """Inserts and destinations."""
+        return np.concatenate((self.inserts, self.destinations)) if len(self.destinations) else self.inserts
+
+    @property
+    def all_deletes(self) -> Points:
+        """Deletes and origins."""
+        return np.concatenate((self.deletes, self.origins)) if len(self.origins) else self.deletes
+
+    @property
     def growth(self) -> int:
         """How many more points there are afterwards, at most."""
         grown = len(self.inserts) + len(self.destinations)

@@ -12,7 +12,7 @@ from dataclasses import asdict
 import numpy as np
 
 from dynhull.static import chan
-from dynhull.static.trace import Round, Trace
+from dynhull.static.trace import Round, Rounds
 
 LOW_PRIORITY = 10
 
@@ -21,7 +21,7 @@ def main() -> None:
     """Read packed points to the end, write one JSON object."""
     os.nice(LOW_PRIORITY)
     points = np.frombuffer(sys.stdin.buffer.read(), np.float64).reshape(-1, 2)
-    trace: Trace = []
+    trace = Rounds()
     vertices = chan(points, trace=trace)
     rounds = [asdict(event) for event in trace if isinstance(event, Round)]
     json.dump({"vertices": vertices.tolist(), "rounds": rounds, "seconds": time.process_time()}, sys.stdout)

@@ -103,3 +103,11 @@ class HullReplacedError(RefusedError):
         super().__init__(f"the hull {name!r} is another one than the one resumed, it has the uid {uid}")
         self.name = name
         self.uid = uid
+
+
+class StorageError(RefusedError):
+    """The disk did not take a change; nothing of it was applied."""
+
+
+class StorageFullError(StorageError):
+    """There is no room on the disk; nothing of the change was applied."""

@@ -28,12 +28,13 @@ class History:
 
     Args:
         most_bytes: how much to remember, about.
-        vertices: the hull at revision 0.
+        vertices: the hull at the revision `first`.
+        first: where the history begins.
     """
 
-    def __init__(self, most_bytes: int, vertices: Points) -> None:
+    def __init__(self, most_bytes: int, vertices: Points, first: int = 0) -> None:
         self._most_bytes = most_bytes
-        self._entries = deque([Entry(0, None, vertices)])
+        self._entries = deque([Entry(first, None, vertices)])
         self._bytes = ENTRY_BYTES
 
     def told(self, first: int, vertices: Points) -> None:

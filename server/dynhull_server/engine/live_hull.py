@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 from collections.abc import Callable
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TypeVar
@@ -11,13 +11,23 @@ from typing import TypeVar
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
+from ..journal.errors import JournalError
+from ..journal.records import Record
 from .batch import Applied, apply_batch
 from .difference import Differences
-from .errors import HullEmptyError, HullNotFoundError, HullReplacedError, LimitExceededError
+from .errors import (
+    HullEmptyError,
+    HullNotFoundError,
+    HullReplacedError,
+    LimitExceededError,
+    RevisionForgottenError,
+    StorageError,
+)
 from .history import History
 from .limits import Limits
 from .producers import Producers
 from .serial import SerialExecutor
+from .storage import HullStore, Restored, storage_error
 from .verification import Verification, verify
 from .writer import SMALL, Write, Writer
 
@@ -34,6 +44,19 @@ class Config:
     max_points: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Birth:
+    """Where a hull comes from: `uid` tells it from others of its name."""
+
+    uid: str
+    created: datetime
+
+    @classmethod
+    def now(cls) -> "Birth":
+        """Of a new hull."""
+        return cls(secrets.token_hex(8), datetime.now(UTC))
+
+
 @dataclass(slots=True)
 class Counts:
     """How much a hull holds at a revision; `points` with multiplicity."""
@@ -46,34 +69,57 @@ class Counts:
 class LiveHull:
     """A hull that many callers read, write and wait for.
 
-    Batches and reads run one at a time in the order they came, so every read sees one revision.
+    Batches and reads run one at a time in the order they came, so every read sees one revision. With a store, nobody
+    is told of a batch before it is committed.
 
     Attributes:
         name: the hull's name.
         config: what it was told at its creation.
         uid: tells it from other hulls of its name.
         created: when.
-        counts: as of the latest revision.
+        counts: as of the latest revision that anybody may be told of.
+        unsaved: points in batches since the last snapshot.
         differences: between the vertices it has told.
     """
 
-    def __init__(self, name: str, config: Config, pool: Executor, limits: Limits) -> None:
+    def __init__(
+        self,
+        name: str,
+        config: Config,
+        pool: Executor,
+        limits: Limits,
+        birth: Birth | None = None,
+        store: HullStore | None = None,
+        restored: Restored | None = None,
+    ) -> None:
+        birth = birth or Birth.now()
         self.name = name
         self.config = config
-        self.uid = secrets.token_hex(8)
-        self.created = datetime.now(UTC)
-        self.counts = Counts(0, 0, 0)
+        self.uid = birth.uid
+        self.created = birth.created
+        self.unsaved = 0
         self.differences = Differences()
-        self._hull = DynamicHull()
+        self._limits = limits
         self._most_points = min(config.max_points or limits.max_points, limits.max_points)
-        self._serial = SerialExecutor(pool, self._wake)
+        self._pool = pool
+        self._serial = SerialExecutor(pool, self._commit, self._roll_back, self._wake)
+        self._store = store
+        self._uncommitted: list[Record] = []
         self._moved: asyncio.Event | None = None
+        self._closed = False
         self._deleted = False
+        self._load(restored or Restored(DynamicHull(), 0, {}))
+        self.counts = self._counts
+
+    def _load(self, restored: Restored) -> None:
+        self._hull = restored.hull
+        self._counts = Counts(restored.revision, len(restored.hull), restored.hull.distinct)
+        self._producers = Producers(self._limits.max_producers, restored.producers)
         self._vertices = self._hull.vertices()
+        self._vertices.setflags(write=False)
         self._vertices_as_of = self._hull.changes
-        self._changed_at = 0
-        self._history = History(limits.history_bytes, self._vertices)
-        self._producers = Producers(limits.max_producers)
+        self._changed_at = restored.revision
+        self._history = History(self._limits.history_bytes, self._vertices, restored.revision)
 
     @property
     def vertex_count(self) -> int:
@@ -86,7 +132,7 @@ class LiveHull:
 
     async def apply(self, write: Write) -> Applied:
         """Apply a batch as the next revision, or raise what refuses it and change nothing."""
-        return await self._serial.run(lambda: self._apply(write), write.rows <= SMALL)
+        return await self._serial.run(lambda: self._apply(write), small=write.rows <= SMALL, writes=True)
 
     async def read(
         self, function: Callable[[DynamicHull], T], rows: int = 0, min_revision: int = 0
@@ -124,12 +170,31 @@ class LiveHull:
         """
         if uid != self.uid:
             raise HullReplacedError(self.name, self.uid)
-        _, vertices = await self._read(0, lambda: self._history.at(revision, self.counts.revision), small=True)
+        try:
+            _, vertices = await self._read(0, lambda: self._history.at(revision, self._counts.revision), small=True)
+        except RevisionForgottenError as error:
+            if self._store is None or revision > error.newest:
+                raise
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(self._pool, self._recall_stored, self._store, error)
         return vertices
 
-    def last_sequence(self, producer: str) -> int:
+    async def last_sequence(self, producer: str) -> int:
         """The last number of a producer that was applied, 0 where there is none."""
-        return self._producers.last(producer)
+        _, last = await self._read(0, lambda: self._producers.last(producer), small=True)
+        return last
+
+    async def snapshot(self) -> None:
+        """Write the points and the producers to the store, beside the traffic."""
+        if self._store is None:
+            return
+        unsaved = self.unsaved
+        counts, (points, producers) = await self._read(
+            0, lambda: (self._hull.points(), self._producers.state()), small=False
+        )
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._pool, self._store.snapshot, counts.revision, points, producers)
+        self.unsaved -= unsaved
 
     async def reached(self, revision: int) -> None:
         """Wait until the hull has this revision or a later one."""
@@ -140,19 +205,41 @@ class LiveHull:
         if self._deleted:
             raise HullNotFoundError(self.name)
 
-    def delete(self) -> None:
-        """Refuse all further work; whoever waits gets HullNotFoundError."""
+    async def create(self) -> None:
+        """Commit the hull to the store, or raise StorageError."""
+        if self._store is not None:
+            await _committed(self._store.create())
+
+    async def delete(self) -> None:
+        """Refuse all further work; whoever waits gets HullNotFoundError. StorageError where it cannot be committed."""
+        await self._serial.run(lambda: self._close(closed=True), small=True)  # after the batches under way
+        if self._store is not None:
+            try:
+                await _committed(self._store.delete())
+            except StorageError:
+                self._close(closed=False)
+                raise
+        self.discard()
+
+    def discard(self) -> None:
+        """As `delete`, of a hull that the store does not know."""
         self._deleted = True
         self._wake()
 
+    def _close(self, *, closed: bool) -> None:
+        self._closed = closed
+
     async def _read(self, min_revision: int, function: Callable[[], T], small: bool) -> tuple[Counts, T]:
-        await self.reached(min_revision)
-        return await self._serial.run(lambda: (self.counts, function()), small)
+        while True:
+            await self.reached(min_revision)
+            counts, result = await self._serial.run(lambda: (self._counts, function()), small=small)
+            if counts.revision >= min_revision:
+                return counts, result
 
     def _apply(self, write: Write) -> Applied:
-        if self._deleted:
+        if self._closed or self._deleted:
             raise HullNotFoundError(self.name)
-        counts = self.counts
+        counts = self._counts
         if write.producer and not self._producers.is_new(write.producer, write.sequence):
             return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True)
         batch = write.make()
@@ -164,8 +251,31 @@ class LiveHull:
             self._history.changed(applied.revision)
         if write.producer:
             self._producers.applied(write.producer, write.sequence)
-        self.counts = Counts(applied.revision, applied.points, self._hull.distinct)
+        self._counts = Counts(applied.revision, applied.points, self._hull.distinct)
+        if self._store is not None:
+            inserts, deletes, lenient = batch.all_inserts, batch.all_deletes, applied.missing > 0
+            self._uncommitted.append(
+                Record(applied.revision, inserts, deletes, write.producer, write.sequence, lenient)
+            )
+            self.unsaved += len(inserts) + len(deletes)
         return applied
+
+    def _commit(self) -> Future[None] | None:
+        if self._store is None or not self._uncommitted:
+            return None
+        records, self._uncommitted = self._uncommitted, []
+        return self._store.append(records)
+
+    def _roll_back(self, failure: BaseException) -> StorageError:
+        assert self._store is not None
+        self._load(self._store.restore())
+        return storage_error(failure)
+
+    def _recall_stored(self, store: HullStore, forgotten: RevisionForgottenError) -> Points:
+        oldest = store.oldest()
+        if forgotten.revision < oldest:
+            raise RevisionForgottenError(forgotten.revision, oldest, forgotten.newest) from None
+        return store.restore(forgotten.revision).hull.vertices()
 
     def _current_vertices(self) -> Points:
         if self._vertices_as_of != self._hull.changes:
@@ -176,6 +286,14 @@ class LiveHull:
         return self._vertices
 
     def _wake(self) -> None:
+        self.counts = self._counts
         if self._moved is not None:
             self._moved.set()
             self._moved = None
+
+
+async def _committed(commit: Future[None]) -> None:
+    try:
+        await asyncio.wrap_future(commit)
+    except JournalError as error:
+        raise storage_error(error) from error

@@ -2,6 +2,7 @@
 
 import time
 from collections import OrderedDict
+from collections.abc import Mapping
 
 from .errors import LimitExceededError, SequenceGapError
 
@@ -16,11 +17,17 @@ class Producers:
 
     Args:
         most: how many producers there may be.
+        last: the last sequence number of each that is known already.
     """
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, last: Mapping[str, int] | None = None) -> None:
         self._most = most
-        self._last: OrderedDict[str, tuple[int, float]] = OrderedDict()
+        now = time.monotonic()
+        self._last = OrderedDict((producer, (sequence, now)) for producer, sequence in (last or {}).items())
+
+    def state(self) -> dict[str, int]:
+        """The last sequence number of each producer."""
+        return {producer: sequence for producer, (sequence, _) in self._last.items()}
 
     def last(self, producer: str) -> int:
         """The last number applied, 0 for a producer that is not known."""

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynhull import KERNEL
 from dynhull.arrays import Points
 from dynhull.static import chan
-from dynhull.static.trace import Round, Trace
+from dynhull.static.trace import Round, Rounds
 
 from . import chan_process
 
@@ -43,7 +44,7 @@ class Verification:
 
 async def verify(points: Points, vertices: Points) -> Verification:
     """Compare `vertices`, a live hull's, with the hull of `points` computed anew, off the event loop."""
-    if len(points) < LARGE:
+    if KERNEL == "cpp" or len(points) < LARGE:  # the kernel leaves the interpreter to others
         recomputed, rounds, seconds = await asyncio.to_thread(_recompute, points)
     else:
         recomputed, rounds, seconds = await _recompute_apart(points)
@@ -62,7 +63,7 @@ def first_difference(live: Points, recomputed: Points) -> Difference | None:
 
 def _recompute(points: Points) -> tuple[Points, list[Round], float]:
     begun = time.thread_time()
-    trace: Trace = []
+    trace = Rounds()
     vertices = chan(points, trace=trace)
     return vertices, [event for event in trace if isinstance(event, Round)], time.thread_time() - begun
 

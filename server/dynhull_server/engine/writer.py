@@ -74,4 +74,4 @@ class Writer:
                 self.refusal = error
             self._notify()
 
-        self._serial.submit(apply, done, write.rows <= SMALL)
+        self._serial.submit(apply, done, small=write.rows <= SMALL, writes=True)

@@ -14,7 +14,7 @@ from grpc_status import rpc_status
 from ..engine.errors import LimitExceededError
 from .access import Access
 from .metrics import Metrics
-from .status import ANSWERED, DrainingError, error_status
+from .status import ANSWERED, DrainingError, StartingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
 
@@ -85,9 +85,14 @@ class Calls:
         self._metrics = metrics
         self._max_streams = max_streams
         self._streams = 0
+        self._starting = True
         self._draining = False
         self._short: set[asyncio.Task[Any]] = set()
         self._waiting: set[asyncio.Task[Any]] = set()
+
+    def ready(self) -> None:
+        """From now on calls are served: before, they are told that the server is starting."""
+        self._starting = False
 
     async def drain(self, grace: float) -> None:
         """End the calls that wait, refuse new ones, and let the short ones finish for up to `grace` seconds."""
@@ -104,6 +109,8 @@ class Calls:
         code = "OK"
         call = None
         try:
+            if self._starting:
+                raise StartingError
             if self._draining:
                 raise DrainingError
             call = Call(self, context, self._authenticate(dict(context.invocation_metadata() or ())))

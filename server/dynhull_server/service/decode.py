@@ -129,6 +129,20 @@ def decode_directions(directions: points_pb2.Points) -> Points:
     return vectors
 
 
+def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Points, Points]:
+    """As many origins as targets, each another point than its target."""
+    origins = decode_points(request.origins, "origins")
+    targets = decode_points(request.targets, "targets")
+    if len(origins) != len(targets):
+        problem = f"there must be as many as there are origins, {len(origins)}"
+        raise InvalidFieldError("targets", f"{len(targets)} points", problem)
+    same = np.flatnonzero((origins == targets).all(axis=1))
+    if same.size:
+        row = int(same[0])
+        raise InvalidFieldError("targets", tuple(targets[row].tolist()), "the same point as the origin: no line", row)
+    return origins, targets
+
+
 def decode_batch(batch: batch_pb2.Batch) -> Batch:
     """A batch whose moves have as many destinations as origins."""
     if batch.missing_points not in MISSING_POINT_POLICIES:

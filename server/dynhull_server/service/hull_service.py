@@ -40,13 +40,14 @@ class HullService:
     async def CreateHull(self, request: pb.CreateHullRequest, call: Call) -> pb.CreateHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        hull = self._engine.create(name, decode.decode_config(request.config))
+        config = decode.decode_config(request.config)
+        hull = await self._engine.create(name, config)
         return pb.CreateHullResponse(hull=encode.encode_hull(hull, hull.counts))
 
     async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        self._engine.delete(name)
+        await self._engine.delete(name)
         return pb.DeleteHullResponse()
 
     async def ListHulls(self, request: pb.ListHullsRequest, call: Call) -> pb.ListHullsResponse:
@@ -110,8 +111,9 @@ class HullService:
         call.access.require_write(name)
         if not request.producer:
             raise decode.InvalidFieldError("producer", "", "which producer?")
-        hull = self._engine.get(name)
-        return pb.GetProducerResponse(last_sequence=hull.last_sequence(decode.decode_producer(request.producer)))
+        producer = decode.decode_producer(request.producer)
+        last = await self._engine.get(name).last_sequence(producer)
+        return pb.GetProducerResponse(last_sequence=last)
 
     # Reads
 
@@ -145,6 +147,25 @@ class HullService:
             revision=counts.revision,
             left=encode.encode_points(np.ascontiguousarray(tangents[:, 0]), encoding),
             right=encode.encode_points(np.ascontiguousarray(tangents[:, 1]), encoding),
+        )
+
+    async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
+        hull = self._read(call, request.name)
+        xy = decode.decode_points(request.points, "points")
+        rows = len(xy) + hull.vertex_count
+        counts, distances = await hull.read(lambda live: live.distance(xy), rows, request.min_revision)
+        return pb.DistanceResponse(revision=counts.revision, distances=distances)
+
+    async def IntersectLines(self, request: pb.IntersectLinesRequest, call: Call) -> pb.IntersectLinesResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        p, q = decode.decode_lines(request)
+        rows = len(p) + hull.vertex_count
+        counts, crossings = await hull.read(lambda live: live.intersect_lines(p, q), rows, request.min_revision)
+        return pb.IntersectLinesResponse(
+            revision=counts.revision,
+            entries=encode.encode_points(np.ascontiguousarray(crossings[:, 0]), encoding),
+            exits=encode.encode_points(np.ascontiguousarray(crossings[:, 1]), encoding),
         )
 
     async def GetHull(self, request: pb.GetHullRequest, call: Call) -> pb.GetHullResponse:
@@ -213,7 +234,7 @@ class HullService:
         name = decode.decode_name(name)
         call.access.require_write(name)
         created = self._create_on_write and not self._engine.has(name)
-        hull = self._engine.create(name, Config()) if created else self._engine.get(name)
+        hull = self._engine.begin(name, Config()) if created else self._engine.get(name)
         try:
             yield hull
         except BaseException:

@@ -14,7 +14,9 @@ from ..engine.hulls import Engine
 from ..engine.limits import Limits
 from ..engine.live_hull import LiveHull
 from ..engine.scrub import scrub
+from ..engine.snapshots import keep_snapshots
 from ..engine.verification import Verification
+from ..journal.journal import Journal
 from ..settings import Settings
 from .access import EVERYTHING, Access, TokenFile
 from .calls import Calls
@@ -50,8 +52,9 @@ class Server:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
+        journal = None if settings.in_memory else Journal(settings.data, settings.durability)
         self._engine = Engine(
-            Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes)
+            Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes), journal
         )
         self._metrics = Metrics()
         authenticate = _anonymous if settings.tokens is None else TokenFile(settings.tokens).access
@@ -69,12 +72,21 @@ class Server:
             ]
         )
         self._scrub: asyncio.Task[None] | None = None
+        self._snapshots: asyncio.Task[None] | None = None
         self._stop_metrics: Callable[[], None] = lambda: None
         self.address = ""
         self.metrics_address = ""
 
-    async def start(self) -> None:
-        """Listen. Raises RuntimeError where the address is taken or is none of this machine's."""
+    async def start(self, progress: Callable[[int, int], None]) -> None:
+        """Listen, take up what is stored, then serve. Meanwhile calls are told so, and health is NOT_SERVING.
+
+        Args:
+            progress: called with the hulls taken up and the hulls in all.
+
+        Raises:
+            RuntimeError: the address is taken or is none of this machine's.
+            JournalError: the stored data cannot be used.
+        """
         service = HullService(
             self._engine,
             self._metrics,
@@ -86,10 +98,17 @@ class Server:
         reflection.enable_server_reflection((SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME), self._server)
         port = self._listen()
         self.address = f"{self._settings.host}:{port}"
-        self._serve_metrics()
-        await self._health.set(SERVICE, SERVING)
-        await self._health.set(SCRUB, SERVING)
+        await self._health.set("", NOT_SERVING)
+        await self._health.set(SERVICE, NOT_SERVING)
         await self._server.start()
+        for note in await self._engine.restore(progress):
+            log.warning("lost", extra={"what": note})
+        self._serve_metrics()
+        self._calls.ready()
+        for name in ("", SERVICE, SCRUB):
+            await self._health.set(name, SERVING)
+        if not self._settings.in_memory:
+            self._snapshots = asyncio.create_task(keep_snapshots(self._engine, self._settings.snapshot_points))
         if self._settings.scrub_cpu:
             self._scrub = asyncio.create_task(
                 scrub(
@@ -106,8 +125,9 @@ class Server:
         """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
         log.info("draining")
         await self._health.enter_graceful_shutdown()
-        if self._scrub is not None:
-            self._scrub.cancel()
+        for task in (self._scrub, self._snapshots):
+            if task is not None:
+                task.cancel()
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_WORDS)
         self._stop_metrics()

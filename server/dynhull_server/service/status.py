@@ -18,6 +18,8 @@ from ..engine.errors import (
     RefusedError,
     RevisionForgottenError,
     SequenceGapError,
+    StorageError,
+    StorageFullError,
 )
 from .access import PermissionDeniedError, UnauthenticatedError
 from .decode import InvalidFieldError
@@ -34,7 +36,11 @@ class DrainingError(Exception):
     """The server is about to stop."""
 
 
-ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError)
+class StartingError(Exception):
+    """The server is not ready yet."""
+
+
+ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError, StartingError)
 
 
 def error_status(error: Exception, batch: int | None = None) -> Status:
@@ -96,6 +102,14 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             return _status(
                 code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where
             )
+        case StorageFullError():
+            quota = QuotaFailure()
+            quota.violations.add(subject="disk", description=str(error))
+            return _status(code.RESOURCE_EXHAUSTED, str(error), "DISK_FULL", {"limit": "disk", **where}, quota)
+        case StorageError():
+            return _status(code.UNAVAILABLE, str(error), "STORAGE_FAILED", where)
+        case StartingError():
+            return _status(code.UNAVAILABLE, "the server is reading its data", "STARTING", where)
         case DrainingError():
             return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error

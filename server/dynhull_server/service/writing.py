@@ -92,7 +92,7 @@ class BatchStream:
         if self._reading is None and not self._ended and writer.rows < MOST_ROWS and writer.batches < MOST_BATCHES:
             self._reading = asyncio.ensure_future(self._call.read())
             self._reading.add_done_callback(lambda _: self._news.set())
-        if self._reading is None or not self._reading.done():
+        if self._reading is None or not self._reading.done():  # it may have come while the caller was busy
             self._news.clear()
             with nullcontext() if self._ended else self._call.cutoff():
                 await self._news.wait()

@@ -1,0 +1,135 @@
+// Chan's algorithm (1996): hulls of small groups, wrapped as one. What dynhull.static.chan does, round by round.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "chain.hpp"
+#include "columns.hpp"
+
+namespace dynhull {
+
+// The hull of a group, counter-clockwise from the least; `turning` is the index of the greatest.
+struct Ring {
+  const Point* points;
+  std::size_t size, turning;
+
+  std::size_t lower_size() const { return turning + 1; }
+  std::size_t upper_size() const { return size - turning + (size > 1); }
+  Point lower(std::size_t i) const { return points[i]; }
+  Point upper(std::size_t i) const { return points[i == 0 ? 0 : size - i]; }
+};
+
+// The first index from `first` on to `last` where `holds`, which once true stays true; `last` where nowhere before.
+template <class Holds>
+std::size_t first_where(std::size_t first, std::size_t last, Holds holds) {
+  while (first < last) {
+    const std::size_t middle = first + (last - first) / 2;
+    if (holds(middle))
+      last = middle;
+    else
+      first = middle + 1;
+  }
+  return first;
+}
+
+// The ring's point that has all of the ring on or to the left of the ray from p; the farthest of several. p is a vertex
+// of the hull of all rings. p where the ring is p alone. O(log size).
+inline Point tangent(Point p, const Ring& ring) {
+  const auto rightward = [&](std::size_t first) {  // to the lower chain from index `first` on
+    const std::size_t last = ring.lower_size() - 1;
+    if (first > last) return ring.size > 1 ? ring.upper(ring.upper_size() - 2) : p;  // p is the greatest point
+    return ring.lower(first_where(
+        first, last, [&](std::size_t i) { return orientation(ring.lower(i), ring.lower(i + 1), p) > 0; }));
+  };
+  const std::size_t i = first_where(0, ring.lower_size(), [&](std::size_t k) { return p <= ring.lower(k); });
+  if (i == 0 && p < ring.lower(0)) return rightward(0);
+  if (i < ring.lower_size()) {
+    if (p == ring.lower(i)) return rightward(i + 1);
+    if (orientation(ring.lower(i - 1), ring.lower(i), p) < 0) return rightward(i);
+  }
+  const std::size_t j = first_where(0, ring.upper_size(), [&](std::size_t k) { return p <= ring.upper(k); });
+  return ring.upper(first_where(
+      0, j - 1, [&](std::size_t k) { return orientation(ring.upper(k), ring.upper(k + 1), p) >= 0; }));
+}
+
+class Chan {
+ public:
+  // A guess, the number of groups, the vertices found before the round closed or was thrown away, and which of these.
+  struct Round {
+    std::uint64_t guess, groups, steps;
+    bool closed;
+  };
+
+  // O(n log h). The points are finite and have no negative zeros.
+  Chan(const Point* points, std::size_t count) : points_(points, points + count), scratch_(count) {
+    if (count == 0) return;
+    const Point start = *std::min_element(points_.begin(), points_.end());
+    rings_.reserve(count);
+    for (const Point& p : points_) rings_.push_back({&p, 1, 0});
+    std::uint64_t guess = 2, merged = 2;
+    bool closed = false;
+    while (!closed) {
+      merge(merged);
+      closed = wrap(start, guess);
+      rounds.push_back({guess, rings_.size(), vertices.size(), closed});
+      merged = guess;
+      guess *= guess;
+    }
+  }
+
+  std::vector<Point> vertices;
+  std::vector<Round> rounds;
+
+ private:
+  // Replace each `count` rings in succession by their hull. The hull of a group is that of its subgroups' vertices.
+  void merge(std::uint64_t count) {
+    Point* free = points_.data();
+    std::size_t groups = 0;
+    for (std::size_t from = 0, to; from < rings_.size(); from = to) {
+      to = from + static_cast<std::size_t>(std::min<std::uint64_t>(count, rings_.size() - from));
+      Point* end = free;
+      for (std::size_t i = from; i < to; ++i) end = std::copy_n(rings_[i].points, rings_[i].size, end);
+      rings_[groups] = ring_of(free, end);
+      free += rings_[groups++].size;
+    }
+    rings_.erase(rings_.begin() + static_cast<std::ptrdiff_t>(groups), rings_.end());
+  }
+
+  Ring ring_of(Point* first, Point* last) {
+    sort_points(first, scratch_.data(), static_cast<std::size_t>(last - first));
+    Chain upper(UPPER, scratch_.data()), lower(LOWER, first);
+    for (const Point* p = first; p < last; ++p) upper.push(*p);
+    for (const Point* p = first; p < last; ++p) lower.push(*p);
+    const std::size_t turning = lower.points().size() - 1;
+    Point* end = first + turning + 1;
+    if (turning > 0) end = std::reverse_copy(upper.points().begin() + 1, upper.points().end() - 1, end);
+    return {first, static_cast<std::size_t>(end - first), turning};
+  }
+
+  // Gift wrapping from the least point. Whether the hull closes in `limit` vertices.
+  bool wrap(Point start, std::size_t limit) {
+    vertices = {start};
+    while (true) {
+      const Point p = vertices.back();
+      Point best = p;
+      for (const Ring& ring : rings_) {
+        const Point q = tangent(p, ring);
+        if (best == p) {
+          best = q;
+        } else if (!(q == p)) {
+          const int side = orientation(p, best, q);
+          if (side < 0 || (side == 0 && ((p < best && best < q) || (p > best && best > q)))) best = q;
+        }
+      }
+      if (best == start || best == p) return true;
+      if (vertices.size() == limit) return false;
+      vertices.push_back(best);
+    }
+  }
+
+  std::vector<Point> points_, scratch_;
+  std::vector<Ring> rings_;
+};
+
+}  // namespace dynhull

@@ -1,0 +1,79 @@
+// Which points are certainly no vertices: a part of the inside of a hull, as one box for each column of x.
+#pragma once
+
+#include <array>
+
+#include "chain.hpp"
+#include "columns.hpp"
+
+namespace dynhull {
+
+// How high and wide a box is comes from rounded arithmetic; whether it lies in the hull is decided exactly, corner by
+// corner, and a box that does not is left out. A hull that contains the corners contains the box, and a point in the
+// open box is no vertex. The points of a column lie between two x that are in other columns.
+class Interior {
+ public:
+  explicit Interior(const Chains& hull) {
+    boxes_.fill({INFINITY, -INFINITY});
+    if (hull.lower.size() < 2) return;
+    const double left = hull.lower.front().x, right = hull.lower.back().x;
+    columns_ = Columns(left, right, COLUMNS);
+    const double width = (right - left) / (COLUMNS - 1);
+    const auto of_column = [&](unsigned column, double x) { return columns_(x) == column; };
+    Walk lower_from(hull.lower), lower_to(hull.lower), upper_from(hull.upper), upper_to(hull.upper);
+    for (unsigned j = 1; j + 1 < COLUMNS; ++j) {
+      const double from = left + (j - OVERLAP) * width, to = left + (j + 1 + OVERLAP) * width;
+      if (!(left < from && to < right && of_column(j - 1, from) && of_column(j + 1, to))) continue;
+      lower_from.advance(from);
+      lower_to.advance(to);
+      upper_from.advance(from);
+      upper_to.advance(to);
+      const double low = std::max(lower_from.height(from), lower_to.height(to));
+      const double high = std::min(upper_from.height(from), upper_to.height(to));
+      const double margin = MARGIN * (high - low);
+      const Box box = {low + margin, high - margin};
+      if (box.low < box.high && std::isfinite(box.low) && std::isfinite(box.high) &&
+          lower_from.side({from, box.low}) >= 0 && lower_to.side({to, box.low}) >= 0 &&
+          upper_from.side({from, box.high}) <= 0 && upper_to.side({to, box.high}) <= 0)
+        boxes_[j] = box;
+    }
+  }
+
+  // How many of the points it does not hold; they go to `outside`, which has room for all. Those with coordinates that
+  // are not finite are among them.
+  std::size_t discard(std::span<const Point> points, Point* outside) const {
+    const Columns columns = columns_;  // a copy that `outside` cannot overlap stays in registers
+    std::size_t count = 0;
+    for (Point p : points) {
+      const Box& box = boxes_[columns(p.x)];
+      if (!(box.low < p.y && p.y < box.high)) outside[count++] = p;
+    }
+    return count;
+  }
+
+ private:
+  static constexpr unsigned COLUMNS = 1024;
+  static constexpr double OVERLAP = 0x1p-6;  // of columns, in widths, for rounding
+  static constexpr double MARGIN = 0x1p-20;  // of a box, in heights, for rounding
+  struct Box {
+    double low, high;
+  };
+
+  // A chain's edge at growing x, strictly between the chain's ends.
+  struct Walk {
+    explicit Walk(std::span<const Point> chain) : edge(chain.data()) {}
+    void advance(double x) {
+      while (edge[1].x < x) ++edge;
+    }
+    double height(double x) const {
+      return edge[0].y + (x - edge[0].x) / (edge[1].x - edge[0].x) * (edge[1].y - edge[0].y);
+    }
+    int side(Point p) const { return orientation(edge[0], edge[1], p); }
+    const Point* edge;
+  };
+
+  Columns columns_;
+  std::array<Box, COLUMNS> boxes_;
+};
+
+}  // namespace dynhull

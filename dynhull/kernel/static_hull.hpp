@@ -1,0 +1,187 @@
+// The hull of points that stay: discard, sort, chain.
+//
+// The hull of a sample tells of most points that they are no vertices. What is left goes into columns of x, above and
+// below the line through the ends apart; each column is sorted and chained (Andrew 1979) with exact orientations. Two
+// threads share each pass over the points, and then take a chain each.
+#pragma once
+
+#include <future>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "interior.hpp"
+
+namespace dynhull {
+
+// Run both, at the same time where asked to and possible.
+template <class First, class Second>
+void both(bool threads, First first, Second second) {
+  std::future<void> other;
+  if (threads) try {
+      other = std::async(std::launch::async, second);
+    } catch (const std::system_error&) {  // no thread to be had
+    }
+  first();
+  other.valid() ? other.get() : second();
+}
+
+// The hull of points in two parts. Its memory outlives the points; it reads each of them at most three times, and stays
+// in its bounds even where they change meanwhile.
+class StaticHull {
+ public:
+  using Part = std::span<const Point>;
+
+  StaticHull(Part first, Part second, bool threads) : threads_(threads), parts_{first, second} {
+    find_ends();
+    if (finite_ && size() > 0) {
+      place();
+      both(
+          threads_, [&] { chain(LOWER); }, [&] { chain(UPPER); });
+    }
+  }
+
+  bool finite() const { return finite_; }  // false: a coordinate is not, and there is no hull
+  Chains chains() const { return {chains_[LOWER], chains_[UPPER]}; }
+
+ private:
+  std::size_t size() const { return parts_[0].size() + parts_[1].size(); }
+
+  void find_ends() {
+    Point least[2] = {}, greatest[2] = {};
+    bool finite[2] = {true, true};
+    const auto find = [&](int part) {
+      if (parts_[part].empty()) return;
+      Point low = parts_[part].front(), high = low;
+      bool all_finite = true;
+      for (Point p : parts_[part]) {
+        all_finite &= (p.x - p.x == 0) & (p.y - p.y == 0);
+        if (p.x <= low.x && p < low) low = p;
+        if (p.x >= high.x && p > high) high = p;
+      }
+      least[part] = low;
+      greatest[part] = high;
+      finite[part] = all_finite;
+    };
+    both(
+        threads_, [&] { find(0); }, [&] { find(1); });
+    finite_ = finite[0] && finite[1];
+    const int some = parts_[0].empty() ? 1 : 0, other = parts_[1].empty() ? 0 : 1;
+    least_ = positive_zeros(std::min(least[some], least[other]));
+    greatest_ = positive_zeros(std::max(greatest[some], greatest[other]));
+  }
+
+  // Put the points in columns: the lower chain's, then the upper chain's. Those on the line through the ends are none.
+  void place() {
+    constexpr std::size_t MOST_COLUMNS = 4096, A_COLUMN = 64;
+    width_ = static_cast<unsigned>(std::min(std::bit_ceil(size() / A_COLUMN + 1), MOST_COLUMNS));
+    const Columns columns(least_.x, greatest_.x, width_);
+    const unsigned none = 2 * width_;
+    std::unique_ptr<std::uint16_t[]> keys[2];
+    std::vector<std::size_t> next[2];  // at first how many points each column has, then where its next one goes
+    const auto count = [&](int part) {
+      next[part].assign(none + 1, 0);
+      keys[part] = std::make_unique_for_overwrite<std::uint16_t[]>(parts_[part].size());
+      std::uint16_t* key = keys[part].get();
+      for (Point p : parts_[part]) {
+        const int side = orientation(least_, greatest_, p);
+        const unsigned column = side == 0 ? none : columns(p.x) + (side > 0 ? width_ : 0);
+        ++next[part][column];
+        *key++ = static_cast<std::uint16_t>(column);
+      }
+    };
+    both(
+        threads_, [&] { count(0); }, [&] { count(1); });
+
+    starts_.resize(none + 1);
+    std::size_t total = 0;
+    for (unsigned column = 0; column <= none; ++column) {
+      if (column % width_ == 0) total += column == 0 ? 1 : 2;  // room for the ends, which go into both chains
+      starts_[column] = total;
+      for (auto& part : next) total += std::exchange(part[column], total);
+    }
+    total = starts_[none] - 1;
+    memory_ = std::make_unique_for_overwrite<Point[]>(total);
+    const auto put = [&](int part) {
+      const std::uint16_t* key = keys[part].get();
+      for (Point p : parts_[part]) {
+        const unsigned column = *key++;
+        if (column != none) memory_[next[part][column]++] = positive_zeros(p);
+      }
+    };
+    both(
+        threads_, [&] { put(0); }, [&] { put(1); });
+  }
+
+  // Sort column by column and chain. The chain overwrites what it has read.
+  void chain(Side side) {
+    const std::size_t* start = &starts_[side == LOWER ? 0 : width_];
+    const auto end = [&](unsigned column) { return start[column + 1] - (column + 1 == width_ ? 2 : 0); };
+    std::size_t most = 0;
+    for (unsigned column = 0; column < width_; ++column) most = std::max(most, end(column) - start[column]);
+    const auto scratch = std::make_unique_for_overwrite<Point[]>(most);
+    Chain chain(side, &memory_[start[0] - 1]);
+    chain.push(least_);
+    for (unsigned column = 0; column < width_; ++column) {
+      Point* const first = &memory_[start[column]];
+      const std::size_t count = end(column) - start[column];
+      sort_points(first, scratch.get(), count);
+      for (std::size_t i = 0; i < count; ++i) chain.push(first[i]);
+    }
+    chain.push(greatest_);
+    chains_[side] = chain.points();
+  }
+
+  static Point positive_zeros(Point p) { return {p.x + 0.0, p.y + 0.0}; }
+
+  bool threads_, finite_ = true;
+  Part parts_[2];
+  Point least_, greatest_;
+  unsigned width_ = 0;
+  std::vector<std::size_t> starts_;
+  std::unique_ptr<Point[]> memory_;
+  std::span<const Point> chains_[2];
+};
+
+// Whether to discard points by a sample's hull first, and to use two threads; decided by the input where not told.
+struct Means {
+  std::optional<bool> discard, threads;
+};
+
+// What to discard of these points; nothing where it would be too few to pay.
+inline std::optional<Interior> interior_of(const Point* points, std::size_t count, bool always) {
+  constexpr std::size_t SAMPLE = 4096, WORTHWHILE = SAMPLE / 8;
+  if (count < 8 * SAMPLE && !always) return {};
+  std::vector<Point> sample(std::min(SAMPLE, count));
+  const std::size_t stride = count / std::max<std::size_t>(sample.size(), 1);
+  for (std::size_t i = 0; i < sample.size(); ++i)
+    sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, to follow no pattern of the input
+  const StaticHull hull(sample, {}, false);
+  if (!hull.finite()) return {};
+  const Interior interior(hull.chains());
+  const std::size_t kept = interior.discard(sample, sample.data());
+  if (sample.size() - kept < WORTHWHILE && !always) return {};
+  return interior;
+}
+
+// O(n log n), and O(n) where few points are near the hull.
+inline StaticHull static_hull(const Point* points, std::size_t count, Means means = {}) {
+  constexpr std::size_t MANY = std::size_t{1} << 17;
+  const bool threads = means.threads.value_or(count >= MANY && std::thread::hardware_concurrency() > 1);
+  const std::size_t half = threads ? count / 2 : count;
+  const std::span<const Point> parts[] = {{points, half}, {points + half, count - half}};
+  const auto interior = means.discard.value_or(true) ? interior_of(points, count, means.discard.has_value()) : std::nullopt;
+  if (!interior) return StaticHull(parts[0], parts[1], threads);
+  const auto candidates = std::make_unique_for_overwrite<Point[]>(count + 1);
+  std::size_t kept[2];
+  both(
+      threads, [&] { kept[0] = interior->discard(parts[0], candidates.get()); },
+      [&] { kept[1] = interior->discard(parts[1], candidates.get() + half); });
+  return StaticHull({candidates.get(), kept[0]}, {candidates.get() + half, kept[1]},
+                    threads && (means.threads.has_value() || kept[0] + kept[1] >= MANY));
+}
+
+}  // namespace dynhull

@@ -1,0 +1,51 @@
+"""The fastest hull of points that stay."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Points, as_points
+from ..implementation import kernel
+from .monotone_chain import monotone_chain
+
+
+def convex_hull(xy: npt.ArrayLike) -> Points:
+    """Convex hull by the fastest way there is. O(n log n), and O(n) where few points are near the hull.
+
+    With the kernel, the exact hull of a sample discards most points unsorted: those in boxes that are proven to lie
+    inside it (in the manner of Akl and Toussaint, "A fast convex hull algorithm", 1978). The others are sorted and
+    chained (Andrew 1979), every turn exact, large inputs in two threads. Other Python threads run meanwhile. Without
+    the kernel, this is `monotone_chain`. A contiguous float64 array is read where it is; anything else is converted.
+
+    Args:
+        xy: (n, 2) array-like of finite numbers.
+
+    Returns:
+        (h, 2) vertices, counter-clockwise from the lexicographically smallest; strict: points on an edge are none. All
+        points on one line: two vertices.
+
+    Raises:
+        ValueError, TypeError: bad input; the message names the first bad row.
+
+    >>> convex_hull([[0, 0], [1, 0], [2, 0], [1, 1], [1, 0.5]]).tolist()
+    [[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]
+    """
+    if kernel is None:
+        return monotone_chain(xy)
+    # The kernel finds coordinates that are not finite while it works. Only then, or where the array is not plain, does
+    # the input go through the checks, which say what is wrong.
+    hull: Points | None = kernel.convex_hull(xy) if _is_plain(xy) else None
+    return kernel.convex_hull(as_points(xy)) if hull is None else hull
+
+
+def _is_plain(xy: Any) -> bool:
+    """Whether the kernel can read it where it is."""
+    return (
+        type(xy) is np.ndarray
+        and xy.dtype == np.float64
+        and xy.ndim == 2
+        and xy.shape[1] == 2
+        and xy.flags.c_contiguous
+        and xy.flags.aligned
+    )
