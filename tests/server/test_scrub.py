@@ -50,7 +50,7 @@ def test_a_wrong_hull_is_found() -> None:
         engine = Engine(LIMITS)
         random = np.random.default_rng(8)
         for name in ("good", "large", "wrong"):
-            await insert(engine.create(name, Config()), random.normal(size=(LARGE if name == "large" else 50, 2)))
+            await insert(await engine.create(name, Config()), random.normal(size=(LARGE if name == "large" else 50, 2)))
         wrong = engine.get("wrong")
         wrong._hull = Liar(wrong._hull.points())
         wrong._vertices_as_of = -1
@@ -69,7 +69,7 @@ def test_a_hull_that_is_as_it_was_is_left_out() -> None:
     async def run() -> None:
         engine = Engine(LIMITS)
         for name in ("a", "b"):
-            await insert(engine.create(name, Config()), np.ones((1, 2)))
+            await insert(await engine.create(name, Config()), np.ones((1, 2)))
         seen = await rounds(engine, 3)
         assert [name for name, _ in seen] == ["a", "b"]
         engine.close()
