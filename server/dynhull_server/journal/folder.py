@@ -10,7 +10,7 @@ DATABASE = "dynhull.db"
 LOCK = "dynhull.lock"
 APPLICATION_ID = 0x64796E68  # "dynh"
 FORMAT = 1
-PAGE_BYTES = 16384  # a batch of many points spans few pages
+PAGE_BYTES = 8192  # a batch of many points spans few pages, and wastes half of one
 
 SCHEMA = """
 CREATE TABLE hulls (
