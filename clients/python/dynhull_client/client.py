@@ -195,7 +195,7 @@ class HullClient:
         min_revision: int = 0,
         timeout: float | None = None,
     ) -> Crossings:
-        """Where the lines through each of (n, 2) points p and q enter and leave the hull; NaN for a line that misses."""
+        """Where the lines through each of (n, 2) points p and q enter and leave the hull; NaN for one that misses."""
         request = pb.IntersectLinesRequest(
             name=name,
             min_revision=min_revision,
