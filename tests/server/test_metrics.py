@@ -4,13 +4,11 @@ import json
 import re
 import shutil
 import subprocess
-import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from server_process import PATIENCE, Server, run, server_process
+from metrics import fetch, measured, scrape
+from server_process import PATIENCE, run
 
 from dynhull_client import HullClient, PointMissingError
 
@@ -26,25 +24,6 @@ def program(name: str) -> str:
     path = shutil.which(name)
     assert path, f"{name} is not installed; tests/peers.sh installs it (Debian's package prometheus)"
     return path
-
-
-@contextmanager
-def measured(*options: str) -> Iterator[tuple[Server, str]]:
-    """A server, and the address of its metrics."""
-    with server_process("--metrics-port", "0", *options) as server:
-        line = server.process.stdout.readline()
-        yield server, re.fullmatch(r"metrics on http://(.*)/metrics\n", line).group(1)
-
-
-def scrape(address: str) -> dict[str, float]:
-    text = fetch(f"http://{address}/metrics")
-    samples = (line.rsplit(" ", 1) for line in text.splitlines() if not line.startswith("#"))
-    return {name: float(value) for name, value in samples}
-
-
-def fetch(url: str) -> str:
-    with urllib.request.urlopen(url, timeout=PATIENCE) as response:
-        return response.read().decode()
 
 
 def work(client: HullClient) -> None:

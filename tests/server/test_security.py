@@ -54,6 +54,8 @@ EVERY_CALL = {
     "Count": lambda stub, name: stub.Count(pb.CountRequest(name=name)),
     "Support": lambda stub, name: stub.Support(pb.SupportRequest(name=name)),
     "Tangents": lambda stub, name: stub.Tangents(pb.TangentsRequest(name=name)),
+    "Distance": lambda stub, name: stub.Distance(pb.DistanceRequest(name=name)),
+    "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
     "Verify": lambda stub, name: stub.Verify(pb.VerifyRequest(name=name)),
@@ -159,17 +161,20 @@ def test_tokens_are_read_again_when_they_change(tmp_path: Path) -> None:
 
     replace(entry("old", [""], [""]))
     options = ("--tokens", str(tokens), "--log-level", "error")
-    with server_process(*options, complaints="stay as they were") as server:
-        with HullClient(server.address, token="old") as old, HullClient(server.address, token="new") as new:
-            old.create_hull("a")
-            with pytest.raises(UnauthenticatedError):
-                new.get_hull("a")
-            replace(entry("new", [""], []))
-            with pytest.raises(UnauthenticatedError):
-                old.get_hull("a")
-            assert new.get_hull("a").info.name == "a"
-            replace("[[token")
-            assert new.get_hull("a").info.name == "a"
+    with (
+        server_process(*options, complaints="stay as they were") as server,
+        HullClient(server.address, token="old") as old,
+        HullClient(server.address, token="new") as new,
+    ):
+        old.create_hull("a")
+        with pytest.raises(UnauthenticatedError):
+            new.get_hull("a")
+        replace(entry("new", [""], []))
+        with pytest.raises(UnauthenticatedError):
+            old.get_hull("a")
+        assert new.get_hull("a").info.name == "a"
+        replace("[[token")
+        assert new.get_hull("a").info.name == "a"
 
 
 def test_a_new_token_and_its_entry(tmp_path: Path) -> None:

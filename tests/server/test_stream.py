@@ -151,7 +151,7 @@ def test_exactly_once_over_broken_connections(address: str, name: str, seed: int
                         if acknowledged == cut_at:
                             way.cut()
                 except grpc.RpcError as error:
-                    assert error.code() == grpc.StatusCode.UNAVAILABLE
+                    assert error.code() == grpc.StatusCode.UNAVAILABLE  # noqa: PT017  # the last one ends in peace
         live = direct.get_hull(name)
         everything = np.concatenate(batches)
         assert (live.revision, live.info.points) == (total, len(everything))
@@ -192,7 +192,7 @@ def test_a_full_hull_and_producers_without_room() -> None:
         assert limit("a", insert([[0, 0]]), producer="q", sequence=1) == ("max_producers", "1")
         watch = stub.Watch(pb.WatchRequest(name="a"))
         next(watch)
-        code, info, _ = refusal(lambda: list(stub.Watch(pb.WatchRequest(name="a"))))
+        _, info, _ = refusal(lambda: list(stub.Watch(pb.WatchRequest(name="a"))))
         assert dict(info.metadata) == {"limit": "max_streams", "value": "1"}
         watch.cancel()
         assert stub.GetHull(pb.GetHullRequest(name="a")).hull.point_count == 3

@@ -19,7 +19,7 @@ from .batch import Missing, encode_batch
 from .connection import open_channel
 from .errors import error_of
 from .ingest import Ingest
-from .messages import Applied, Counted, Hull, HullInfo, Located, Supported, Tangents, Verification
+from .messages import Applied, Counted, Crossings, Distances, Hull, HullInfo, Located, Supported, Tangents, Verification
 from .watch import HullCopy, Watch
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
@@ -176,6 +176,35 @@ class HullClient:
         response = self._call(self._stub.Tangents, request, timeout)
         left, right = messages.decode_points(response.left), messages.decode_points(response.right)
         return Tangents(response.revision, np.stack((left, right), axis=1))
+
+    def distance(
+        self, name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
+    ) -> Distances:
+        """How far each of (n, 2) points is from the hull: 0 inside and on the boundary, infinite from an empty hull."""
+        points = messages.encode_points(as_points(xy, "xy"))
+        request = pb.DistanceRequest(name=name, min_revision=min_revision, points=points)
+        response = self._call(self._stub.Distance, request, timeout)
+        return Distances(response.revision, np.array(response.distances, np.float64))
+
+    def intersect_lines(
+        self,
+        name: str,
+        p: npt.ArrayLike,
+        q: npt.ArrayLike,
+        *,
+        min_revision: int = 0,
+        timeout: float | None = None,
+    ) -> Crossings:
+        """Where the lines through each of (n, 2) points p and q enter and leave the hull; NaN for one that misses."""
+        request = pb.IntersectLinesRequest(
+            name=name,
+            min_revision=min_revision,
+            origins=messages.encode_points(as_points(p, "p")),
+            targets=messages.encode_points(as_points(q, "q")),
+        )
+        response = self._call(self._stub.IntersectLines, request, timeout)
+        entries, exits = messages.decode_points(response.entries), messages.decode_points(response.exits)
+        return Crossings(response.revision, np.stack((entries, exits), axis=1))
 
     def last_sequence(self, name: str, producer: str, *, timeout: float | None = None) -> int:
         """The number of the last batch of a producer that was applied; 0 where there is none."""

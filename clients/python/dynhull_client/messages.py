@@ -111,6 +111,22 @@ class Supported:
 
 
 @dataclass(frozen=True, slots=True)
+class Distances:
+    """Distances of points to the hull, (n,): 0 inside and on the boundary, infinite from an empty hull."""
+
+    revision: int
+    distances: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Crossings:
+    """(n, 2, 2) where lines enter and leave the hull, as of `DynamicHull.intersect_lines`."""
+
+    revision: int
+    crossings: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class Tangents:
     """(n, 2, 2) left and right tangent points, as of `DynamicHull.tangents`."""
 

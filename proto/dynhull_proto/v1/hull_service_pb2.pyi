@@ -224,6 +224,48 @@ class TangentsResponse(_message.Message):
     right: _points_pb2.Points
     def __init__(self, revision: _Optional[int] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
+class DistanceRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "points")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    points: _points_pb2.Points
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class DistanceResponse(_message.Message):
+    __slots__ = ("revision", "distances")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    DISTANCES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    distances: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class IntersectLinesRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "origins", "targets", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ORIGINS_FIELD_NUMBER: _ClassVar[int]
+    TARGETS_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    origins: _points_pb2.Points
+    targets: _points_pb2.Points
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class IntersectLinesResponse(_message.Message):
+    __slots__ = ("revision", "entries", "exits")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENTRIES_FIELD_NUMBER: _ClassVar[int]
+    EXITS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    entries: _points_pb2.Points
+    exits: _points_pb2.Points
+    def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
 class GetHullRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "view")
     NAME_FIELD_NUMBER: _ClassVar[int]

@@ -103,6 +103,16 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsResponse.FromString,
                 _registered_method=True)
+        self.Distance = channel.unary_unary(
+                '/dynhull.v1.HullService/Distance',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceResponse.FromString,
+                _registered_method=True)
+        self.IntersectLines = channel.unary_unary(
+                '/dynhull.v1.HullService/IntersectLines',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesResponse.FromString,
+                _registered_method=True)
         self.GetHull = channel.unary_unary(
                 '/dynhull.v1.HullService/GetHull',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullRequest.SerializeToString,
@@ -216,6 +226,20 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def Distance(self, request, context):
+        """The distance of points to the hull.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def IntersectLines(self, request, context):
+        """Where lines enter and leave the hull.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def GetHull(self, request, context):
         """The hull's counts, vertices and measures.
         """
@@ -295,6 +319,16 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.Tangents,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsResponse.SerializeToString,
+            ),
+            'Distance': grpc.unary_unary_rpc_method_handler(
+                    servicer.Distance,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceResponse.SerializeToString,
+            ),
+            'IntersectLines': grpc.unary_unary_rpc_method_handler(
+                    servicer.IntersectLines,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesResponse.SerializeToString,
             ),
             'GetHull': grpc.unary_unary_rpc_method_handler(
                     servicer.GetHull,
@@ -623,6 +657,60 @@ class HullService(object):
             '/dynhull.v1.HullService/Tangents',
             dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Distance(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Distance',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def IntersectLines(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/IntersectLines',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -73,6 +73,10 @@ class HullServiceStub:
     """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
     Tangents: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]
     """The tangent points seen from outside. Exact."""
+    Distance: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]
+    """The distance of points to the hull."""
+    IntersectLines: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]
+    """Where lines enter and leave the hull."""
     GetHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]
     """The hull's counts, vertices and measures."""
     Watch: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]
@@ -127,6 +131,10 @@ class HullServiceAsyncStub(HullServiceStub):
     """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
     Tangents: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]  # type: ignore[assignment]
     """The tangent points seen from outside. Exact."""
+    Distance: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]  # type: ignore[assignment]
+    """The distance of points to the hull."""
+    IntersectLines: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]  # type: ignore[assignment]
+    """Where lines enter and leave the hull."""
     GetHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]  # type: ignore[assignment]
     """The hull's counts, vertices and measures."""
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
@@ -244,6 +252,22 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.TangentsResponse, _abc.Awaitable[_hull_service_pb2.TangentsResponse]]:
         """The tangent points seen from outside. Exact."""
+
+    @_abc_1.abstractmethod
+    def Distance(
+        self,
+        request: _hull_service_pb2.DistanceRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.DistanceResponse, _abc.Awaitable[_hull_service_pb2.DistanceResponse]]:
+        """The distance of points to the hull."""
+
+    @_abc_1.abstractmethod
+    def IntersectLines(
+        self,
+        request: _hull_service_pb2.IntersectLinesRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.IntersectLinesResponse, _abc.Awaitable[_hull_service_pb2.IntersectLinesResponse]]:
+        """Where lines enter and leave the hull."""
 
     @_abc_1.abstractmethod
     def GetHull(

@@ -1,6 +1,7 @@
 """A batch: inserts, deletes and moves that are applied all or none."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -62,24 +63,43 @@ def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
     inserted = len(batch.inserts) + len(batch.destinations)
     to_delete = len(batch.deletes) + len(batch.origins)
     changes = hull.changes
-    if to_delete == 0:
+    if inserted + to_delete == 1:
+        deleted = _apply_one(hull, batch)
+    elif to_delete == 0:
         deleted = 0
-        if inserted == 1:  # what most messages of a live feed hold
-            x, y = batch.inserts[0].tolist()
-            hull.insert(x, y)
-        else:
-            hull.insert_many(batch.inserts)
+        hull.insert_many(batch.all_inserts)
     else:
-        points = np.concatenate((batch.inserts, batch.destinations, batch.deletes, batch.origins))
-        ops = np.repeat(np.array([1, -1], np.int8), [inserted, to_delete])
-        try:
-            applied = hull.apply(ops, points, missing="ignore" if batch.count_missing else "raise")
-        except MissingPointError as error:
-            if error.row is None:
-                raise
-            row = error.row - inserted
-            if row < len(batch.deletes):
-                raise PointMissingError("deletes", row, error.point) from None
-            raise PointMissingError("origins", row - len(batch.deletes), error.point) from None
-        deleted = applied - inserted
+        deleted = _apply_many(hull, batch)
     return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))
+
+
+def _apply_one(hull: DynamicHull, batch: Batch) -> int:
+    """One insert or one delete, what most messages of a live feed hold: without the cost of arrays."""
+    if len(batch.inserts):
+        x, y = batch.inserts[0].tolist()
+        hull.insert(x, y)
+        return 0
+    x, y = batch.deletes[0].tolist()
+    try:
+        hull.delete(x, y)
+    except MissingPointError as error:
+        if batch.count_missing:
+            return 0
+        raise PointMissingError("deletes", 0, error.point) from None
+    return 1
+
+
+def _apply_many(hull: DynamicHull, batch: Batch) -> int:
+    inserts, deletes = batch.all_inserts, batch.all_deletes
+    ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
+    missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
+    try:
+        applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
+    except MissingPointError as error:
+        if error.row is None:
+            raise
+        row = error.row - len(inserts)
+        if row < len(batch.deletes):
+            raise PointMissingError("deletes", row, error.point) from None
+        raise PointMissingError("origins", row - len(batch.deletes), error.point) from None
+    return applied - len(inserts)

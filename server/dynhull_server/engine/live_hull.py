@@ -14,6 +14,7 @@ from dynhull.arrays import Points
 from ..journal.errors import JournalError
 from ..journal.records import Record
 from .batch import Applied, apply_batch
+from .difference import Differences
 from .errors import (
     HullEmptyError,
     HullNotFoundError,
@@ -78,6 +79,7 @@ class LiveHull:
         created: when.
         counts: as of the latest revision that anybody may be told of.
         unsaved: points in batches since the last snapshot.
+        differences: between the vertices it has told.
     """
 
     def __init__(
@@ -96,6 +98,7 @@ class LiveHull:
         self.uid = birth.uid
         self.created = birth.created
         self.unsaved = 0
+        self.differences = Differences()
         self._limits = limits
         self._most_points = min(config.max_points or limits.max_points, limits.max_points)
         self._pool = pool

@@ -1,16 +1,15 @@
 """What a watcher holds of a hull: its vertices, or the extreme ones in some directions."""
 
-import asyncio
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from .live_hull import FEW_VERTICES, Counts, LiveHull
+from .difference import Difference
+from .live_hull import Counts, LiveHull
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,19 +19,6 @@ class Snapshot:
     counts: Counts
     vertices: Points
     uid: str
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """How to make one list of vertices from another.
-
-    Strike the rows at `removed`, move the first `rotation` of the rest to the end, put in the rows that stand at
-    `added` in the new list.
-    """
-
-    removed: npt.NDArray[np.intp]
-    added: npt.NDArray[np.intp]
-    rotation: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +83,7 @@ class VerticesView:
         held, self._held = self._held, vertices
         if vertices is held:
             return Progress(counts)
-        if len(held) + len(vertices) <= FEW_VERTICES:
-            change = difference(held, vertices)
-        else:
-            change = await asyncio.to_thread(difference, held, vertices)
+        change = await self._hull.differences.between(held, vertices)
         if change.removed.size or change.added.size:
             return Change(counts, held, vertices, change)
         return Progress(counts)
@@ -138,27 +121,6 @@ class SketchView:
         if all(map(_same, before, self._held)):
             return Progress(counts)
         return Sketch(counts, *self._held)
-
-
-def difference(old: Points, new: Points) -> Difference:
-    """How to make the vertices `new` from the vertices `old`, both counter-clockwise. O(h).
-
-    Vertices common to two convex polygons stand in the same cyclic order on both, so a rotation is all they need.
-    """
-    old_points, new_points = _points(old), _points(new)
-    common = set(old_points).intersection(new_points)
-    kept = [p for p in old_points if p in common]
-    first = next((p for p in new_points if p in common), None)
-    rotation = 0 if first is None else kept.index(first)
-    return Difference(_positions_outside(old_points, common), _positions_outside(new_points, common), rotation)
-
-
-def _points(vertices: Points) -> list[tuple[Any, ...]]:
-    return list(map(tuple, vertices.tolist()))
-
-
-def _positions_outside(points: list[tuple[Any, ...]], common: set[tuple[Any, ...]]) -> npt.NDArray[np.intp]:
-    return np.array([i for i, p in enumerate(points) if p not in common], np.intp)
 
 
 def _same(a: Points | None, b: Points | None) -> bool:

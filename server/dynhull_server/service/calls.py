@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, nullcontext
+from types import TracebackType
 from typing import Any
 
 import grpc
@@ -86,9 +87,9 @@ class Calls:
         self._max_streams = max_streams
         self._streams = 0
         self._starting = True
-        self._draining = False
+        self.draining = False
         self._short: set[asyncio.Task[Any]] = set()
-        self._waiting: set[asyncio.Task[Any]] = set()
+        self.waiting: set[asyncio.Task[Any]] = set()
 
     def ready(self) -> None:
         """From now on calls are served: before, they are told that the server is starting."""
@@ -96,8 +97,8 @@ class Calls:
 
     async def drain(self, grace: float) -> None:
         """End the calls that wait, refuse new ones, and let the short ones finish for up to `grace` seconds."""
-        self._draining = True
-        for task in self._waiting:
+        self.draining = True
+        for task in self.waiting:
             task.cancel()
         if self._short:
             await asyncio.wait(self._short, timeout=grace)
@@ -111,7 +112,7 @@ class Calls:
         try:
             if self._starting:
                 raise StartingError
-            if self._draining:
+            if self.draining:
                 raise DrainingError
             call = Call(self, context, self._authenticate(dict(context.invocation_metadata() or ())))
             if isinstance(request, Exception):
@@ -142,24 +143,12 @@ class Calls:
         task.add_done_callback(self._short.discard)
         yield
 
-    @contextmanager
-    def cutoff(self) -> Iterator[None]:
+    def cutoff(self) -> "Cutoff":
         """Whatever happens inside ends with DrainingError when the server drains.
 
         It must not be sending: a message cut off half-way would leave the call without a status.
         """
-        if self._draining:
-            raise DrainingError
-        task = _current_task()
-        self._waiting.add(task)
-        try:
-            yield
-        except asyncio.CancelledError:
-            if self._draining and task.uncancel() == 0:
-                raise DrainingError from None
-            raise
-        finally:
-            self._waiting.discard(task)
+        return Cutoff(self)
 
     @contextmanager
     def _streaming(self) -> Iterator[None]:
@@ -170,6 +159,26 @@ class Calls:
             yield
         finally:
             self._streams -= 1
+
+
+class Cutoff:
+    """The context of `Calls.cutoff`. A class, because each message of a stream goes through one."""
+
+    __slots__ = ("_calls", "_task")
+
+    def __init__(self, calls: Calls) -> None:
+        self._calls = calls
+
+    def __enter__(self) -> None:
+        if self._calls.draining:
+            raise DrainingError
+        self._task = _current_task()
+        self._calls.waiting.add(self._task)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        self._calls.waiting.discard(self._task)
+        if isinstance(error, asyncio.CancelledError) and self._calls.draining and self._task.uncancel() == 0:
+            raise DrainingError from None
 
 
 def _current_task() -> asyncio.Task[Any]:

@@ -2,6 +2,7 @@
 
 import math
 import re
+import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ DEFAULT_PAGE = 100
 LARGEST_PAGE = 1000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
+ONE_POINT = struct.Struct("<dd")
 NO_POINTS = np.empty((0, 2))
 MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
 LARGEST_SEQUENCE = 2**63 - 1
@@ -102,6 +104,10 @@ def batch_rows(batch: batch_pb2.Batch) -> int:
 def decode_points(points: points_pb2.Points, field: str) -> Points:
     """An (n, 2) array of finite doubles without negative zeros."""
     packed, coordinates = points.packed, points.coordinates
+    if len(packed) == BYTES_PER_POINT and not coordinates:  # a live feed: numpy would take longer than all the rest
+        x, y = ONE_POINT.unpack(packed)
+        if math.isfinite(x) and math.isfinite(y):
+            return np.array(((x + 0.0, y + 0.0),))
     if packed and coordinates:
         raise InvalidFieldError(field, "packed and coordinates", "use one encoding or the other")
     if len(packed) % BYTES_PER_POINT:
@@ -127,6 +133,20 @@ def decode_directions(directions: points_pb2.Points) -> Points:
     if zero.size:
         raise InvalidFieldError("directions", (0.0, 0.0), "has no direction", int(zero[0]))
     return vectors
+
+
+def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Points, Points]:
+    """As many origins as targets, each another point than its target."""
+    origins = decode_points(request.origins, "origins")
+    targets = decode_points(request.targets, "targets")
+    if len(origins) != len(targets):
+        problem = f"there must be as many as there are origins, {len(origins)}"
+        raise InvalidFieldError("targets", f"{len(targets)} points", problem)
+    same = np.flatnonzero((origins == targets).all(axis=1))
+    if same.size:
+        row = int(same[0])
+        raise InvalidFieldError("targets", tuple(targets[row].tolist()), "the same point as the origin: no line", row)
+    return origins, targets
 
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch:

@@ -149,6 +149,25 @@ class HullService:
             right=encode.encode_points(np.ascontiguousarray(tangents[:, 1]), encoding),
         )
 
+    async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
+        hull = self._read(call, request.name)
+        xy = decode.decode_points(request.points, "points")
+        rows = len(xy) + hull.vertex_count
+        counts, distances = await hull.read(lambda live: live.distance(xy), rows, request.min_revision)
+        return pb.DistanceResponse(revision=counts.revision, distances=distances)
+
+    async def IntersectLines(self, request: pb.IntersectLinesRequest, call: Call) -> pb.IntersectLinesResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        p, q = decode.decode_lines(request)
+        rows = len(p) + hull.vertex_count
+        counts, crossings = await hull.read(lambda live: live.intersect_lines(p, q), rows, request.min_revision)
+        return pb.IntersectLinesResponse(
+            revision=counts.revision,
+            entries=encode.encode_points(np.ascontiguousarray(crossings[:, 0]), encoding),
+            exits=encode.encode_points(np.ascontiguousarray(crossings[:, 1]), encoding),
+        )
+
     async def GetHull(self, request: pb.GetHullRequest, call: Call) -> pb.GetHullResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)

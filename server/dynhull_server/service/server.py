@@ -98,12 +98,12 @@ class Server:
         reflection.enable_server_reflection((SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME), self._server)
         port = self._listen()
         self.address = f"{self._settings.host}:{port}"
+        self._serve_metrics()
         await self._health.set("", NOT_SERVING)
         await self._health.set(SERVICE, NOT_SERVING)
         await self._server.start()
         for note in await self._engine.restore(progress):
             log.warning("lost", extra={"what": note})
-        self._serve_metrics()
         self._calls.ready()
         for name in ("", SERVICE, SCRUB):
             await self._health.set(name, SERVING)
