@@ -1,33 +1,61 @@
 # One word for each thing people do here. Everything runs in .venv, made on first use.
 PYTHON ?= python3
 BIN := .venv/bin
+KERNEL := $(wildcard dynhull/kernel/*)
 DAY ?= 2013-03-08
 
-.PHONY: demo test check proto clean
+.PHONY: demo test check proto contract fuzz fuzz-server robustness clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
 
-test: .venv/.test  ## the whole test suite, on both cores
+test: .venv/.test tests/strangers/node_modules  ## the whole test suite, on both cores
 	$(BIN)/pytest -n 2 --dist worksteal
+
+FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
+	-DDYNHULL_FAIL_ALLOCATIONS
+SECONDS ?= 60
+
+fuzz:  ## random lives of the kernel under sanitizers, SECONDS for each size of leaf
+	mkdir -p build
+	for leaf in 4 62; do \
+		$(FUZZ) -DDYNHULL_LEAF=$$leaf tests/kernel/fuzz.cpp -o build/fuzz$$leaf \
+		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
+	done
 
 check: .venv/.check  ## format, lint, types, import rules, proto rules
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/buf lint
 	$(BIN)/buf format --diff --exit-code
+	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/python proto/generate.py --check
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py
 
-.venv/.%: pyproject.toml
+contract: .venv/.check  ## with a release: the contract that later ones must not break
+	$(BIN)/buf breaking --against proto/contract.binpb
+	$(BIN)/buf build --exclude-source-info --output proto/contract.binpb
+
+fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
+	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics
+
+robustness: .venv/.test  ## kill, pause, cut off and starve a server a hundred times while a model checks its promises
+	$(BIN)/python tests/robustness/server/torture.py --faults 99
+
+tests/strangers/node_modules: tests/strangers/package-lock.json
+	tests/peers.sh
+	touch $@
+
+.venv/.%: pyproject.toml CMakeLists.txt $(KERNEL)
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[$*]'
 	touch $@
 
 clean:
-	rm -rf .venv build dist
+	rm -rf .venv build dist tests/strangers/node_modules

@@ -193,6 +193,31 @@ class DynamicHull:
         """
         return self._tree.tangents(as_points(xy))
 
+    def distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Distance of each of (k, 2) points to the hull, the exact value rounded. O(h + k log n).
+
+        0.0 inside and on the boundary; inf from an empty hull.
+        """
+        points = as_points(xy)
+        return measure.distance(self.vertices(), self._tree.tangents(points), points)
+
+    def intersect_lines(self, p: npt.ArrayLike, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(k, 2, 2) where the lines through each of (k, 2) points p and q enter and leave the hull. O(h + k log h).
+
+        In the order from p to q; each coordinate is the exact value rounded once. A line that touches a vertex has it
+        twice, one along an edge has the edge's ends; NaN for a line that misses.
+
+        Raises:
+            ValueError: p and q differ in length, or are the same point in a row.
+        """
+        starts, ends = as_points(p, "p"), as_points(q, "q")
+        if len(starts) != len(ends):
+            raise ValueError(f"p and q must have the same length, got {len(starts)} and {len(ends)}")
+        same = np.flatnonzero((starts == ends).all(axis=1))
+        if same.size:
+            raise ValueError(f"p and q row {same[0]} are the same point: no line")
+        return measure.intersect_lines(self.vertices(), starts, ends)
+
     # Measures
 
     @property
@@ -214,6 +239,24 @@ class DynamicHull:
     def bounds(self) -> tuple[float, float, float, float]:
         """Least x, least y, greatest x, greatest y; NaN without points. O(h log n)."""
         return measure.bounds(self.vertices())
+
+    def diameter(self) -> float:
+        """The greatest distance of two points, the exact value rounded; 0.0 for fewer than two. O(h log n)."""
+        return measure.diameter(self.vertices())
+
+    def width(self) -> float:
+        """The least distance of parallel lines with all points between, the exact value rounded. O(h log n).
+
+        0.0 for points on one line, and for no points.
+        """
+        return measure.width(self.vertices())
+
+    def min_box(self) -> Points:
+        """(4, 2) corners of the smallest box in any direction around the points, counter-clockwise. O(h log n).
+
+        Chosen exactly, each coordinate rounded once. Of points on one line the box is flat; NaN without points.
+        """
+        return measure.min_box(self.vertices())
 
     # As a value
 

@@ -62,6 +62,37 @@ def direction_sign(d: Point, a: Point, b: Point) -> int:
     return _sign(dx * (bx - ax) + dy * (by - ay))
 
 
+def cross_sign(a: Point, b: Point, c: Point, d: Point) -> int:
+    """Return the sign of (b - a) x (d - c): +1 where the way from c to d turns left of the way from a to b."""
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = a, b, c, d
+    left = (bx - ax) * (dy - cy)
+    right = (by - ay) * (dx - cx)
+    det = left - right
+    bound = ORIENT_BOUND * (abs(left) + abs(right)) + UNDERFLOW
+    if det > bound:
+        return 1
+    if -det > bound:
+        return -1
+    ax, bx, cx, dx = _integers((ax, bx, cx, dx))
+    ay, by, cy, dy = _integers((ay, by, cy, dy))
+    return _sign((bx - ax) * (dy - cy) - (by - ay) * (dx - cx))
+
+
+def dot_sign(a: Point, b: Point, c: Point, d: Point) -> int:
+    """Return the sign of (b - a) . (d - c): +1 where the two ways lead in one direction rather than apart."""
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = a, b, c, d
+    along = (bx - ax) * (dx - cx)
+    up = (by - ay) * (dy - cy)
+    dot = along + up
+    bound = ORIENT_BOUND * (abs(along) + abs(up)) + UNDERFLOW
+    if dot > bound:
+        return 1
+    if -dot > bound:
+        return -1
+    ax, ay, bx, by, cx, cy, dx, dy = _integers((ax, ay, bx, by, cx, cy, dx, dy))
+    return _sign((bx - ax) * (dx - cx) + (by - ay) * (dy - cy))
+
+
 def crossing(a: Point, b: Point, c: Point, d: Point, z: Point) -> int:
     """Return the sign of height(ab) - height(cd) at the vertical line through z, turned by a convention for verticals.
 

@@ -1,5 +1,6 @@
 """Points that hull code gets wrong, as hypothesis strategies."""
 
+import numpy as np
 from hypothesis import strategies as st
 
 ULP = 2.0**-53
@@ -27,3 +28,18 @@ def points(max_size: int) -> st.SearchStrategy[list[tuple[float, float]]]:
     kinds = [st.tuples(coordinate, coordinate) for coordinate in coordinates.values()]
     kinds += [st.sampled_from(CIRCLE), line, point]
     return st.one_of(*(st.lists(kind, max_size=max_size) for kind in kinds))
+
+
+def cloud(kind, count, random):
+    """Many points of one kind: (count, 2), from a numpy generator."""
+    if kind == "uniform":
+        return random.random((count, 2))
+    if kind == "circle":
+        angle = random.random(count) * 2 * np.pi
+        return np.column_stack([np.cos(angle), np.sin(angle)])
+    if kind == "grid":
+        return random.integers(0, 40, (count, 2)).astype(float)
+    if kind == "columns":
+        return np.column_stack([random.integers(0, 3, count).astype(float), random.random(count)])
+    clusters = np.exp2(random.integers(-60, 60, count).astype(float))
+    return np.column_stack([clusters * random.random(count), clusters])

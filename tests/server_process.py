@@ -1,9 +1,10 @@
 """A real server, in a process of its own."""
 
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,20 +20,33 @@ class Server:
 
 
 @contextmanager
-def server_process(*options: str) -> Iterator[Server]:
-    """`dynhull serve` on a free port. It must stop in peace, and have nothing to complain about."""
-    command = [COMMAND, "serve", "--port", "0", "--in-memory", *options]
+def server_process(
+    *options: str, wrap: Sequence[str] = (), killed: bool = False, complaints: str = ""
+) -> Iterator[Server]:
+    """`dynhull serve` on a free port, in memory unless the options name a folder.
+
+    It must stop in peace, unless it was `killed`, and have nothing to complain about but what is expected. Its log is
+    of warnings and worse, unless the options say otherwise.
+    """
+    memory = [] if "--data" in options else ["--in-memory"]
+    command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *memory, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
     ):
         try:
             first_line = process.stdout.readline()
-            assert first_line.startswith("dynhull serving on 127.0.0.1:")
+            assert first_line.startswith("dynhull serving on "), errors.seek(0) or errors.read()
             yield Server(first_line.split()[-1], process)
         finally:
             process.terminate()
             code = process.wait(PATIENCE)
             errors.seek(0)
-            complaints = errors.read()
-            assert (code, complaints) == (0, ""), complaints
+            said = errors.read()
+            assert code == (-signal.SIGKILL if killed else 0), said
+            assert complaints in said if complaints else not said, said
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """The `dynhull` command, to its end."""
+    return subprocess.run([COMMAND, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)

@@ -37,8 +37,8 @@ class Commit {
   }
 
  private:
-  // Up to so many changes run one by one in the subtree that they share: measured, see docs/performance.md.
-  static constexpr std::size_t FEW = 8;
+  // Up to so many changes run one by one in the subtree that they share.
+  static constexpr std::size_t FEW = LEAF * 3 / 8;
   static constexpr std::size_t LOOKAHEAD = 4;
 
   // A subtree after its changes, detached, and how many candidates there are, a side: numbers of changes, stored in
@@ -71,9 +71,8 @@ class Commit {
         const Change& change = changes_[i];
         if (!insert && i + LOOKAHEAD < count_) nodes_.leaf(changes_[i + LOOKAHEAD].leaf).fetch();
         if (change.insert != insert) continue;
-        const Place place = find(nodes_, change.p);
-        const unsigned changed =
-            insert ? insert_point(nodes_, place, change.p) : remove_point(nodes_, place, change.p);
+        const Place place = find_near(nodes_, change.leaf, change.p);
+        const unsigned changed = insert ? insert_point(nodes_, place, change.p) : remove_point(nodes_, place, change.p);
         for (Side side : SIDES)
           if (changed & (1u << side)) propose(found, side, from, i);
       }
@@ -134,19 +133,25 @@ class Commit {
       nodes_.give_back(v);
       found.tree = left.tree == NONE ? right.tree : left.tree;
       for (Side side : SIDES)
-        filter(found, side, from, [&](const Change& change, bool on_left) {
-          return change.insert || reaches(old.side[side], change.p, on_left);
-        }, cut);
+        filter(
+            found, side, from,
+            [&](const Change& change, bool on_left) {
+              return change.insert || reaches(old.side[side], change.p, on_left);
+            },
+            cut);
       return found;
     }
     const int difference = static_cast<int>(nodes_.height(left.tree)) - static_cast<int>(nodes_.height(right.tree));
     if (std::abs(difference) > 1) {
       found.tree = join(nodes_, left.tree, right.tree, v);
       for (Side side : SIDES)
-        filter(found, side, from, [&](const Change& change, bool on_left) {
-          return change.insert ? on_chain(nodes_, found.tree, side, change.p)
-                               : reaches(old.side[side], change.p, on_left);
-        }, cut);
+        filter(
+            found, side, from,
+            [&](const Change& change, bool on_left) {
+              return change.insert ? on_chain(nodes_, found.tree, side, change.p)
+                                   : reaches(old.side[side], change.p, on_left);
+            },
+            cut);
       return found;
     }
     nodes_.link(v, 0, left.tree);
@@ -157,9 +162,12 @@ class Commit {
       Edge& edge = nodes_.bridge(v, side);
       if (broken(edge, side, found, from, cut))
         edge = bridge_of(nodes_, left.tree, right.tree, side, nodes_.node(v).separator);
-      filter(found, side, from, [&](const Change& change, bool on_left) {
-        return reaches(change.insert ? edge : old.side[side], change.p, on_left);
-      }, cut);
+      filter(
+          found, side, from,
+          [&](const Change& change, bool on_left) {
+            return reaches(change.insert ? edge : old.side[side], change.p, on_left);
+          },
+          cut);
     }
     return found;
   }
@@ -205,7 +213,7 @@ class Commit {
   const Change* changes_;
   std::size_t count_;
   std::vector<std::uint32_t> candidates_[2];
-  std::vector<Point> points_;        // of a leaf that is merged
+  std::vector<Point> points_;  // of a leaf that is merged
   std::vector<std::uint8_t> repeated_;
   std::vector<Ref> leaves_;
   std::vector<Ref> small_;  // leaves to merge with their neighbours at the end

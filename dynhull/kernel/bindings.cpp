@@ -283,13 +283,15 @@ NB_MODULE(_kernel, module) {
 
   nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
       .def(nb::init<>())
-      .def("__init__",
-           [](Hull* hull, nb::object xy) {
-             if (xy.is_none())
-               new (hull) Hull();
-             else
-               new (hull) Hull(nb::cast<Rows>(xy));
-           }, "xy"_a.none())
+      .def(
+          "__init__",
+          [](Hull* hull, nb::object xy) {
+            if (xy.is_none())
+              new (hull) Hull();
+            else
+              new (hull) Hull(nb::cast<Rows>(xy));
+          },
+          "xy"_a.none())
       .def("__len__", &Hull::size)
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
       .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
@@ -299,7 +301,8 @@ NB_MODULE(_kernel, module) {
       .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
            "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
       .def("apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a,
-           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the first "
+           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the "
+           "first "
            "row that deletes what is not there, or -1.")
       .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
@@ -313,18 +316,23 @@ NB_MODULE(_kernel, module) {
       .def("check", &Hull::check, "Raise AssertionError where an invariant is broken. O(n log n).")
       .def_prop_ro("memory", &Hull::memory, "Bytes used and bytes reserved by the tree.");
 
-  module.def("orientation",
-             [](nb::handle a, nb::handle b, nb::handle c) {
-               return orientation(point_of(a), point_of(b), point_of(c));
-             }, "a"_a, "b"_a, "c"_a, "+1 where three points turn left, -1 right, 0 on one line.");
-  module.def("direction_sign",
-             [](nb::handle d, nb::handle a, nb::handle b) {
-               return direction_sign(point_of(d), point_of(a), point_of(b));
-             }, "d"_a, "a"_a, "b"_a, "+1 where b lies further than a in direction d, -1 less far, 0 neither.");
-  module.def("crossing",
-             [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
-               return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
-             }, "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
+  module.def(
+      "orientation",
+      [](nb::handle a, nb::handle b, nb::handle c) { return orientation(point_of(a), point_of(b), point_of(c)); },
+      "a"_a, "b"_a, "c"_a, "+1 where three points turn left, -1 right, 0 on one line.");
+  module.def(
+      "direction_sign",
+      [](nb::handle d, nb::handle a, nb::handle b) { return direction_sign(point_of(d), point_of(a), point_of(b)); },
+      "d"_a, "a"_a, "b"_a, "+1 where b lies further than a in direction d, -1 less far, 0 neither.");
+  module.def(
+      "crossing",
+      [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
+        return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
+      },
+      "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
+  module.def(
+      "plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
+      "a * b - c * d as the predicates' filters compute it: three roundings. For the test of the build's flags.");
   module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
              "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. "
              "Whether to discard points by a sample's hull first, and to use two threads, the input decides where not "

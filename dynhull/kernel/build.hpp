@@ -15,7 +15,8 @@ struct Row {
 };
 inline bool operator<(const Row& a, const Row& b) { return a.p < b.p || (a.p == b.p && a.row < b.row); }
 
-constexpr std::size_t SMALL_SORT = 16 * LEAF;  // below this many rows, comparisons are faster than counting
+constexpr std::size_t SMALL_SORT = 32;       // below, insertion sort
+constexpr std::size_t ONE_PASS = 64 * LEAF;  // below, one counting pass instead of two
 
 // Insertion sort: linear for rows that are almost in order.
 template <class R>
@@ -28,19 +29,23 @@ void insertion_sort(R* first, R* last) {
   }
 }
 
-// Stable sort by point. Two counting passes over x, mapped affinely to 22 bits, leave short runs for insertion sort;
-// long runs of almost equal x (clusters, columns) are mapped again, or compared. O(n) on most inputs, O(n log n) on all.
+// Scatter by a key below `buckets`, stably.
+template <class R, class Key>
+void counting_pass(const R* rows, R* target, std::size_t count, std::size_t buckets, Key key) {
+  std::vector<std::uint32_t> next(buckets);
+  for (std::size_t i = 0; i < count; ++i) ++next[key(rows[i])];
+  std::uint32_t sum = 0;
+  for (std::uint32_t& start : next) sum += std::exchange(start, sum);
+  for (std::size_t i = 0; i < count; ++i) target[next[key(rows[i])]++] = rows[i];
+}
+
+// Stable sort by point. Counting passes over x, mapped affinely to as many keys as there are rows or more, leave short
+// runs for insertion sort; long runs of almost equal x (clusters, columns) are mapped again, or compared. O(n) on most
+// inputs, O(n log n) on all.
 template <class R>
 void sort_by_point(R* rows, R* scratch, std::size_t count) {
-  constexpr unsigned DIGIT = 11, BUCKETS = 1u << DIGIT;
-  const auto by_point = [](const R& a, const R& b) { return a.p < b.p; };
-  if (count < SMALL_SORT) {
-    if (count < 32)
-      insertion_sort(rows, rows + count);
-    else
-      std::stable_sort(rows, rows + count, by_point);
-    return;
-  }
+  if (count < SMALL_SORT) return insertion_sort(rows, rows + count);
+  const auto compare = [=] { std::stable_sort(rows, rows + count, [](const R& a, const R& b) { return a.p < b.p; }); };
   double least = rows[0].p.x, greatest = least;
   bool sorted = true;
   for (std::size_t i = 1; i < count; ++i) {
@@ -49,33 +54,26 @@ void sort_by_point(R* rows, R* scratch, std::size_t count) {
     sorted &= rows[i - 1].p <= rows[i].p;
   }
   if (sorted) return;
-  const double scale = (BUCKETS * BUCKETS - 1) / (greatest - least);
-  if (!(scale > 0 && scale < INFINITE)) {  // one column, or a width beyond every double
-    std::stable_sort(rows, rows + count, by_point);
-    return;
+  constexpr std::size_t DIGIT = 11;
+  const std::size_t keys = count < ONE_PASS ? std::bit_ceil(count) : std::size_t{1} << (2 * DIGIT);
+  const double scale = static_cast<double>(keys - 1) / (greatest - least);
+  if (!(scale > 0 && scale < INFINITE)) return compare();  // one column, or a width beyond every double
+  const auto key = [=](const R& row) {                     // monotone in x, whatever the rounding
+    return static_cast<std::uint32_t>((row.p.x - least) * scale);
+  };
+  if (count < ONE_PASS) {
+    counting_pass(rows, scratch, count, keys, key);
+    std::copy_n(scratch, count, rows);
+  } else {
+    constexpr std::uint32_t BUCKETS = 1u << DIGIT;
+    counting_pass(rows, scratch, count, BUCKETS, [=](const R& row) { return key(row) % BUCKETS; });
+    counting_pass(scratch, rows, count, BUCKETS, [=](const R& row) { return key(row) / BUCKETS; });
   }
-  // Monotone in x, whatever the rounding.
-  const auto key = [=](const R& row) { return static_cast<std::uint32_t>((row.p.x - least) * scale); };
-  std::vector<std::uint32_t> low(BUCKETS), high(BUCKETS);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t k = key(rows[i]);
-    ++low[k % BUCKETS];
-    ++high[k / BUCKETS];
-  }
-  std::uint32_t low_sum = 0, high_sum = 0;
-  for (unsigned b = 0; b < BUCKETS; ++b) {
-    low_sum += std::exchange(low[b], low_sum);
-    high_sum += std::exchange(high[b], high_sum);
-  }
-  for (std::size_t i = 0; i < count; ++i) scratch[low[key(rows[i]) % BUCKETS]++] = rows[i];
-  for (std::size_t i = 0; i < count; ++i) rows[high[key(scratch[i]) / BUCKETS]++] = scratch[i];
   for (std::size_t from = 0, to; from < count; from = to) {
     const std::uint32_t k = key(rows[from]);
     for (to = from + 1; to < count && key(rows[to]) == k;) ++to;
-    if (to - from > 1 && to - from < count)
-      sort_by_point(rows + from, scratch + from, to - from);
-    else if (to - from == count)
-      std::stable_sort(rows, rows + count, by_point);
+    if (to - from > count / 2) return compare();
+    if (to - from > 1) sort_by_point(rows + from, scratch + from, to - from);
   }
 }
 

@@ -1,4 +1,5 @@
-// Signs of sums of products of doubles, exact for every finite double: a fixed-point number as wide as the exponent range.
+// Signs of sums of products of doubles, exact for every finite double: a fixed-point number as wide as the exponent
+// range.
 #pragma once
 
 #include <array>

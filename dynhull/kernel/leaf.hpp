@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include "predicates.hpp"
@@ -15,15 +16,16 @@ namespace dynhull {
 
 constexpr unsigned LEAF = DYNHULL_LEAF;
 static_assert(4 <= LEAF && LEAF <= 64);
-constexpr unsigned FILL = LEAF * 27 / 32;                  // entries of a leaf built in bulk
-constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);     // a leaf with fewer entries is merged with its neighbour
-constexpr unsigned MERGE_STEP = 4;                         // a try at every fourth size: its neighbour may be full
+constexpr unsigned FILL = LEAF * 27 / 32;               // entries of a leaf built in bulk
+constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);  // a leaf with fewer entries is merged with its neighbour
+constexpr unsigned MERGE_STEP = 4;                      // a try at every fourth size: its neighbour may be full
 constexpr std::uint32_t NONE = ~std::uint32_t{0};
 
 using Mask = std::uint64_t;
 inline Mask bit(unsigned i) { return Mask{1} << i; }
 inline Mask below(unsigned i) { return i < 64 ? bit(i) - 1 : ~Mask{0}; }
 inline unsigned lowest(Mask mask) { return static_cast<unsigned>(std::countr_zero(mask)); }
+inline bool several(Mask mask) { return (mask & (mask - 1)) != 0; }
 inline unsigned highest(Mask mask) { return 63 - static_cast<unsigned>(std::countl_zero(mask)); }
 
 inline void prefetch(const void* address) {
@@ -34,7 +36,9 @@ inline void prefetch(const void* address) {
 #endif
 }
 
-struct alignas(8) Leaf {
+constexpr unsigned LINE = 64;  // bytes of a cache line
+
+struct Leaf {
   std::uint32_t parent;
   std::uint32_t size;
   Mask chain[2];
@@ -45,17 +49,21 @@ struct alignas(8) Leaf {
   Point first() const { return (*this)[0]; }
 
   void fetch() const {
-    for (unsigned i = 0; i < sizeof(Leaf); i += 64) prefetch(reinterpret_cast<const char*>(this) + i);
+    for (unsigned i = 0; i < sizeof(Leaf); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
+  }
+  void fetch_x() const {
+    for (unsigned i = 0; i < offsetof(Leaf, y); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
   }
 
-  // The first entry that is not less than p. A binary search without branches.
+  // The first entry that is not less than p. A binary search in x without branches; y decides between equal x.
   unsigned find(Point p) const {
     unsigned from = 0;
     for (unsigned rest = size; rest > 0;) {
       const unsigned half = (rest + 1) / 2;
-      from += half & -static_cast<unsigned>((*this)[from + half - 1] < p);
+      from += half & -static_cast<unsigned>(x[from + half - 1] < p.x);
       rest -= half;
     }
+    while (from < size && x[from] == p.x && y[from] < p.y) ++from;
     return from;
   }
   bool holds(unsigned i, Point p) const { return i < size && (*this)[i] == p; }
@@ -106,6 +114,12 @@ struct alignas(8) Leaf {
     return sides;
   }
 
+  // The vertices before and after entry i, itself on the chain; infinite where there is none.
+  Edge neighbours(Side side, unsigned i) const {
+    const Mask before = chain[side] & below(i), after = chain[side] & ~below(i + 1);
+    return {before ? (*this)[highest(before)] : LOWEST, after ? (*this)[lowest(after)] : HIGHEST};
+  }
+
   // The strict chain of the entries from..to, as a mask. The scan keeps to entries outside the chord: all vertices are.
   Mask scan(Side side, unsigned from, unsigned to) const {
     Mask mask = bit(from) | bit(to);
@@ -133,7 +147,7 @@ struct alignas(8) Leaf {
   // Drop what the last point of a scanned chain covers.
   Mask settled(Side side, Mask mask, unsigned to) const {
     Mask kept = mask & below(to);
-    while (std::popcount(kept) > 1) {
+    while (several(kept)) {
       const unsigned top = highest(kept), under = highest(kept & below(top));
       if (turned(side, orientation((*this)[under], (*this)[top], (*this)[to])) < 0) break;
       kept &= ~bit(top);
@@ -147,12 +161,12 @@ struct alignas(8) Leaf {
     Mask before = chain[side] & below(i), after = chain[side] & ~below(i + 1);
     if (before && after && turned(side, orientation((*this)[highest(before)], (*this)[lowest(after)], p)) <= 0)
       return false;
-    while (std::popcount(after) > 1) {
+    while (several(after)) {
       const unsigned next = lowest(after), beyond = lowest(after & (after - 1));
       if (turned(side, orientation(p, (*this)[next], (*this)[beyond])) < 0) break;
       after &= after - 1;
     }
-    while (std::popcount(before) > 1) {
+    while (several(before)) {
       const unsigned last = highest(before), under = highest(before & below(last));
       if (turned(side, orientation((*this)[under], (*this)[last], p)) < 0) break;
       before &= ~bit(last);

@@ -15,24 +15,27 @@ namespace dynhull {
 class Turns {
  public:
   // Wait until nobody writes, or until nobody reads or writes.
-  void await_readable() { await([this] { return !writing_; }); }
+  void await_readable() {
+    if (writing_) wait([this] { return !writing_; });
+  }
   void await_writable() {
-    if (writing_ || readers_ > 0) await([this] { return !writing_ && readers_ == 0; });
+    if (writing_ || readers_ > 0) await_as_writer([this] { return !writing_ && readers_ == 0; });
   }
 
   // Before a fork, wait until no batch runs in any hull and let none begin; the child's hulls are whole.
   static void before_fork() {
+    ++forking_;
     wait([] { return running_ == 0; });
-    forking_ = true;
   }
   static void after_fork_in_parent() {
-    forking_ = false;
+    --forking_;
     wake();
   }
   static void after_fork_in_child() {
     signal_ = new Signal;  // some thread of the parent may hold the old one
     waiting_ = 0;
-    forking_ = false;
+    ++this_process_;
+    forking_ = 0;
   }
 
  private:
@@ -44,10 +47,17 @@ class Turns {
     std::condition_variable changed;
   };
 
+  // Readers that come after a waiting writer wait for it, unless it waits in the process that this one was forked from.
   template <class Holds>
-  void await(Holds holds) {
-    wait([&] { return !forking_ && holds(); });
+  void await_as_writer(Holds holds) {
+    if (!writer_waits()) writers_waiting_ = 0;
+    process_ = this_process_;
+    ++writers_waiting_;
+    wait(holds);
+    --writers_waiting_;
+    wake();  // those who let it go first
   }
+  bool writer_waits() const { return writers_waiting_ > 0 && process_ == this_process_; }
 
   // The mutex is taken before the GIL is let go of, so that no signal is missed, and never held while taking the GIL.
   template <class Holds>
@@ -71,18 +81,20 @@ class Turns {
   }
 
   bool writing_ = false;
-  int readers_ = 0;
+  int readers_ = 0, writers_waiting_ = 0;
+  int process_ = 0;
 
   static inline Signal* signal_ = new Signal;
   static inline int waiting_ = 0, running_ = 0;
-  static inline bool forking_ = false;
+  static inline int forking_ = 0;
+  static inline int this_process_ = 0;  // one more in each forked child
 };
 
 // A batch that reads, with the GIL let go of.
 class Reading {
  public:
   explicit Reading(Turns& turns) : turns_(turns) {
-    turns.await([&] { return !turns.writing_; });
+    Turns::wait([&] { return Turns::forking_ == 0 && !turns.writing_ && !turns.writer_waits(); });
     ++turns.readers_;
     ++Turns::running_;
     release_.emplace();
@@ -104,7 +116,7 @@ class Reading {
 class Writing {
  public:
   explicit Writing(Turns& turns) : turns_(turns) {
-    turns.await([&] { return !turns.writing_ && turns.readers_ == 0; });
+    turns.await_as_writer([&] { return Turns::forking_ == 0 && !turns.writing_ && turns.readers_ == 0; });
     turns.writing_ = true;
     ++Turns::running_;
     release_.emplace();

@@ -42,8 +42,15 @@ class Nodes {
 
   // The leaf where p belongs.
   Ref descend(Ref tree, Point p) const {
-    while (!is_leaf(tree)) tree = node(tree).child[p >= node(tree).separator];
+    while (!is_leaf(tree)) tree = step(tree, p);
     return tree;
+  }
+  Ref step(Ref tree, Point p) const {
+    const Node& node = this->node(tree);
+    bool right = p.x > node.separator.x;
+    if (p.x == node.separator.x) [[unlikely]]
+      right = p.y >= node.separator.y;
+    return node.child[right];
   }
   Ref first_leaf(Ref tree) const {
     while (!is_leaf(tree)) tree = node(tree).child[0];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 namespace dynhull {
 
@@ -15,6 +16,9 @@ inline bool operator<(Point p, Point q) { return (p.x < q.x) | ((p.x == q.x) & (
 inline bool operator>(Point p, Point q) { return q < p; }
 inline bool operator<=(Point p, Point q) { return (p.x < q.x) | ((p.x == q.x) & (p.y <= q.y)); }
 inline bool operator>=(Point p, Point q) { return q <= p; }
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+constexpr Point LOWEST = {-INFINITE, -INFINITE}, HIGHEST = {INFINITE, INFINITE};
 
 struct Edge {
   Point a, b;

@@ -10,6 +10,10 @@
 #include "exact.hpp"
 #include "point.hpp"
 
+#ifdef __FAST_MATH__
+#error "exact predicates need every rounding as written: compile without -ffast-math"
+#endif
+
 namespace dynhull {
 
 constexpr double EPSILON = 0x1p-53;
@@ -50,6 +54,13 @@ inline bool exact_difference(double a, double b, double difference) {
   sum.add(+1, {a.y, c.x});
   sum.add(+1, {c.y, b.x});
   return sum.sign();
+}
+
+// As in the filters: each product is rounded, then their difference.
+inline double difference_of_products(double a, double b, double c, double d) {
+  const double left = a * b;
+  const double right = c * d;
+  return left - right;
 }
 
 // The sign of the turn, or 0 where floating point cannot tell.

@@ -1,14 +1,9 @@
 // Searches along chains: a cursor, the bridge of two subtrees, tangents from a point.
 #pragma once
 
-#include <limits>
-
 #include "nodes.hpp"
 
 namespace dynhull {
-
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr Point LOWEST = {-INFINITE, -INFINITE}, HIGHEST = {INFINITE, INFINITE};
 
 // A binary search along the chain of a subtree, or its part between two of its vertices. At every step (a, b) is an
 // edge of the chain, and the caller says on which side of it the sought vertex lies; once one vertex is left, it is a.
@@ -114,12 +109,10 @@ inline Edge find_bridge(Cursor left, Cursor right, Side side, Point separator) {
   while (true) {
     const Point a = left.a, b = left.b, c = right.a, d = right.b;
     if (left.single && right.single) return {a, c};
-    const bool start_before =
-        !left.single && (turned(side, orientation(a, b, c)) >= 0 ||
-                         (!right.single && turned(side, orientation(a, b, d)) >= 0));
-    const bool end_after =
-        !right.single && (turned(side, orientation(c, d, a)) >= 0 ||
-                          (!left.single && turned(side, orientation(c, d, b)) >= 0));
+    const bool start_before = !left.single && (turned(side, orientation(a, b, c)) >= 0 ||
+                                               (!right.single && turned(side, orientation(a, b, d)) >= 0));
+    const bool end_after = !right.single && (turned(side, orientation(c, d, a)) >= 0 ||
+                                             (!left.single && turned(side, orientation(c, d, b)) >= 0));
     if (start_before || end_after) {
       if (start_before) left.go_left();
       if (end_after) right.go_right();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "batch.hpp"
+#include "sequence.hpp"
 
 namespace dynhull {
 
@@ -87,22 +88,14 @@ class HullTree {
   // Insert the rows with +1 and delete those with -1, as a set. With a row that deletes what is not there nothing is
   // applied, unless missing points are to be ignored.
   Applied apply(const std::int8_t* ops, const Point* points, std::size_t count, bool ignore_missing) {
-    const Plan plan(nodes_, copies_, ops, points, count);
-    if (plan.first_missing >= 0 && !ignore_missing) return {0, plan.first_missing};
-    make_room_for_copies(plan);
-    try {
-      if (plan.inserts > 0 && plan.inserts >= distinct_)
-        rebuild(plan);
-      else if (!plan.changes.empty() && Commit(nodes_, plan).apply())
-        changed();
-    } catch (...) {
-      drop_room_for_copies();
-      throw;
-    }
-    size_ += plan.growth;
-    distinct_ += 2 * plan.inserts - plan.changes.size();
-    for (const Recount& entry : plan.recounts) recount(entry);
-    return {plan.rows_applied, plan.first_missing};
+    Groups groups(ops, points, count);
+    groups.descend(nodes_);
+    if (nodes_.root != NONE && groups.inserts < distinct_ && groups.size() < CROWDED * groups.touched_leaves())
+      apply_one_by_one(groups, ignore_missing);
+    else
+      apply_together(groups, ignore_missing);
+    if (groups.first_missing >= 0 && !ignore_missing) return {0, groups.first_missing};
+    return {groups.rows_applied, groups.first_missing};
   }
 
   // Every distinct point in order, with its number of copies.
@@ -125,6 +118,46 @@ class HullTree {
   struct Bare {
     Point p;
   };
+
+  // With so many distinct points a touched leaf, a batch is applied together: measured, see docs/performance.md.
+  static constexpr std::size_t CROWDED = LEAF / 2;
+
+  void apply_one_by_one(Groups& groups, bool ignore_missing) {
+    Sequence sequence(nodes_, copies_, groups);
+    try {
+      sequence.apply(ignore_missing);
+    } catch (...) {
+      sequence.go_back();
+      throw;
+    }
+    if (groups.first_missing >= 0 && !ignore_missing) {
+      sequence.go_back();
+      for (std::size_t i = 0; i < groups.size(); ++i) groups.settle(i, count(groups[i].p));  // the first of all
+      return;
+    }
+    sequence.drop_room();
+    size_ += groups.growth;
+    distinct_ += sequence.distinct_growth;
+    if (sequence.changed) changed();
+  }
+
+  void apply_together(Groups& groups, bool ignore_missing) {
+    const Plan plan(nodes_, copies_, groups);
+    if (groups.first_missing >= 0 && !ignore_missing) return;
+    make_room_for_copies(plan);
+    try {
+      if (plan.inserts > 0 && plan.inserts >= distinct_)
+        rebuild(plan);
+      else if (!plan.changes.empty() && Commit(nodes_, plan).apply())
+        changed();
+    } catch (...) {
+      drop_room_for_copies();
+      throw;
+    }
+    size_ += groups.growth;
+    distinct_ += 2 * plan.inserts - plan.changes.size();
+    for (const Recount& entry : plan.recounts) recount(entry);
+  }
 
   bool changed() {
     ++changes;

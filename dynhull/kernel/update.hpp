@@ -12,28 +12,46 @@ struct Place {
   bool there;
 };
 
-inline Place find(const Nodes& nodes, Point p) {
-  if (nodes.root == NONE) return {NONE, 0, false};
-  const Ref tree = nodes.descend(nodes.root, p);
+inline Place find_in(const Nodes& nodes, Ref tree, Point p) {
   const Leaf& leaf = nodes.leaf(tree);
-  leaf.fetch();
   const unsigned i = leaf.find(p);
   return {tree, i, leaf.holds(i, p)};
 }
 
+inline Place find(const Nodes& nodes, Point p) {
+  if (nodes.root == NONE) return {NONE, 0, false};
+  const Ref tree = nodes.descend(nodes.root, p);
+  nodes.leaf(tree).fetch();
+  return find_in(nodes, tree, p);
+}
+
+// The same, faster where `guess`, a leaf that may be gone by now, has points on both sides of p.
+inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
+  const Leaf& leaf = nodes.leaf(guess);
+  if (leaf.size > 0 && leaf.first() <= p && p <= leaf[leaf.size - 1]) return find_in(nodes, guess, p);
+  return find(nodes, p);
+}
+
 // Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
-inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side) {
+//
+// `neighbours` are those of p on the chain, infinite where p is its end. With one of them between p and the bridge, the
+// chain turns before it gets there, and p lies inside the bridge's line.
+inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
   for (; v != NONE; v = nodes.node(v).parent) {
     const Node& node = nodes.node(v);
     Edge& edge = nodes.bridge(v, side);
     const bool on_left = p < node.separator;
     const bool beyond = on_left ? p < edge.a : p > edge.b;
+    if (on_left ? neighbours.b < edge.a : neighbours.a > edge.b) continue;
     const int turn = turned(side, orientation(edge.a, edge.b, p));
     if (turn > 0 || (turn == 0 && beyond)) {
-      if (on_left)
-        edge = {p, tangent_to_right(Cursor(nodes, node.child[1], side), p, side)};
-      else
-        edge = {tangent_to_left(Cursor(nodes, node.child[0], side), p, side), p};
+      if (on_left) {
+        neighbours.b = tangent_to_right(Cursor(nodes, node.child[1], side), p, side);
+        edge = {p, neighbours.b};
+      } else {
+        neighbours.a = tangent_to_left(Cursor(nodes, node.child[0], side), p, side);
+        edge = {neighbours.a, p};
+      }
     } else if (!beyond) {
       return false;
     }
@@ -71,7 +89,8 @@ inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
   const unsigned on_leaf = leaf.add(place.entry, p);
   unsigned changed = 0;
   for (Side side : SIDES)
-    if (on_leaf & (1u << side) && climb_added(nodes, leaf.parent, p, side)) changed |= 1u << side;
+    if (on_leaf & (1u << side) && climb_added(nodes, leaf.parent, p, side, leaf.neighbours(side, place.entry)))
+      changed |= 1u << side;
   return changed;
 }
 

@@ -3,48 +3,57 @@
 import asyncio
 import signal
 import sys
-from typing import Annotated
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
-import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from .service.server import Server, Settings
+from . import logs
+from .flags import with_settings
+from .journal.errors import JournalError
+from .service.server import Server
+from .settings import Settings
 
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
-
-def serve(
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen on; 0 for a free one.", min=0, max=65535)] = 50051,
-    in_memory: Annotated[bool, typer.Option("--in-memory", help="Keep hulls in memory, and do not say so.")] = False,
-    insecure: Annotated[bool, typer.Option("--insecure", help="Listen to other machines, without protection.")] = False,
-    max_message_bytes: Annotated[int, typer.Option(help="Largest message.", min=1024, max=2**31 - 1)] = 64 * 2**20,
-    max_hulls: Annotated[int, typer.Option(help="How many hulls there may be.", min=1)] = 100_000,
-    grace: Annotated[float, typer.Option(help="Seconds that calls under way get at the end.", min=0)] = 30.0,
-) -> None:
+@with_settings
+def serve(settings: Settings, _: dict[str, str]) -> None:
     """Serve hulls over gRPC.
 
     The first line printed is "dynhull serving on HOST:PORT". SIGTERM ends the server: what it has acknowledged is
     applied, calls under way finish, everything else gets UNAVAILABLE.
+
+    A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
-    if host not in LOOPBACK and not insecure:
-        sys.exit(
-            f"{host} can be reached by other machines, without encryption or passwords: say --insecure to allow it"
-        )
-    if not in_memory:
-        typer.echo("Hulls are kept in memory: they are gone when the server stops.", err=True)
+    logs.configure(settings.log_level, settings.log_format)
     try:
-        asyncio.run(_serve(Settings(host, port, max_message_bytes, max_hulls), grace))
+        asyncio.run(_serve(settings))
     except RuntimeError as error:
-        sys.exit(f"cannot listen on {host}:{port}: {error}")
+        sys.exit(f"cannot listen on {settings.host}:{settings.port}: {error}")
+    except (OSError, ValueError, JournalError) as error:
+        sys.exit(f"cannot serve: {error}")
 
 
-async def _serve(settings: Settings, grace: float) -> None:
+async def _serve(settings: Settings) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     server = Server(settings)
-    await server.start()
+    with _restoring() as progress:
+        await server.start(progress)
     print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
+    if server.metrics_address:
+        print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
     await stop.wait()
-    await server.drain(grace)
+    await server.drain()
+
+
+@contextmanager
+def _restoring() -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on a terminal for the hulls read from the disk, once there are any."""
+    console = Console(stderr=True)
+    columns = [TextColumn("reading hulls"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", visible=False)
+        yield lambda done, total: bar.update(task, completed=done, total=total, visible=total > 0)

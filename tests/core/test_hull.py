@@ -245,6 +245,7 @@ def test_area_is_rounded_once(make):
     assert sliver.area == 2.0
     assert make([[0, 0], [4, 2]]).centroid == (2.0, 1.0)
     assert make([[0, 0], [3, 4]]).perimeter == 10.0
+    assert make([[0, 0], [1.7e308, 0], [1.7e308, 1]]).perimeter == float("inf")
     assert make([[7, 8]]).bounds == (7.0, 8.0, 7.0, 8.0)
 
 

@@ -40,7 +40,8 @@ using Model = std::map<Point, std::uint64_t>;
 std::vector<Point> chain_of(const Model& model, Side side) {
   std::vector<Point> chain;
   for (const auto& [p, copies] : model) {
-    while (chain.size() > 1 && turned(side, orientation(chain[chain.size() - 2], chain.back(), p)) >= 0) chain.pop_back();
+    while (chain.size() > 1 && turned(side, orientation(chain[chain.size() - 2], chain.back(), p)) >= 0)
+      chain.pop_back();
     chain.push_back(p);
   }
   return chain;
@@ -71,8 +72,9 @@ class Life {
   std::uint64_t below(std::uint64_t n) { return n > 0 ? random_() % n : 0; }
 
   double coordinate() {
-    static const double EXTREME[] = {0.0, 5e-324, -5e-324, 1e-323, 2.2250738585072014e-308, 1e-160, -1e-160,
-                                     1.0, -3.0,   9e15,    1e160,  -1e160,                  1.7e308, -1.7e308};
+    static const double EXTREME[] = {0.0,    5e-324,  -5e-324, 1e-323,  2.2250738585072014e-308,
+                                     1e-160, -1e-160, 1.0,     -3.0,    9e15,
+                                     1e160,  -1e160,  1.7e308, -1.7e308};
     switch (kind_) {
       case 0: return static_cast<double>(below(4));
       case 1: return static_cast<double>(below(40)) - 20;
@@ -229,7 +231,8 @@ class Life {
     const Check checked(tree_);
     auto expected = model_.begin();
     tree_.for_each([&](Point p, std::uint64_t copies) {
-      require(expected != model_.end() && expected->first == p && expected->second == copies, "a point or count is off");
+      require(expected != model_.end() && expected->first == p && expected->second == copies,
+              "a point or count is off");
       ++expected;
     });
     require(expected == model_.end(), "a point is missing");

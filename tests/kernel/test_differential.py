@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from inputs import point, points
+from inputs import cloud, point, points
 
 from dynhull import _kernel, predicates, tree
 
@@ -123,20 +123,6 @@ class Twins(RuleBasedStateMachine):
 
 TestTwins = Twins.TestCase
 TestTwins.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
-
-
-def cloud(kind, count, random):
-    if kind == "uniform":
-        return random.random((count, 2))
-    if kind == "circle":
-        angle = random.random(count) * 2 * np.pi
-        return np.column_stack([np.cos(angle), np.sin(angle)])
-    if kind == "grid":
-        return random.integers(0, 40, (count, 2)).astype(float)
-    if kind == "columns":
-        return np.column_stack([random.integers(0, 3, count).astype(float), random.random(count)])
-    clusters = np.exp2(random.integers(-60, 60, count).astype(float))
-    return np.column_stack([clusters * random.random(count), clusters])
 
 
 @pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])

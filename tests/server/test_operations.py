@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import grpc
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
-from server_process import COMMAND, PATIENCE, server_process
+from server_process import PATIENCE, run, server_process
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -103,10 +104,6 @@ def test_a_batch_under_way_is_finished_at_the_end() -> None:
             list(watch)
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([COMMAND, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)
-
-
 def test_a_port_in_use(address: str) -> None:
     port = address.rpartition(":")[2]
     result = run("serve", "--port", port)
@@ -115,16 +112,10 @@ def test_a_port_in_use(address: str) -> None:
     assert "Traceback" not in result.stderr
 
 
-def test_other_machines_only_when_told() -> None:
-    result = run("serve", "--host", "0.0.0.0", "--port", "0")
-    assert result.returncode == 1
-    assert "--insecure" in result.stderr
-
-
-def test_python_m_is_the_same_and_says_that_memory_is_all_there_is() -> None:
+def test_python_m_is_the_same_and_keeps_its_data_here(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dynhull_server", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stdout.readline().startswith("dynhull serving on 127.0.0.1:")
         process.terminate()
         assert process.wait(PATIENCE) == 0
-        assert "in memory" in process.stderr.read()
+    assert (tmp_path / "dynhull-data" / "dynhull.db").exists()

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 import grpc
 import pytest
 from google.protobuf.duration_pb2 import Duration
-from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFailure, QuotaFailure, ResourceInfo
-from grpc_status import rpc_status
+from refusal import refusal
 from server_process import server_process
 
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
@@ -21,24 +20,6 @@ INFINITE_ROW = points_pb2.Points(packed=struct.pack("<4d", 0, 0, -math.inf, 1))
 ONE = points_pb2.Points(coordinates=[1, 2])
 TWO = points_pb2.Points(coordinates=[1, 2, 3, 4])
 FAR_AWAY = points_pb2.Points(coordinates=[8, 8, 9, 9])
-
-
-def refusal(call: Callable[[], object]) -> tuple[grpc.StatusCode, ErrorInfo, list[object]]:
-    """The code, the ErrorInfo and the other details of a call that must fail."""
-    with pytest.raises(grpc.RpcError) as caught:
-        call()
-    status = rpc_status.from_call(caught.value)
-    assert status is not None, caught.value
-    types = (ErrorInfo, BadRequest, ResourceInfo, PreconditionFailure, QuotaFailure)
-    details = []
-    for packed in status.details:
-        (kind,) = (each for each in types if packed.Is(each.DESCRIPTOR))
-        detail = kind()
-        packed.Unpack(detail)
-        details.append(detail)
-    assert isinstance(details[0], ErrorInfo)
-    assert details[0].domain == "dynhull.v1"
-    return caught.value.code(), details[0], details[1:]
 
 
 def apply(**parts: object) -> Callable[[str], pb.ApplyRequest]:
@@ -272,7 +253,7 @@ def test_limits_are_told() -> None:
         assert dict(info.metadata) == {"limit": "max_hulls", "value": "1"}
         assert details[0].violations[0].subject == "max_hulls"
         batch = batch_pb2.Batch(inserts=points_pb2.Points(packed=bytes(16 * 4096)))
-        with pytest.raises(grpc.RpcError, match="4096") as caught:
-            stub.Apply(pb.ApplyRequest(name="one", batch=batch))
-        assert caught.value.code() == grpc.StatusCode.RESOURCE_EXHAUSTED
+        code, info, _ = refusal(lambda: stub.Apply(pb.ApplyRequest(name="one", batch=batch)))
+        assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
+        assert dict(info.metadata) == {"limit": "max_message_bytes", "value": "4096"}
         assert stub.GetHull(pb.GetHullRequest(name="one")).hull.revision == 0

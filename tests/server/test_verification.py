@@ -1,12 +1,14 @@
 """A hull that is wrong is found out."""
 
+import asyncio
+
 import numpy as np
 import pytest
 
 from dynhull_proto.v1 import points_pb2
 from dynhull_server.engine.live_hull import Counts
 from dynhull_server.engine.verification import verify
-from dynhull_server.service.codec import encode_verification
+from dynhull_server.service.encode import encode_verification
 
 POINTS = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4], [1, 1]])
 VERTICES = POINTS[:4]
@@ -23,7 +25,9 @@ VERTICES = POINTS[:4]
     ids=["a vertex less", "the wrong start", "another vertex", "a vertex more"],
 )
 def test_the_first_difference_is_told(live: np.ndarray, row: int, there: list[float], expected: list[float]) -> None:
-    message = encode_verification(Counts(7, 5, 5), verify(POINTS, live), points_pb2.POINT_ENCODING_COORDINATES)
+    message = encode_verification(
+        Counts(7, 5, 5), asyncio.run(verify(POINTS, live)), points_pb2.POINT_ENCODING_COORDINATES
+    )
     assert not message.equal
     assert (message.revision, message.point_count, message.vertex_count) == (7, 5, len(live))
     assert message.first_difference.index == row
@@ -32,4 +36,4 @@ def test_the_first_difference_is_told(live: np.ndarray, row: int, there: list[fl
 
 
 def test_a_right_hull_is_equal() -> None:
-    assert verify(POINTS, VERTICES).difference is None
+    assert asyncio.run(verify(POINTS, VERTICES)).difference is None

@@ -16,14 +16,14 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 from . import messages
 from .batch import Missing, encode_batch
+from .connection import open_channel
 from .errors import error_of
 from .ingest import Ingest
-from .messages import Applied, Hull, HullInfo, Located, Verification
-from .watch import Watch
+from .messages import Applied, Counted, Crossings, Distances, Hull, HullInfo, Located, Supported, Tangents, Verification
+from .watch import HullCopy, Watch
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 DEFAULT_TIMEOUT = 30.0
-MAX_MESSAGE_BYTES = 2**31 - 1
 
 
 class HullClient:
@@ -37,6 +37,9 @@ class HullClient:
         address: host:port.
         timeout: seconds a call may take unless the call says otherwise; None for no limit. Ingests and watches have
             none of themselves.
+        token: the bearer token to show. Over an encrypted connection only, or on this machine.
+        tls: TLS with the server; None for none. `grpc.ssl_channel_credentials()` trusts what the machine trusts; it
+            also takes a root certificate, and a client's key and certificate.
         wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.
     """
 
@@ -46,17 +49,12 @@ class HullClient:
         *,
         timeout: float | None = DEFAULT_TIMEOUT,
         wait_for_ready: bool = False,
+        token: str | None = None,
+        tls: grpc.ChannelCredentials | None = None,
     ) -> None:
         self._timeout = timeout
         self._wait_for_ready = wait_for_ready
-        # The server's limit is the one that counts.
-        self._channel = grpc.insecure_channel(
-            address,
-            options=[
-                ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
-                ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
-            ],
-        )
+        self._channel = open_channel(address, token, tls)
         self._stub = HullServiceStub(self._channel)
 
     def close(self) -> None:
@@ -101,6 +99,8 @@ class HullClient:
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
         missing: Missing = "raise",
+        producer: str = "",
+        sequence: int = 0,
         timeout: float | None = None,
     ) -> Applied:
         """Apply one batch: all of it or nothing, as one revision.
@@ -112,10 +112,13 @@ class HullClient:
             move: origins and destinations, (n, 2) each: row by row a delete and an insert.
             missing: for a point to delete that is not there: "raise" refuses the batch with PointMissingError, which
                 names the row; "count" passes over it and counts it.
+            producer: who numbers the batch, so that it is applied once however often it is sent.
+            sequence: its number. A producer's numbers to a hull are 1, 2, 3, ...; SequenceGapError tells the next one.
             timeout: seconds, instead of the client's.
         """
         batch = encode_batch(insert, delete, move, missing)
-        response = self._call(self._stub.Apply, pb.ApplyRequest(name=name, batch=batch), timeout)
+        request = pb.ApplyRequest(name=name, batch=batch, producer=producer, sequence=sequence)
+        response = self._call(self._stub.Apply, request, timeout)
         return messages.decode_applied(response.result)
 
     def ingest(self, name: str, *, missing: Missing = "raise", timeout: float | None = None) -> Ingest:
@@ -144,6 +147,70 @@ class HullClient:
         response = self._call(self._stub.Locate, request, timeout)
         return Located(response.revision, np.frombuffer(response.sides, np.int8))
 
+    def count(self, name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Counted:
+        """How many times each of (n, 2) points is there."""
+        request = pb.CountRequest(
+            name=name, min_revision=min_revision, points=messages.encode_points(as_points(xy, "xy"))
+        )
+        response = self._call(self._stub.Count, request, timeout)
+        return Counted(response.revision, np.array(response.counts, np.int64))
+
+    def support(
+        self, name: str, directions: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
+    ) -> Supported:
+        """The extreme vertex in each of (n, 2) directions, of any length but 0. Exact.
+
+        HullEmptyError where there are no points.
+        """
+        vectors = messages.encode_points(as_points(directions, "directions"))
+        request = pb.SupportRequest(name=name, min_revision=min_revision, directions=vectors)
+        response = self._call(self._stub.Support, request, timeout)
+        return Supported(response.revision, messages.decode_points(response.vertices))
+
+    def tangents(
+        self, name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
+    ) -> Tangents:
+        """Left and right tangent points from each of (n, 2) points; NaN for those not strictly outside. Exact."""
+        points = messages.encode_points(as_points(xy, "xy"))
+        request = pb.TangentsRequest(name=name, min_revision=min_revision, points=points)
+        response = self._call(self._stub.Tangents, request, timeout)
+        left, right = messages.decode_points(response.left), messages.decode_points(response.right)
+        return Tangents(response.revision, np.stack((left, right), axis=1))
+
+    def distance(
+        self, name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
+    ) -> Distances:
+        """How far each of (n, 2) points is from the hull: 0 inside and on the boundary, infinite from an empty hull."""
+        points = messages.encode_points(as_points(xy, "xy"))
+        request = pb.DistanceRequest(name=name, min_revision=min_revision, points=points)
+        response = self._call(self._stub.Distance, request, timeout)
+        return Distances(response.revision, np.array(response.distances, np.float64))
+
+    def intersect_lines(
+        self,
+        name: str,
+        p: npt.ArrayLike,
+        q: npt.ArrayLike,
+        *,
+        min_revision: int = 0,
+        timeout: float | None = None,
+    ) -> Crossings:
+        """Where the lines through each of (n, 2) points p and q enter and leave the hull; NaN for one that misses."""
+        request = pb.IntersectLinesRequest(
+            name=name,
+            min_revision=min_revision,
+            origins=messages.encode_points(as_points(p, "p")),
+            targets=messages.encode_points(as_points(q, "q")),
+        )
+        response = self._call(self._stub.IntersectLines, request, timeout)
+        entries, exits = messages.decode_points(response.entries), messages.decode_points(response.exits)
+        return Crossings(response.revision, np.stack((entries, exits), axis=1))
+
+    def last_sequence(self, name: str, producer: str, *, timeout: float | None = None) -> int:
+        """The number of the last batch of a producer that was applied; 0 where there is none."""
+        response = self._call(self._stub.GetProducer, pb.GetProducerRequest(name=name, producer=producer), timeout)
+        return int(response.last_sequence)
+
     def get_hull(self, name: str, *, min_revision: int = 0, timeout: float | None = None) -> Hull:
         """The vertices, counts, area, perimeter, centroid and bounds."""
         request = pb.GetHullRequest(name=name, min_revision=min_revision)
@@ -157,6 +224,8 @@ class HullClient:
         max_rate: float = 0.0,
         progress_interval: float | None = None,
         measures: bool = False,
+        resume: HullCopy | None = None,
+        directions: npt.ArrayLike | None = None,
         timeout: float | None = None,
     ) -> Watch:
         """Follow a hull: an iterator of events, with which a `HullCopy` keeps a copy of the hull.
@@ -167,11 +236,18 @@ class HullClient:
             max_rate: at most so many events a second; 0 for no bound. Changes in between are taken together.
             progress_interval: a Progress after so many seconds without an event; None for none.
             measures: whether events carry measures.
+            resume: a copy to bring up to date: changes since then instead of a snapshot. RevisionForgottenError where
+                the server cannot.
+            directions: (k, 2) vectors; instead of vertices, `Sketch` events with the extreme vertices in these.
             timeout: seconds after which the watch ends with DeadlineError; None for never.
         """
         request = pb.WatchRequest(
             name=name, min_revision=min_revision, max_events_per_second=max_rate, include_measures=measures
         )
+        if resume is not None:
+            request.resume.uid, request.resume.revision = resume.uid, resume.revision
+        if directions is not None:
+            request.directions.CopyFrom(messages.encode_points(as_points(directions, "directions")))
         if progress_interval is not None:
             duration = Duration()
             duration.FromTimedelta(timedelta(seconds=progress_interval))

@@ -16,6 +16,8 @@ class DynhullError(Exception):
         field: the field of the request at fault, None where it is none in particular.
         row: the row of the points at fault, None where it is none in particular.
         value: the value at fault as text, or that of the limit exceeded; None where there is none.
+        expected: of a gap in a producer's numbers, the number that should have come.
+        oldest: of a revision that is forgotten, the oldest one that is not.
         batch: of an ingest, how many of its batches were applied before; None of other calls.
     """
 
@@ -26,6 +28,8 @@ class DynhullError(Exception):
         self.field = metadata.get("field")
         self.row = _number(metadata.get("row"))
         self.value = metadata.get("value")
+        self.expected = _number(metadata.get("expected"))
+        self.oldest = _number(metadata.get("oldest"))
         self.batch = _number(metadata.get("batch"))
 
 
@@ -49,6 +53,26 @@ class LimitExceededError(DynhullError):
     """The request goes beyond a limit of the server, such as the size of a message."""
 
 
+class SequenceGapError(DynhullError):
+    """A numbered batch came before the ones that precede it; `expected` is the number of the next one."""
+
+
+class HullEmptyError(DynhullError, ValueError):
+    """A question that a hull without points has no answer to."""
+
+
+class RevisionForgottenError(DynhullError, LookupError):
+    """A watch cannot be resumed from that revision: watch anew. `oldest` is the oldest one that could be resumed."""
+
+
+class UnauthenticatedError(DynhullError):
+    """The server wants a token, and got none or one that it does not know."""
+
+
+class PermissionDeniedError(DynhullError, PermissionError):
+    """The token does not allow it."""
+
+
 class UnavailableError(DynhullError, ConnectionError):
     """There is no server at the address, or it is starting or shutting down."""
 
@@ -57,11 +81,19 @@ class DeadlineError(DynhullError, TimeoutError):
     """The call took longer than its timeout."""
 
 
+BY_REASON: Mapping[str, type[DynhullError]] = {
+    "SEQUENCE_GAP": SequenceGapError,
+    "HULL_EMPTY": HullEmptyError,
+}
+
 BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
     grpc.StatusCode.INVALID_ARGUMENT: InvalidRequestError,
     grpc.StatusCode.NOT_FOUND: HullNotFoundError,
     grpc.StatusCode.ALREADY_EXISTS: HullExistsError,
     grpc.StatusCode.FAILED_PRECONDITION: PointMissingError,
+    grpc.StatusCode.OUT_OF_RANGE: RevisionForgottenError,
+    grpc.StatusCode.UNAUTHENTICATED: UnauthenticatedError,
+    grpc.StatusCode.PERMISSION_DENIED: PermissionDeniedError,
     grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceededError,
     grpc.StatusCode.UNAVAILABLE: UnavailableError,
     grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineError,
@@ -76,7 +108,8 @@ def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
     for detail in [] if status is None else status.details:
         if detail.Is(ErrorInfo.DESCRIPTOR):
             detail.Unpack(info)
-    return BY_CODE.get(code, DynhullError)(message or code.name, code, info.reason, info.metadata)
+    kind = BY_REASON.get(info.reason) or BY_CODE.get(code, DynhullError)
+    return kind(message or code.name, code, info.reason, info.metadata)
 
 
 def _number(text: str | None) -> int | None:

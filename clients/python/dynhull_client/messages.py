@@ -13,13 +13,17 @@ Points = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class HullInfo:
-    """A hull and how much it holds; `points` with multiplicity, `distinct` without."""
+    """A hull and how much it holds; `points` with multiplicity, `distinct` without.
+
+    `uid` tells it from an earlier or later hull of the same name.
+    """
 
     name: str
     revision: int
     points: int
     distinct: int
     created: datetime
+    uid: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +57,8 @@ class Hull:
 class Applied:
     """What a batch did, and the number of points after it. A move counts as one deleted and one inserted.
 
-    `missing` is the number of deletes passed over because the point was not there.
+    `missing` is the number of deletes passed over because the point was not there. A `duplicate` had been applied
+    before; its counts are 0, and the revision is one that has it.
     """
 
     revision: int
@@ -62,11 +67,15 @@ class Applied:
     missing: int
     hull_changed: bool
     points: int
+    duplicate: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Ingested:
-    """What an ingest did in all its `batches`, and the hull's revision and number of points after the last."""
+    """What an ingest did in all its `batches`, and the hull's revision and number of points after the last.
+
+    `duplicates` are batches that had been applied before, by an earlier call of the same producer.
+    """
 
     batches: int
     revision: int
@@ -74,6 +83,7 @@ class Ingested:
     deleted: int
     missing: int
     points: int
+    duplicates: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +95,54 @@ class Located:
 
 
 @dataclass(frozen=True, slots=True)
+class Counted:
+    """How many times points are there, an integer each."""
+
+    revision: int
+    counts: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Supported:
+    """The extreme vertices, (n, 2), one for each direction."""
+
+    revision: int
+    vertices: Points
+
+
+@dataclass(frozen=True, slots=True)
+class Distances:
+    """Distances of points to the hull, (n,): 0 inside and on the boundary, infinite from an empty hull."""
+
+    revision: int
+    distances: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Crossings:
+    """(n, 2, 2) where lines enter and leave the hull, as of `DynamicHull.intersect_lines`."""
+
+    revision: int
+    crossings: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Tangents:
+    """(n, 2, 2) left and right tangent points, as of `DynamicHull.tangents`."""
+
+    revision: int
+    tangents: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The whole hull."""
+    """The whole hull; `uid` is the hull's, for resuming."""
 
     revision: int
     points: int
     vertices: Points
     measures: Measures | None
+    uid: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +164,16 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
+class Sketch:
+    """The extreme vertices in the directions asked for, one each; none where the hull has no points."""
+
+    revision: int
+    points: int
+    vertices: Points
+    measures: Measures | None
+
+
+@dataclass(frozen=True, slots=True)
 class Progress:
     """The hull at this revision is the one of the event before."""
 
@@ -120,7 +181,7 @@ class Progress:
     points: int
 
 
-Event = Snapshot | Change | Progress
+Event = Snapshot | Change | Sketch | Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +233,9 @@ def decode_points(message: points_pb2.Points) -> Points:
 def decode_info(message: hull_pb2.Hull) -> HullInfo:
     """A hull's counts."""
     created = message.create_time.ToDatetime(UTC)
-    return HullInfo(message.name, message.revision, message.point_count, message.distinct_point_count, created)
+    return HullInfo(
+        message.name, message.revision, message.point_count, message.distinct_point_count, created, message.uid
+    )
 
 
 def decode_measures(message: hull_pb2.Measures) -> Measures:
@@ -193,14 +256,26 @@ def decode_hull(message: hull_service_pb2.GetHullResponse) -> Hull:
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:
     """What a batch did."""
     return Applied(
-        message.revision, message.inserted, message.deleted, message.missing, message.hull_changed, message.point_count
+        message.revision,
+        message.inserted,
+        message.deleted,
+        message.missing,
+        message.hull_changed,
+        message.point_count,
+        message.duplicate,
     )
 
 
 def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
     """What an ingest did."""
     return Ingested(
-        message.batches, message.revision, message.inserted, message.deleted, message.missing, message.point_count
+        message.batches,
+        message.revision,
+        message.inserted,
+        message.deleted,
+        message.missing,
+        message.point_count,
+        message.duplicates,
     )
 
 
@@ -208,7 +283,10 @@ def decode_event(message: hull_service_pb2.WatchResponse) -> Event:
     """What a watcher is told."""
     measures = decode_measures(message.measures) if message.HasField("measures") else None
     if message.HasField("snapshot"):
-        return Snapshot(message.revision, message.point_count, decode_points(message.snapshot.vertices), measures)
+        snapshot = message.snapshot
+        return Snapshot(message.revision, message.point_count, decode_points(snapshot.vertices), measures, snapshot.uid)
+    if message.HasField("sketch"):
+        return Sketch(message.revision, message.point_count, decode_points(message.sketch.vertices), measures)
     if message.HasField("change"):
         change = message.change
         return Change(

@@ -51,12 +51,14 @@ class HullCopy:
     """A copy of a watched hull, brought up to date event by event.
 
     Attributes:
+        uid: the hull's, from the snapshot; empty before.
         revision: the revision of the last event; 0 before the first.
         points: how many points the hull had then, with multiplicity.
         vertices: (h, 2) counter-clockwise from the lexicographically smallest; exactly the hull's at that revision.
     """
 
     def __init__(self) -> None:
+        self.uid = ""
         self.revision = 0
         self.points = 0
         self.vertices: Points = np.empty((0, 2))
@@ -64,7 +66,7 @@ class HullCopy:
     def update(self, event: Event) -> None:
         """Do what the event says. O(h)."""
         if isinstance(event, Snapshot):
-            self.vertices = event.vertices
+            self.vertices, self.uid = event.vertices, event.uid
         elif isinstance(event, Change):
             self.vertices = _changed(self.vertices, event)
         self.revision, self.points = event.revision, event.points

@@ -25,19 +25,19 @@ _sym_db = _symbol_database.Default()
 from dynhull_proto.v1 import points_pb2 as dynhull__proto_dot_v1_dot_points__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x64ynhull_proto/v1/batch.proto\x12\ndynhull.v1\x1a\x1d\x64ynhull_proto/v1/points.proto\"\xab\x01\n\x05\x42\x61tch\x12#\n\x07inserts\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12#\n\x07\x64\x65letes\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\x12 \n\x05moves\x18\x03 \x01(\x0b\x32\x11.dynhull.v1.Moves\x12\x36\n\x0emissing_points\x18\x04 \x01(\x0e\x32\x1e.dynhull.v1.MissingPointPolicy\"V\n\x05Moves\x12#\n\x07origins\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12(\n\x0c\x64\x65stinations\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\"~\n\x0b\x42\x61tchResult\x12\x10\n\x08revision\x18\x01 \x01(\x04\x12\x10\n\x08inserted\x18\x02 \x01(\x04\x12\x0f\n\x07\x64\x65leted\x18\x03 \x01(\x04\x12\x0f\n\x07missing\x18\x04 \x01(\x04\x12\x14\n\x0chull_changed\x18\x05 \x01(\x08\x12\x13\n\x0bpoint_count\x18\x06 \x01(\x04*{\n\x12MissingPointPolicy\x12$\n MISSING_POINT_POLICY_UNSPECIFIED\x10\x00\x12\x1f\n\x1bMISSING_POINT_POLICY_REFUSE\x10\x01\x12\x1e\n\x1aMISSING_POINT_POLICY_COUNT\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x64ynhull_proto/v1/batch.proto\x12\ndynhull.v1\x1a\x1d\x64ynhull_proto/v1/points.proto\"\xab\x01\n\x05\x42\x61tch\x12#\n\x07inserts\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12#\n\x07\x64\x65letes\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\x12 \n\x05moves\x18\x03 \x01(\x0b\x32\x11.dynhull.v1.Moves\x12\x36\n\x0emissing_points\x18\x04 \x01(\x0e\x32\x1e.dynhull.v1.MissingPointPolicy\"V\n\x05Moves\x12#\n\x07origins\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12(\n\x0c\x64\x65stinations\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\"\x91\x01\n\x0b\x42\x61tchResult\x12\x10\n\x08revision\x18\x01 \x01(\x04\x12\x10\n\x08inserted\x18\x02 \x01(\x04\x12\x0f\n\x07\x64\x65leted\x18\x03 \x01(\x04\x12\x0f\n\x07missing\x18\x04 \x01(\x04\x12\x14\n\x0chull_changed\x18\x05 \x01(\x08\x12\x13\n\x0bpoint_count\x18\x06 \x01(\x04\x12\x11\n\tduplicate\x18\x07 \x01(\x08*{\n\x12MissingPointPolicy\x12$\n MISSING_POINT_POLICY_UNSPECIFIED\x10\x00\x12\x1f\n\x1bMISSING_POINT_POLICY_REFUSE\x10\x01\x12\x1e\n\x1aMISSING_POINT_POLICY_COUNT\x10\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'dynhull_proto.v1.batch_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_MISSINGPOINTPOLICY']._serialized_start=465
-  _globals['_MISSINGPOINTPOLICY']._serialized_end=588
+  _globals['_MISSINGPOINTPOLICY']._serialized_start=485
+  _globals['_MISSINGPOINTPOLICY']._serialized_end=608
   _globals['_BATCH']._serialized_start=76
   _globals['_BATCH']._serialized_end=247
   _globals['_MOVES']._serialized_start=249
   _globals['_MOVES']._serialized_end=335
-  _globals['_BATCHRESULT']._serialized_start=337
-  _globals['_BATCHRESULT']._serialized_end=463
+  _globals['_BATCHRESULT']._serialized_start=338
+  _globals['_BATCHRESULT']._serialized_end=483
 # @@protoc_insertion_point(module_scope)

@@ -37,17 +37,19 @@ class Moves(_message.Message):
     def __init__(self, origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., destinations: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class BatchResult(_message.Message):
-    __slots__ = ("revision", "inserted", "deleted", "missing", "hull_changed", "point_count")
+    __slots__ = ("revision", "inserted", "deleted", "missing", "hull_changed", "point_count", "duplicate")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     INSERTED_FIELD_NUMBER: _ClassVar[int]
     DELETED_FIELD_NUMBER: _ClassVar[int]
     MISSING_FIELD_NUMBER: _ClassVar[int]
     HULL_CHANGED_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    DUPLICATE_FIELD_NUMBER: _ClassVar[int]
     revision: int
     inserted: int
     deleted: int
     missing: int
     hull_changed: bool
     point_count: int
-    def __init__(self, revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., hull_changed: bool = ..., point_count: _Optional[int] = ...) -> None: ...
+    duplicate: bool
+    def __init__(self, revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., hull_changed: bool = ..., point_count: _Optional[int] = ..., duplicate: bool = ...) -> None: ...

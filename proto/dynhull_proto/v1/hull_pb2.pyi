@@ -17,26 +17,30 @@ IDENTITY_UNSPECIFIED: Identity
 IDENTITY_MULTISET: Identity
 
 class Hull(_message.Message):
-    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time")
+    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     CONFIG_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     DISTINCT_POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     CREATE_TIME_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     config: HullConfig
     revision: int
     point_count: int
     distinct_point_count: int
     create_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    uid: str
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class HullConfig(_message.Message):
-    __slots__ = ("identity",)
+    __slots__ = ("identity", "max_points")
     IDENTITY_FIELD_NUMBER: _ClassVar[int]
+    MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
     identity: Identity
-    def __init__(self, identity: _Optional[_Union[Identity, str]] = ...) -> None: ...
+    max_points: int
+    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ...) -> None: ...
 
 class Measures(_message.Message):
     __slots__ = ("area", "perimeter", "centroid_x", "centroid_y", "min_x", "min_y", "max_x", "max_y")

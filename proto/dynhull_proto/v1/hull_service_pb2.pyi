@@ -5,12 +5,22 @@ from dynhull_proto.v1 import hull_pb2 as _hull_pb2
 from dynhull_proto.v1 import points_pb2 as _points_pb2
 from google.protobuf import duration_pb2 as _duration_pb2
 from google.protobuf.internal import containers as _containers
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from collections.abc import Iterable as _Iterable, Mapping as _Mapping
 from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
+
+class HullView(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    HULL_VIEW_UNSPECIFIED: _ClassVar[HullView]
+    HULL_VIEW_BASIC: _ClassVar[HullView]
+    HULL_VIEW_FULL: _ClassVar[HullView]
+HULL_VIEW_UNSPECIFIED: HullView
+HULL_VIEW_BASIC: HullView
+HULL_VIEW_FULL: HullView
 
 class CreateHullRequest(_message.Message):
     __slots__ = ("name", "config")
@@ -55,12 +65,16 @@ class ListHullsResponse(_message.Message):
     def __init__(self, hulls: _Optional[_Iterable[_Union[_hull_pb2.Hull, _Mapping]]] = ..., next_page_token: _Optional[str] = ...) -> None: ...
 
 class ApplyRequest(_message.Message):
-    __slots__ = ("name", "batch")
+    __slots__ = ("name", "batch", "producer", "sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
+    PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ...) -> None: ...
+    producer: str
+    sequence: int
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class ApplyResponse(_message.Message):
     __slots__ = ("result",)
@@ -69,28 +83,68 @@ class ApplyResponse(_message.Message):
     def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ...) -> None: ...
 
 class IngestRequest(_message.Message):
-    __slots__ = ("name", "batch")
+    __slots__ = ("name", "batch", "producer", "sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
+    PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ...) -> None: ...
+    producer: str
+    sequence: int
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class IngestResponse(_message.Message):
-    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count")
+    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates")
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
     INSERTED_FIELD_NUMBER: _ClassVar[int]
     DELETED_FIELD_NUMBER: _ClassVar[int]
     MISSING_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    DUPLICATES_FIELD_NUMBER: _ClassVar[int]
     batches: int
     revision: int
     inserted: int
     deleted: int
     missing: int
     point_count: int
-    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ...) -> None: ...
+    duplicates: int
+    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ...) -> None: ...
+
+class StreamRequest(_message.Message):
+    __slots__ = ("name", "batch", "producer", "sequence")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    BATCH_FIELD_NUMBER: _ClassVar[int]
+    PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    batch: _batch_pb2.Batch
+    producer: str
+    sequence: int
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
+
+class StreamResponse(_message.Message):
+    __slots__ = ("result", "sequence")
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    result: _batch_pb2.BatchResult
+    sequence: int
+    def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ..., sequence: _Optional[int] = ...) -> None: ...
+
+class GetProducerRequest(_message.Message):
+    __slots__ = ("name", "producer")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    producer: str
+    def __init__(self, name: _Optional[str] = ..., producer: _Optional[str] = ...) -> None: ...
+
+class GetProducerResponse(_message.Message):
+    __slots__ = ("last_sequence",)
+    LAST_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    last_sequence: int
+    def __init__(self, last_sequence: _Optional[int] = ...) -> None: ...
 
 class LocateRequest(_message.Message):
     __slots__ = ("name", "min_revision", "points")
@@ -110,15 +164,119 @@ class LocateResponse(_message.Message):
     sides: bytes
     def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ...) -> None: ...
 
-class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding")
+class CountRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "points")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    points: _points_pb2.Points
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class CountResponse(_message.Message):
+    __slots__ = ("revision", "counts")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    COUNTS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    counts: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, revision: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ...) -> None: ...
+
+class SupportRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "directions", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
+    directions: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class SupportResponse(_message.Message):
+    __slots__ = ("revision", "vertices")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    vertices: _points_pb2.Points
+    def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class TangentsRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "points", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    points: _points_pb2.Points
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class TangentsResponse(_message.Message):
+    __slots__ = ("revision", "left", "right")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    LEFT_FIELD_NUMBER: _ClassVar[int]
+    RIGHT_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    left: _points_pb2.Points
+    right: _points_pb2.Points
+    def __init__(self, revision: _Optional[int] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class DistanceRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "points")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    points: _points_pb2.Points
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class DistanceResponse(_message.Message):
+    __slots__ = ("revision", "distances")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    DISTANCES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    distances: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class IntersectLinesRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "origins", "targets", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ORIGINS_FIELD_NUMBER: _ClassVar[int]
+    TARGETS_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    origins: _points_pb2.Points
+    targets: _points_pb2.Points
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class IntersectLinesResponse(_message.Message):
+    __slots__ = ("revision", "entries", "exits")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENTRIES_FIELD_NUMBER: _ClassVar[int]
+    EXITS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    entries: _points_pb2.Points
+    exits: _points_pb2.Points
+    def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class GetHullRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding", "view")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    VIEW_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    view: HullView
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
     __slots__ = ("hull", "vertices", "measures")
@@ -131,38 +289,60 @@ class GetHullResponse(_message.Message):
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
 
 class WatchRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval")
+    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_MEASURES_FIELD_NUMBER: _ClassVar[int]
     MAX_EVENTS_PER_SECOND_FIELD_NUMBER: _ClassVar[int]
     PROGRESS_INTERVAL_FIELD_NUMBER: _ClassVar[int]
+    RESUME_FIELD_NUMBER: _ClassVar[int]
+    DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     include_measures: bool
     max_events_per_second: float
     progress_interval: _duration_pb2.Duration
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ...) -> None: ...
+    resume: WatchResume
+    directions: _points_pb2.Points
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class WatchResume(_message.Message):
+    __slots__ = ("uid", "revision")
+    UID_FIELD_NUMBER: _ClassVar[int]
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    uid: str
+    revision: int
+    def __init__(self, uid: _Optional[str] = ..., revision: _Optional[int] = ...) -> None: ...
 
 class WatchResponse(_message.Message):
-    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "measures")
+    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
     CHANGE_FIELD_NUMBER: _ClassVar[int]
     PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    SKETCH_FIELD_NUMBER: _ClassVar[int]
     MEASURES_FIELD_NUMBER: _ClassVar[int]
     revision: int
     point_count: int
     snapshot: HullSnapshot
     change: HullChange
     progress: HullProgress
+    sketch: HullSketch
     measures: _hull_pb2.Measures
-    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
+    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
 
 class HullSnapshot(_message.Message):
+    __slots__ = ("vertices", "uid")
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
+    vertices: _points_pb2.Points
+    uid: str
+    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., uid: _Optional[str] = ...) -> None: ...
+
+class HullSketch(_message.Message):
     __slots__ = ("vertices",)
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     vertices: _points_pb2.Points

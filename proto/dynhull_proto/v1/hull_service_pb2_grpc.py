@@ -33,6 +33,11 @@ class HullServiceStub(object):
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
 
+    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
+    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
+    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
+    batch that was refused has not used up its number.
+
     A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
     response is from one revision.
     """
@@ -68,10 +73,45 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IngestRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IngestResponse.FromString,
                 _registered_method=True)
+        self.Stream = channel.stream_stream(
+                '/dynhull.v1.HullService/Stream',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.StreamRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.StreamResponse.FromString,
+                _registered_method=True)
+        self.GetProducer = channel.unary_unary(
+                '/dynhull.v1.HullService/GetProducer',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetProducerRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetProducerResponse.FromString,
+                _registered_method=True)
         self.Locate = channel.unary_unary(
                 '/dynhull.v1.HullService/Locate',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.LocateRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.LocateResponse.FromString,
+                _registered_method=True)
+        self.Count = channel.unary_unary(
+                '/dynhull.v1.HullService/Count',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountResponse.FromString,
+                _registered_method=True)
+        self.Support = channel.unary_unary(
+                '/dynhull.v1.HullService/Support',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SupportRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SupportResponse.FromString,
+                _registered_method=True)
+        self.Tangents = channel.unary_unary(
+                '/dynhull.v1.HullService/Tangents',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsResponse.FromString,
+                _registered_method=True)
+        self.Distance = channel.unary_unary(
+                '/dynhull.v1.HullService/Distance',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceResponse.FromString,
+                _registered_method=True)
+        self.IntersectLines = channel.unary_unary(
+                '/dynhull.v1.HullService/IntersectLines',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesResponse.FromString,
                 _registered_method=True)
         self.GetHull = channel.unary_unary(
                 '/dynhull.v1.HullService/GetHull',
@@ -98,6 +138,11 @@ class HullServiceServicer(object):
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
 
+    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
+    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
+    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
+    batch that was refused has not used up its number.
+
     A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
     response is from one revision.
     """
@@ -117,7 +162,7 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ListHulls(self, request, context):
-        """Hulls in the order of their names, a page at a time.
+        """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -138,6 +183,21 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def Stream(self, request_iterator, context):
+        """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
+        ends the call, as in Ingest, after the acknowledgements of the ones before it.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def GetProducer(self, request, context):
+        """The last sequence number of a producer that was applied.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Locate(self, request, context):
         """Says of points whether they are inside, on the boundary or outside. Exact.
         """
@@ -145,8 +205,43 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def Count(self, request, context):
+        """How many times each of some points is there.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Support(self, request, context):
+        """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Tangents(self, request, context):
+        """The tangent points seen from outside. Exact.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Distance(self, request, context):
+        """The distance of points to the hull.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def IntersectLines(self, request, context):
+        """Where lines enter and leave the hull.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def GetHull(self, request, context):
-        """The hull's vertices, counts and measures.
+        """The hull's counts, vertices and measures.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -195,10 +290,45 @@ def add_HullServiceServicer_to_server(servicer, server):
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IngestRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IngestResponse.SerializeToString,
             ),
+            'Stream': grpc.stream_stream_rpc_method_handler(
+                    servicer.Stream,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.StreamRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.StreamResponse.SerializeToString,
+            ),
+            'GetProducer': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetProducer,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetProducerRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetProducerResponse.SerializeToString,
+            ),
             'Locate': grpc.unary_unary_rpc_method_handler(
                     servicer.Locate,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.LocateRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.LocateResponse.SerializeToString,
+            ),
+            'Count': grpc.unary_unary_rpc_method_handler(
+                    servicer.Count,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountResponse.SerializeToString,
+            ),
+            'Support': grpc.unary_unary_rpc_method_handler(
+                    servicer.Support,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SupportRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SupportResponse.SerializeToString,
+            ),
+            'Tangents': grpc.unary_unary_rpc_method_handler(
+                    servicer.Tangents,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsResponse.SerializeToString,
+            ),
+            'Distance': grpc.unary_unary_rpc_method_handler(
+                    servicer.Distance,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceResponse.SerializeToString,
+            ),
+            'IntersectLines': grpc.unary_unary_rpc_method_handler(
+                    servicer.IntersectLines,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesResponse.SerializeToString,
             ),
             'GetHull': grpc.unary_unary_rpc_method_handler(
                     servicer.GetHull,
@@ -230,6 +360,11 @@ class HullService(object):
     "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+
+    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
+    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
+    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
+    batch that was refused has not used up its number.
 
     A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
     response is from one revision.
@@ -371,6 +506,60 @@ class HullService(object):
             _registered_method=True)
 
     @staticmethod
+    def Stream(request_iterator,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.stream_stream(
+            request_iterator,
+            target,
+            '/dynhull.v1.HullService/Stream',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.StreamRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.StreamResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetProducer(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/GetProducer',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetProducerRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetProducerResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
     def Locate(request,
             target,
             options=(),
@@ -387,6 +576,141 @@ class HullService(object):
             '/dynhull.v1.HullService/Locate',
             dynhull__proto_dot_v1_dot_hull__service__pb2.LocateRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.LocateResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Count(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Count',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.CountRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.CountResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Support(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Support',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SupportRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SupportResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Tangents(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Tangents',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.TangentsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Distance(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Distance',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.DistanceResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def IntersectLines(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/IntersectLines',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.IntersectLinesResponse.FromString,
             options,
             channel_credentials,
             insecure,

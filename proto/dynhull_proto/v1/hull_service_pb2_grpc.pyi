@@ -34,6 +34,11 @@ class HullServiceStub:
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
 
+    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
+    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
+    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
+    batch that was refused has not used up its number.
+
     A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
     response is from one revision.
     """
@@ -47,17 +52,33 @@ class HullServiceStub:
     DeleteHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.DeleteHullRequest, _hull_service_pb2.DeleteHullResponse]
     """Removes a hull with its points. Its watchers end with NOT_FOUND."""
     ListHulls: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHullsRequest, _hull_service_pb2.ListHullsResponse]
-    """Hulls in the order of their names, a page at a time."""
+    """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read."""
     Apply: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]
     """Applies one batch."""
     Ingest: _grpc.StreamUnaryMultiCallable[_hull_service_pb2.IngestRequest, _hull_service_pb2.IngestResponse]
     """Applies many batches to one hull, in order, and answers once at the end. A batch that is refused ends the call; the
     ones before it stay applied, and the error's metadata say how many they are ("batch").
     """
+    Stream: _grpc.StreamStreamMultiCallable[_hull_service_pb2.StreamRequest, _hull_service_pb2.StreamResponse]
+    """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
+    ends the call, as in Ingest, after the acknowledgements of the ones before it.
+    """
+    GetProducer: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetProducerRequest, _hull_service_pb2.GetProducerResponse]
+    """The last sequence number of a producer that was applied."""
     Locate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.LocateRequest, _hull_service_pb2.LocateResponse]
     """Says of points whether they are inside, on the boundary or outside. Exact."""
+    Count: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]
+    """How many times each of some points is there."""
+    Support: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]
+    """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
+    Tangents: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]
+    """The tangent points seen from outside. Exact."""
+    Distance: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]
+    """The distance of points to the hull."""
+    IntersectLines: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]
+    """Where lines enter and leave the hull."""
     GetHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]
-    """The hull's vertices, counts and measures."""
+    """The hull's counts, vertices and measures."""
     Watch: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]
     """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
     what it has received always makes the exact hull at the revision of the last event.
@@ -74,6 +95,11 @@ class HullServiceAsyncStub(HullServiceStub):
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
 
+    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
+    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
+    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
+    batch that was refused has not used up its number.
+
     A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
     response is from one revision.
     """
@@ -84,17 +110,33 @@ class HullServiceAsyncStub(HullServiceStub):
     DeleteHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.DeleteHullRequest, _hull_service_pb2.DeleteHullResponse]  # type: ignore[assignment]
     """Removes a hull with its points. Its watchers end with NOT_FOUND."""
     ListHulls: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHullsRequest, _hull_service_pb2.ListHullsResponse]  # type: ignore[assignment]
-    """Hulls in the order of their names, a page at a time."""
+    """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read."""
     Apply: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]  # type: ignore[assignment]
     """Applies one batch."""
     Ingest: _aio.StreamUnaryMultiCallable[_hull_service_pb2.IngestRequest, _hull_service_pb2.IngestResponse]  # type: ignore[assignment]
     """Applies many batches to one hull, in order, and answers once at the end. A batch that is refused ends the call; the
     ones before it stay applied, and the error's metadata say how many they are ("batch").
     """
+    Stream: _aio.StreamStreamMultiCallable[_hull_service_pb2.StreamRequest, _hull_service_pb2.StreamResponse]  # type: ignore[assignment]
+    """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
+    ends the call, as in Ingest, after the acknowledgements of the ones before it.
+    """
+    GetProducer: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetProducerRequest, _hull_service_pb2.GetProducerResponse]  # type: ignore[assignment]
+    """The last sequence number of a producer that was applied."""
     Locate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.LocateRequest, _hull_service_pb2.LocateResponse]  # type: ignore[assignment]
     """Says of points whether they are inside, on the boundary or outside. Exact."""
+    Count: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]  # type: ignore[assignment]
+    """How many times each of some points is there."""
+    Support: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]  # type: ignore[assignment]
+    """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
+    Tangents: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]  # type: ignore[assignment]
+    """The tangent points seen from outside. Exact."""
+    Distance: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]  # type: ignore[assignment]
+    """The distance of points to the hull."""
+    IntersectLines: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]  # type: ignore[assignment]
+    """Where lines enter and leave the hull."""
     GetHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]  # type: ignore[assignment]
-    """The hull's vertices, counts and measures."""
+    """The hull's counts, vertices and measures."""
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
     """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
     what it has received always makes the exact hull at the revision of the last event.
@@ -109,6 +151,11 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+
+    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
+    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
+    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
+    batch that was refused has not used up its number.
 
     A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
     response is from one revision.
@@ -136,7 +183,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.ListHullsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.ListHullsResponse, _abc.Awaitable[_hull_service_pb2.ListHullsResponse]]:
-        """Hulls in the order of their names, a page at a time."""
+        """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read."""
 
     @_abc_1.abstractmethod
     def Apply(
@@ -157,6 +204,24 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         """
 
     @_abc_1.abstractmethod
+    def Stream(
+        self,
+        request_iterator: _MaybeAsyncIterator[_hull_service_pb2.StreamRequest],
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.StreamResponse], _abc.AsyncIterator[_hull_service_pb2.StreamResponse]]:
+        """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
+        ends the call, as in Ingest, after the acknowledgements of the ones before it.
+        """
+
+    @_abc_1.abstractmethod
+    def GetProducer(
+        self,
+        request: _hull_service_pb2.GetProducerRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetProducerResponse, _abc.Awaitable[_hull_service_pb2.GetProducerResponse]]:
+        """The last sequence number of a producer that was applied."""
+
+    @_abc_1.abstractmethod
     def Locate(
         self,
         request: _hull_service_pb2.LocateRequest,
@@ -165,12 +230,52 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         """Says of points whether they are inside, on the boundary or outside. Exact."""
 
     @_abc_1.abstractmethod
+    def Count(
+        self,
+        request: _hull_service_pb2.CountRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.CountResponse, _abc.Awaitable[_hull_service_pb2.CountResponse]]:
+        """How many times each of some points is there."""
+
+    @_abc_1.abstractmethod
+    def Support(
+        self,
+        request: _hull_service_pb2.SupportRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.SupportResponse, _abc.Awaitable[_hull_service_pb2.SupportResponse]]:
+        """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
+
+    @_abc_1.abstractmethod
+    def Tangents(
+        self,
+        request: _hull_service_pb2.TangentsRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.TangentsResponse, _abc.Awaitable[_hull_service_pb2.TangentsResponse]]:
+        """The tangent points seen from outside. Exact."""
+
+    @_abc_1.abstractmethod
+    def Distance(
+        self,
+        request: _hull_service_pb2.DistanceRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.DistanceResponse, _abc.Awaitable[_hull_service_pb2.DistanceResponse]]:
+        """The distance of points to the hull."""
+
+    @_abc_1.abstractmethod
+    def IntersectLines(
+        self,
+        request: _hull_service_pb2.IntersectLinesRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.IntersectLinesResponse, _abc.Awaitable[_hull_service_pb2.IntersectLinesResponse]]:
+        """Where lines enter and leave the hull."""
+
+    @_abc_1.abstractmethod
     def GetHull(
         self,
         request: _hull_service_pb2.GetHullRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetHullResponse, _abc.Awaitable[_hull_service_pb2.GetHullResponse]]:
-        """The hull's vertices, counts and measures."""
+        """The hull's counts, vertices and measures."""
 
     @_abc_1.abstractmethod
     def Watch(

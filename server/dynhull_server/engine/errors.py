@@ -45,7 +45,69 @@ class LimitExceededError(RefusedError):
         maximum: its value.
     """
 
-    def __init__(self, limit: str, maximum: int) -> None:
+    def __init__(self, limit: str, maximum: float) -> None:
         super().__init__(f"the server's limit {limit} is {maximum}")
         self.limit = limit
         self.maximum = maximum
+
+
+class SequenceGapError(RefusedError):
+    """A producer's batch has a number beyond the next one.
+
+    Attributes:
+        producer: who numbers.
+        sequence: the number.
+        expected: the one that should have come.
+    """
+
+    def __init__(self, producer: str, sequence: int, expected: int) -> None:
+        super().__init__(f"batch {sequence} of producer {producer!r} came where {expected} was expected")
+        self.producer = producer
+        self.sequence = sequence
+        self.expected = expected
+
+
+class HullEmptyError(RefusedError):
+    """A question that a hull without points has no answer to."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"the hull {name!r} has no points, so none is extreme")
+        self.name = name
+
+
+class RevisionForgottenError(RefusedError):
+    """The hull of that revision is not remembered.
+
+    Attributes:
+        revision: the revision.
+        oldest: the oldest revision remembered.
+        newest: the newest.
+    """
+
+    def __init__(self, revision: int, oldest: int, newest: int) -> None:
+        super().__init__(f"revision {revision} is not remembered: the oldest is {oldest}, the newest {newest}")
+        self.revision = revision
+        self.oldest = oldest
+        self.newest = newest
+
+
+class HullReplacedError(RefusedError):
+    """The hull of that name is another one than before.
+
+    Attributes:
+        name: the name.
+        uid: the uid of the hull there is now.
+    """
+
+    def __init__(self, name: str, uid: str) -> None:
+        super().__init__(f"the hull {name!r} is another one than the one resumed, it has the uid {uid}")
+        self.name = name
+        self.uid = uid
+
+
+class StorageError(RefusedError):
+    """The disk did not take a change; nothing of it was applied."""
+
+
+class StorageFullError(StorageError):
+    """There is no room on the disk; nothing of the change was applied."""

@@ -1,63 +1,140 @@
-"""Work on one hull, off the event loop and in order."""
+"""Work on one hull, in order: small work at once, the rest off the event loop; what it wrote, committed before told."""
 
 import asyncio
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-Job = tuple[Callable[[], Any], asyncio.Future[Any]]
+Outcome = tuple[Any, Exception | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Work to do, and whom to tell."""
+
+    function: Callable[[], Any]
+    done: Callable[[Any, Exception | None], None]
+    writes: bool
 
 
 class SerialExecutor:
-    """Runs functions on a pool of threads, one at a time and in the order they came.
+    """Runs functions one at a time and in the order they came. To be used on one event loop.
 
-    Whatever waits when the pool is ready goes there in one trip. A caller that is cancelled stops waiting; its function
-    runs all the same once it has been handed to the pool.
+    A small function runs at once where nothing is under way: the trip to another thread would take longer. Everything
+    else goes to a pool of threads, and whatever waits when the pool is ready goes there in one trip. Nobody is told
+    anything before the trip is committed: so batches that come during one commit share the next, and no reader sees
+    what a power failure could take back.
 
     Args:
         pool: where the functions run.
-        after: called on the event loop after each trip.
+        commit: called after each trip, in its thread; what to wait for before anybody is told, None for nothing.
+        roll_back: called in a thread of the pool where a commit failed. Writes are told the exception it returns, reads
+            run again.
+        after: called on the event loop whenever something has run and is committed, before its callers are told.
     """
 
-    def __init__(self, pool: Executor, after: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        pool: Executor,
+        commit: Callable[[], Future[None] | None],
+        roll_back: Callable[[BaseException], Exception],
+        after: Callable[[], None],
+    ) -> None:
         self._pool = pool
+        self._commit = commit
+        self._roll_back = roll_back
         self._after = after
-        self._waiting: deque[Job] = deque()
-        self._running: asyncio.Task[None] | None = None
+        self._waiting: list[Job] = []
+        self._busy = False
 
-    async def run(self, function: Callable[[], T]) -> T:
-        """The function's result, or its exception."""
+    def submit(
+        self,
+        function: Callable[[], T],
+        done: Callable[[Any, Exception | None], None],
+        *,
+        small: bool,
+        writes: bool = False,
+    ) -> None:
+        """Call `function`, and `done` with its result or its exception, on the event loop."""
+        job = Job(function, done, writes)
         loop = asyncio.get_running_loop()
-        future: asyncio.Future[T] = loop.create_future()
-        self._waiting.append((function, future))
-        if self._running is None:
-            self._running = loop.create_task(self._run_waiting())
+        if small and not self._busy:
+            outcomes = _outcomes([job])
+            pending = self._commit()
+            if pending is None:
+                self._after()
+                done(*outcomes[0])
+                return
+            self._busy = True
+            self._await(loop, [job], outcomes, pending)
+            return
+        self._waiting.append(job)
+        if not self._busy:
+            self._busy = True
+            self._start_trip(loop)
+
+    async def run(self, function: Callable[[], T], *, small: bool, writes: bool = False) -> T:
+        """The function's result, or its exception. A caller that is cancelled stops waiting, its function runs."""
+        future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+
+        def done(result: T, error: Exception | None) -> None:
+            if future.done():
+                return
+            if error is None:
+                future.set_result(result)
+            else:
+                future.set_exception(error)
+
+        self.submit(function, done, small=small, writes=writes)
         return await future
 
-    async def _run_waiting(self) -> None:
-        loop = asyncio.get_running_loop()
-        while self._waiting:
-            jobs = [job for job in self._waiting if not job[1].done()]
-            self._waiting.clear()
-            outcomes = await loop.run_in_executor(self._pool, _outcomes, jobs)
-            self._after()
-            for (_, future), (result, error) in zip(jobs, outcomes, strict=True):
-                if future.done():
-                    continue
-                if error is None:
-                    future.set_result(result)
-                else:
-                    future.set_exception(error)
-        self._running = None
+    def _start_trip(self, loop: asyncio.AbstractEventLoop) -> None:
+        jobs, self._waiting = self._waiting, []
+
+        def trip() -> None:
+            outcomes = _outcomes(jobs)
+            pending = self._commit()
+            if pending is None:
+                loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)
+            else:
+                self._await(loop, jobs, outcomes, pending)
+
+        self._pool.submit(trip)
+
+    def _await(
+        self, loop: asyncio.AbstractEventLoop, jobs: list[Job], outcomes: list[Outcome], pending: Future[None]
+    ) -> None:
+        def committed(pending: Future[None]) -> None:
+            failure = pending.exception()
+            if failure is None:
+                loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)
+            else:
+                self._pool.submit(self._retreat, loop, jobs, failure)
+
+        pending.add_done_callback(committed)
+
+    def _retreat(self, loop: asyncio.AbstractEventLoop, jobs: list[Job], failure: BaseException) -> None:
+        error = self._roll_back(failure)
+        outcomes = [(None, error) if job.writes else _outcomes([job])[0] for job in jobs]
+        loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)
+
+    def _end_trip(self, loop: asyncio.AbstractEventLoop, jobs: list[Job], outcomes: list[Outcome]) -> None:
+        self._after()
+        if self._waiting:
+            self._start_trip(loop)
+        else:
+            self._busy = False
+        for job, outcome in zip(jobs, outcomes, strict=True):
+            job.done(*outcome)
 
 
-def _outcomes(jobs: list[Job]) -> list[tuple[Any, Exception | None]]:
-    outcomes: list[tuple[Any, Exception | None]] = []
-    for function, _ in jobs:
+def _outcomes(jobs: list[Job]) -> list[Outcome]:
+    outcomes: list[Outcome] = []
+    for job in jobs:
         try:
-            outcomes.append((function(), None))
+            outcomes.append((job.function(), None))
         except Exception as error:  # whatever it is, it belongs to the caller
             outcomes.append((None, error))
     return outcomes

@@ -1,93 +1,187 @@
-"""The calls under way: their refusals become statuses, and a draining server ends those that wait."""
+"""The calls under way: who calls, how many there are, refusals as statuses, what a draining server cuts off."""
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+import time
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager, nullcontext
+from types import TracebackType
 from typing import Any
 
 import grpc
-from google.protobuf.message import DecodeError
+from google.protobuf.message import Message
 from grpc_status import rpc_status
 
-from .status import ANSWERED, DrainingError, error_status
+from ..engine.errors import LimitExceededError
+from .access import Access
+from .metrics import Metrics
+from .status import ANSWERED, DrainingError, StartingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
+
+SUSPICIOUS = ("UNAUTHENTICATED", "PERMISSION_DENIED")
 
 log = logging.getLogger(__name__)
 
 
-class Progress:
-    """How many batches a call has applied; None for calls that apply none or one."""
+class Call:
+    """One call.
 
-    batches: int | None = None
+    Attributes:
+        access: what the caller may do.
+        batches: how many batches the call has applied; None for calls that apply none or one.
+    """
+
+    def __init__(self, calls: "Calls", context: Context, access: Access) -> None:
+        self.access = access
+        self.batches: int | None = None
+        self.cutoff = calls.cutoff
+        self._context = context
+        self._max_message_bytes = calls.max_message_bytes
+
+    async def read(self) -> Any:
+        """The next message, None after the last."""
+        message = await self._context.read()
+        if isinstance(message, Exception):
+            raise message
+        return None if message is grpc.aio.EOF else message
+
+    async def write(self, message: Message, patience: float | None = None) -> None:
+        """Send a message. Waits while the client does not read.
+
+        Raises LimitExceededError where that took longer than `patience` seconds: the client will get the message and
+        then the error, for gRPC cannot take back what it has begun to send.
+        """
+        self.check_size(message)
+        begun = time.monotonic()
+        await self._context.write(message)
+        if patience is not None and time.monotonic() - begun > patience:
+            raise LimitExceededError("max_watch_lag", patience)
+
+    def check_size(self, message: Message) -> None:
+        """Raise LimitExceededError where a message is too large to be sent."""
+        if message.ByteSize() > self._max_message_bytes:
+            raise LimitExceededError("max_message_bytes", self._max_message_bytes)
 
 
 class Calls:
-    """Every call runs inside `short`, `waiting` or `streaming`, which take its request to see whether it is one."""
+    """Every call runs inside `enter`.
 
-    def __init__(self) -> None:
-        self._draining = False
+    Args:
+        authenticate: what the caller with this metadata may do; raises UnauthenticatedError.
+        metrics: where calls are counted.
+        max_message_bytes: the largest message sent.
+        max_streams: how many streaming calls there may be at a time.
+    """
+
+    def __init__(
+        self,
+        authenticate: Callable[[Mapping[str, Any]], Access],
+        metrics: Metrics,
+        max_message_bytes: int,
+        max_streams: int,
+    ) -> None:
+        self.max_message_bytes = max_message_bytes
+        self._authenticate = authenticate
+        self._metrics = metrics
+        self._max_streams = max_streams
+        self._streams = 0
+        self._starting = True
+        self.draining = False
         self._short: set[asyncio.Task[Any]] = set()
-        self._cutoffs: set[asyncio.Timeout] = set()
+        self.waiting: set[asyncio.Task[Any]] = set()
+
+    def ready(self) -> None:
+        """From now on calls are served: before, they are told that the server is starting."""
+        self._starting = False
 
     async def drain(self, grace: float) -> None:
         """End the calls that wait, refuse new ones, and let the short ones finish for up to `grace` seconds."""
-        self._draining = True
-        for cutoff in self._cutoffs:
-            cutoff.reschedule(asyncio.get_running_loop().time())
+        self.draining = True
+        for task in self.waiting:
+            task.cancel()
         if self._short:
             await asyncio.wait(self._short, timeout=grace)
 
     @asynccontextmanager
-    async def short(self, context: Context, request: object) -> AsyncIterator[None]:
-        """A call that ends by itself, and that a draining server finishes."""
-        async with self.streaming(context, request):
-            task = asyncio.current_task()
-            assert task is not None  # gRPC runs each call in a task
-            self._short.add(task)
-            task.add_done_callback(self._short.discard)
-            yield
-
-    @asynccontextmanager
-    async def waiting(self, context: Context, request: object) -> AsyncIterator[Progress]:
-        """A call that may wait for others: for a revision, or for its client's next message."""
-        async with self.streaming(context, request) as progress, self.cutoff():
-            yield progress
-
-    @asynccontextmanager
-    async def streaming(self, context: Context, request: object) -> AsyncIterator[Progress]:
-        """A call that waits inside `cutoff` only.
-
-        A generator must not yield inside it: what is cut off would be gRPC's sending.
-        """
-        progress = Progress()
+    async def enter(self, method: str, context: Context, request: object, *, stream: bool) -> AsyncIterator[Call]:
+        """A call. Its refusals become statuses."""
+        begun = time.perf_counter()
+        code = "OK"
+        call = None
         try:
-            if self._draining:
+            if self._starting:
+                raise StartingError
+            if self.draining:
                 raise DrainingError
-            if isinstance(request, DecodeError):
+            call = Call(self, context, self._authenticate(dict(context.invocation_metadata() or ())))
+            if isinstance(request, Exception):
                 raise request
-            yield progress
+            with self._streaming() if stream else nullcontext():
+                yield call
         except ANSWERED as error:
-            status = rpc_status.to_status(error_status(error, progress.batches))
+            status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
+            code = status.code.name
+            if code in SUSPICIOUS:
+                log.warning(status.details, extra={"method": method, "code": code, "peer": context.peer()})
             await context.abort(status.code, status.details, status.trailing_metadata)
-        except grpc.aio.AbortError:
+        except asyncio.CancelledError:
+            code = "CANCELLED"
             raise
         except Exception:
-            log.exception("a call failed; this is a bug")
+            code = "INTERNAL"
+            log.exception("a call failed; this is a bug", extra={"method": method})
             await context.abort(grpc.StatusCode.INTERNAL, "internal error, see the server's log")
+        finally:
+            self._metrics.call(method, code, time.perf_counter() - begun)
 
-    @asynccontextmanager
-    async def cutoff(self) -> AsyncIterator[None]:
-        """Whatever happens inside ends with DrainingError when the server drains."""
-        if self._draining:
-            raise DrainingError
+    @contextmanager
+    def short(self) -> Iterator[None]:
+        """What happens inside is finished by a draining server."""
+        task = _current_task()
+        self._short.add(task)
+        task.add_done_callback(self._short.discard)
+        yield
+
+    def cutoff(self) -> "Cutoff":
+        """Whatever happens inside ends with DrainingError when the server drains.
+
+        It must not be sending: a message cut off half-way would leave the call without a status.
+        """
+        return Cutoff(self)
+
+    @contextmanager
+    def _streaming(self) -> Iterator[None]:
+        if self._streams >= self._max_streams:
+            raise LimitExceededError("max_streams", self._max_streams)
+        self._streams += 1
         try:
-            async with asyncio.timeout(None) as cutoff:
-                self._cutoffs.add(cutoff)
-                try:
-                    yield
-                finally:
-                    self._cutoffs.discard(cutoff)
-        except TimeoutError:
+            yield
+        finally:
+            self._streams -= 1
+
+
+class Cutoff:
+    """The context of `Calls.cutoff`. A class, because each message of a stream goes through one."""
+
+    __slots__ = ("_calls", "_task")
+
+    def __init__(self, calls: Calls) -> None:
+        self._calls = calls
+
+    def __enter__(self) -> None:
+        if self._calls.draining:
+            raise DrainingError
+        self._task = _current_task()
+        self._calls.waiting.add(self._task)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        self._calls.waiting.discard(self._task)
+        if isinstance(error, asyncio.CancelledError) and self._calls.draining and self._task.uncancel() == 0:
             raise DrainingError from None
+
+
+def _current_task() -> asyncio.Task[Any]:
+    task = asyncio.current_task()
+    assert task is not None  # gRPC runs each call in a task
+    return task

@@ -1,122 +1,243 @@
 """HullService: what dynhull.v1 promises, a method an RPC. The contract documents the methods."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import aclosing
+import time
+from collections.abc import Iterator
+from contextlib import aclosing, contextmanager
 
-from google.protobuf.message import DecodeError
+import numpy as np
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_proto.v1 import hull_service_pb2_grpc
 
 from ..engine.hulls import Engine
-from ..engine.live_hull import LiveHull
+from ..engine.live_hull import Config, LiveHull
+from ..engine.views import SketchView, VerticesView, View
 from ..engine.watch import watch
-from . import codec
-from .calls import Calls, Context
+from . import decode, encode
+from .calls import Call
+from .metrics import Metrics
+from .writing import BatchStream, decode_write
 
 
-class HullService(hull_service_pb2_grpc.HullServiceServicer):
+class HullService:
     """The service on an engine.
 
-    Where `request` is a DecodeError instead, entering the call raises it.
+    Args:
+        engine: the state.
+        metrics: where work is counted.
+        create_on_write: whether a write to a hull that is not there creates it.
+        max_watch_lag: seconds that a watcher may take for an event.
     """
 
-    def __init__(self, engine: Engine, calls: Calls) -> None:
+    def __init__(self, engine: Engine, metrics: Metrics, *, create_on_write: bool, max_watch_lag: float) -> None:
         self._engine = engine
-        self._calls = calls
+        self._metrics = metrics
+        self._create_on_write = create_on_write
+        self._max_watch_lag = max_watch_lag
 
-    async def CreateHull(self, request: pb.CreateHullRequest, context: Context) -> pb.CreateHullResponse:
-        async with self._calls.short(context, request):
-            name = codec.decode_name(request.name)
-            codec.decode_config(request.config)
-            hull = self._engine.create(name)
-            return pb.CreateHullResponse(hull=codec.encode_hull(hull, hull.counts))
+    # Hulls
 
-    async def DeleteHull(self, request: pb.DeleteHullRequest, context: Context) -> pb.DeleteHullResponse:
-        async with self._calls.short(context, request):
-            self._engine.delete(codec.decode_name(request.name))
-            return pb.DeleteHullResponse()
+    async def CreateHull(self, request: pb.CreateHullRequest, call: Call) -> pb.CreateHullResponse:
+        name = decode.decode_name(request.name)
+        call.access.require_write(name)
+        config = decode.decode_config(request.config)
+        hull = await self._engine.create(name, config)
+        return pb.CreateHullResponse(hull=encode.encode_hull(hull, hull.counts))
 
-    async def ListHulls(self, request: pb.ListHullsRequest, context: Context) -> pb.ListHullsResponse:
-        async with self._calls.short(context, request):
-            prefix, after, size = codec.decode_page(request)
-            hulls, more = self._engine.page(prefix, after, size)
-            return pb.ListHullsResponse(
-                hulls=[codec.encode_hull(hull, hull.counts) for hull in hulls],
-                next_page_token=hulls[-1].name if more else "",
-            )
+    async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:
+        name = decode.decode_name(request.name)
+        call.access.require_write(name)
+        await self._engine.delete(name)
+        return pb.DeleteHullResponse()
 
-    async def Apply(self, request: pb.ApplyRequest, context: Context) -> pb.ApplyResponse:
-        async with self._calls.short(context, request):
-            hull = self._hull(request.name)
+    async def ListHulls(self, request: pb.ListHullsRequest, call: Call) -> pb.ListHullsResponse:
+        prefix, after, size = decode.decode_page(request)
+        hulls, more = self._engine.page(call.access.readable(prefix), after, size)
+        return pb.ListHullsResponse(
+            hulls=[encode.encode_hull(hull, hull.counts) for hull in hulls],
+            next_page_token=hulls[-1].name if more else "",
+        )
+
+    # Writes
+
+    async def Apply(self, request: pb.ApplyRequest, call: Call) -> pb.ApplyResponse:
+        begun = time.perf_counter()
+        with self._written(call, request.name) as hull:
             if not request.HasField("batch"):
-                raise codec.InvalidFieldError("batch", "", "a batch is required")
-            applied = await hull.apply(codec.decode_batch(request.batch))
-            return pb.ApplyResponse(result=codec.encode_applied(applied))
+                raise decode.InvalidFieldError("batch", "", "a batch is required")
+            write = decode_write(request, decode.decode_producer(request.producer))
+            try:
+                applied = await hull.apply(write)
+            except Exception:
+                self._metrics.refused()
+                raise
+        self._metrics.applied(applied, time.perf_counter() - begun)
+        return pb.ApplyResponse(result=encode.encode_applied(applied))
 
-    async def Ingest(self, requests: AsyncIterator[pb.IngestRequest], context: Context) -> pb.IngestResponse:
-        async with self._calls.waiting(context, requests) as progress:
-            hull: LiveHull | None = None
-            summary = pb.IngestResponse()
-            progress.batches = 0
-            async for request in requests:
-                if isinstance(request, DecodeError):
-                    raise request
-                if hull is None:
-                    hull = self._hull(request.name)
-                    summary.revision, summary.point_count = hull.counts.revision, hull.counts.points
-                elif request.name not in ("", hull.name):
-                    raise codec.InvalidFieldError("name", request.name, f"this call writes to {hull.name!r}")
-                if not request.HasField("batch"):
-                    continue
-                applied = await hull.apply(codec.decode_batch(request.batch))
-                progress.batches += 1
-                summary.inserted += applied.inserted
-                summary.deleted += applied.deleted
-                summary.missing += applied.missing
-                summary.revision, summary.point_count = applied.revision, applied.points
-            if hull is None:
-                raise codec.InvalidFieldError("name", "", "the first message names the hull, and there was none")
-            summary.batches = progress.batches
-            return summary
+    async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
+        call.batches = 0
+        with call.cutoff():
+            first = await call.read()
+        if first is None:
+            raise decode.InvalidFieldError("name", "", "the first message names the hull, and there was none")
+        with self._written(call, first.name) as hull:
+            summary = pb.IngestResponse(revision=hull.counts.revision, point_count=hull.counts.points)
+            async with aclosing(BatchStream(call, first, hull, self._metrics).applied()) as batches:
+                async for _, applied in batches:
+                    call.batches += 1
+                    summary.duplicates += applied.duplicate
+                    summary.inserted += applied.inserted
+                    summary.deleted += applied.deleted
+                    summary.missing += applied.missing
+                    summary.revision, summary.point_count = applied.revision, applied.points
+        summary.batches = call.batches - summary.duplicates
+        return summary
 
-    async def Locate(self, request: pb.LocateRequest, context: Context) -> pb.LocateResponse:
-        async with self._calls.waiting(context, request):
-            hull = self._hull(request.name)
-            counts, sides = await hull.locate(codec.decode_points(request.points, "points"), request.min_revision)
-            return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
+    async def Stream(self, _: object, call: Call) -> None:
+        call.batches = 0
+        with call.cutoff():
+            first = await call.read()
+        if first is None:
+            raise decode.InvalidFieldError("name", "", "the first message names the hull, and there was none")
+        with self._written(call, first.name) as hull:
+            async with aclosing(BatchStream(call, first, hull, self._metrics).applied()) as batches:
+                async for sequence, applied in batches:
+                    call.batches += 1
+                    result = encode.encode_applied(applied)
+                    await call.write(pb.StreamResponse(result=result, sequence=sequence))
 
-    async def GetHull(self, request: pb.GetHullRequest, context: Context) -> pb.GetHullResponse:
-        async with self._calls.waiting(context, request):
-            hull = self._hull(request.name)
-            encoding = codec.decode_encoding(request.encoding)
-            counts, vertices = await hull.vertices(request.min_revision)
-            measures = await asyncio.to_thread(codec.encode_measures, vertices)
-            return pb.GetHullResponse(
-                hull=codec.encode_hull(hull, counts),
-                vertices=codec.encode_points(vertices, encoding),
-                measures=measures,
-            )
+    async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
+        name = decode.decode_name(request.name)
+        call.access.require_write(name)
+        if not request.producer:
+            raise decode.InvalidFieldError("producer", "", "which producer?")
+        producer = decode.decode_producer(request.producer)
+        last = await self._engine.get(name).last_sequence(producer)
+        return pb.GetProducerResponse(last_sequence=last)
 
-    async def Watch(self, request: pb.WatchRequest, context: Context) -> AsyncIterator[pb.WatchResponse]:
-        async with self._calls.streaming(context, request):
-            hull = self._hull(request.name)
-            encoding = codec.decode_encoding(request.encoding)
-            min_interval = codec.decode_rate(request.max_events_per_second)
-            progress_interval = codec.decode_interval(request)
-            async with aclosing(watch(hull, request.min_revision, min_interval, progress_interval)) as events:
+    # Reads
+
+    async def Locate(self, request: pb.LocateRequest, call: Call) -> pb.LocateResponse:
+        hull = self._read(call, request.name)
+        xy = decode.decode_points(request.points, "points")
+        counts, sides = await hull.read(lambda live: live.locate(xy), len(xy), request.min_revision)
+        return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
+
+    async def Count(self, request: pb.CountRequest, call: Call) -> pb.CountResponse:
+        hull = self._read(call, request.name)
+        points = decode.decode_points(request.points, "points").tolist()
+        counts, times = await hull.read(
+            lambda live: [live.count(x, y) for x, y in points], len(points), request.min_revision
+        )
+        return pb.CountResponse(revision=counts.revision, counts=times)
+
+    async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        directions = decode.decode_directions(request.directions)
+        counts, extremes = await hull.support(directions, request.min_revision)
+        return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
+
+    async def Tangents(self, request: pb.TangentsRequest, call: Call) -> pb.TangentsResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        xy = decode.decode_points(request.points, "points")
+        counts, tangents = await hull.read(lambda live: live.tangents(xy), len(xy), request.min_revision)
+        return pb.TangentsResponse(
+            revision=counts.revision,
+            left=encode.encode_points(np.ascontiguousarray(tangents[:, 0]), encoding),
+            right=encode.encode_points(np.ascontiguousarray(tangents[:, 1]), encoding),
+        )
+
+    async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
+        hull = self._read(call, request.name)
+        xy = decode.decode_points(request.points, "points")
+        rows = len(xy) + hull.vertex_count
+        counts, distances = await hull.read(lambda live: live.distance(xy), rows, request.min_revision)
+        return pb.DistanceResponse(revision=counts.revision, distances=distances)
+
+    async def IntersectLines(self, request: pb.IntersectLinesRequest, call: Call) -> pb.IntersectLinesResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        p, q = decode.decode_lines(request)
+        rows = len(p) + hull.vertex_count
+        counts, crossings = await hull.read(lambda live: live.intersect_lines(p, q), rows, request.min_revision)
+        return pb.IntersectLinesResponse(
+            revision=counts.revision,
+            entries=encode.encode_points(np.ascontiguousarray(crossings[:, 0]), encoding),
+            exits=encode.encode_points(np.ascontiguousarray(crossings[:, 1]), encoding),
+        )
+
+    async def GetHull(self, request: pb.GetHullRequest, call: Call) -> pb.GetHullResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        if not decode.decode_view(request.view):
+            await hull.reached(request.min_revision)
+            return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
+        counts, vertices = await hull.vertices(request.min_revision)
+        measures = await asyncio.to_thread(encode.encode_measures, vertices)
+        return pb.GetHullResponse(
+            hull=encode.encode_hull(hull, counts),
+            vertices=encode.encode_points(vertices, encoding),
+            measures=measures,
+        )
+
+    async def Verify(self, request: pb.VerifyRequest, call: Call) -> pb.VerifyResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        counts, verification = await hull.verify(request.min_revision)
+        self._metrics.verified("call", verification.difference is None)
+        return encode.encode_verification(counts, verification, encoding)
+
+    async def Watch(self, request: pb.WatchRequest, call: Call) -> None:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        directions = decode.decode_directions(request.directions) if request.HasField("directions") else None
+        resume = decode.decode_resume(request)
+        since = None
+        view: View
+        if directions is not None:
+            view = SketchView(hull, directions, request.include_measures)
+        elif resume is None:
+            view = VerticesView(hull)
+        else:
+            held = await hull.recall(resume.uid, resume.revision)
+            view = VerticesView(hull, held)
+            since = None if held is None else resume.revision
+        events = watch(
+            hull,
+            view,
+            since=since,
+            min_revision=request.min_revision,
+            min_interval=decode.decode_rate(request.max_events_per_second),
+            progress_interval=decode.decode_interval(request),
+        )
+        with self._metrics.watcher() as watcher:
+            async with aclosing(events):
                 while True:
-                    async with self._calls.cutoff():
+                    with call.cutoff():
                         event = await anext(events)
-                        message = await asyncio.to_thread(codec.encode_event, event, encoding, request.include_measures)
-                    yield message
+                        message = await encode.encode_event_aside(event, encoding, request.include_measures)
+                    with self._metrics.sending(watcher, message.WhichOneof("event")):
+                        await call.write(message, self._max_watch_lag)
 
-    async def Verify(self, request: pb.VerifyRequest, context: Context) -> pb.VerifyResponse:
-        async with self._calls.waiting(context, request):
-            hull = self._hull(request.name)
-            encoding = codec.decode_encoding(request.encoding)
-            return codec.encode_verification(*await hull.verify(request.min_revision), encoding)
+    # Names
 
-    def _hull(self, name: str) -> LiveHull:
-        return self._engine.get(codec.decode_name(name))
+    def _read(self, call: Call, name: str) -> LiveHull:
+        name = decode.decode_name(name)
+        call.access.require_read(name)
+        return self._engine.get(name)
+
+    @contextmanager
+    def _written(self, call: Call, name: str) -> Iterator[LiveHull]:
+        """The hull to write to. One that the call creates is removed again where nothing is written to it."""
+        name = decode.decode_name(name)
+        call.access.require_write(name)
+        created = self._create_on_write and not self._engine.has(name)
+        hull = self._engine.begin(name, Config()) if created else self._engine.get(name)
+        try:
+            yield hull
+        except BaseException:
+            if created:
+                self._engine.discard_unwritten(hull)
+            raise

@@ -1,37 +1,45 @@
-"""A gRPC server with the hull service, health and reflection."""
+"""A gRPC server with the hull service, health, reflection, metrics and the background scrub."""
 
-from dataclasses import dataclass
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
+from prometheus_client import start_http_server
 
 from ..engine.hulls import Engine
+from ..engine.limits import Limits
+from ..engine.live_hull import LiveHull
+from ..engine.scrub import scrub
+from ..engine.snapshots import keep_snapshots
+from ..engine.verification import Verification
+from ..journal.journal import Journal
+from ..settings import Settings
+from .access import EVERYTHING, Access, TokenFile
 from .calls import Calls
 from .hull_service import HullService
 from .methods import DESCRIPTOR, method_handlers
+from .metrics import Metrics, StateCollector
 
 SERVICE = DESCRIPTOR.full_name
+# SERVING until the scrub finds a hull that differs from Chan's algorithm.
+SCRUB = "dynhull.v1.scrub"
+
+SERVING = health_pb2.HealthCheckResponse.SERVING
+NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 
 # Seconds for statuses to reach clients. A client that has stopped reading does not hold up the end.
 LAST_WORDS = 1.0
+# Milliseconds between signs of life on a quiet connection, and until one without an answer is given up.
+KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
 
+# A message of so many bytes beyond the limit is read, to be refused with details.
+REFUSED_BYTES = 64 * 2**20
 
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """How to serve.
-
-    Attributes:
-        host: address to listen on.
-        port: 0 for a free one.
-        max_message_bytes: the largest message taken or sent.
-        max_hulls: how many hulls there may be.
-    """
-
-    host: str
-    port: int
-    max_message_bytes: int
-    max_hulls: int
+log = logging.getLogger(__name__)
 
 
 class Server:
@@ -39,36 +47,134 @@ class Server:
 
     Attributes:
         address: host:port it listens on, once started.
+        metrics_address: host:port for Prometheus; empty for none.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._engine = Engine(settings.max_hulls)
-        self._calls = Calls()
+        journal = None if settings.in_memory else Journal(settings.data, settings.durability)
+        self._engine = Engine(
+            Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes), journal
+        )
+        self._metrics = Metrics()
+        authenticate = _anonymous if settings.tokens is None else TokenFile(settings.tokens).access
+        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, settings.max_streams)
         self._health = health.aio.HealthServicer()
-        # Without so_reuseport=0 a second server on the port would start, and take half of the calls.
         self._server = grpc.aio.server(
             options=[
-                ("grpc.max_receive_message_length", settings.max_message_bytes),
-                ("grpc.max_send_message_length", settings.max_message_bytes),
+                # gRPC's own refusal of a message has no details. So ours comes first, but for the very largest.
+                ("grpc.max_receive_message_length", settings.max_message_bytes + REFUSED_BYTES),
+                ("grpc.max_send_message_length", -1),
+                # Otherwise a second server on the port would start, and take half of the calls.
                 ("grpc.so_reuseport", 0),
+                ("grpc.keepalive_time_ms", KEEPALIVE),
+                ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
             ]
         )
+        self._scrub: asyncio.Task[None] | None = None
+        self._snapshots: asyncio.Task[None] | None = None
+        self._stop_metrics: Callable[[], None] = lambda: None
         self.address = ""
+        self.metrics_address = ""
 
-    async def start(self) -> None:
-        """Listen. Raises RuntimeError where the address is taken or is none of this machine's."""
-        self._server.add_generic_rpc_handlers((method_handlers(HullService(self._engine, self._calls)),))
+    async def start(self, progress: Callable[[int, int], None]) -> None:
+        """Listen, take up what is stored, then serve. Meanwhile calls are told so, and health is NOT_SERVING.
+
+        Args:
+            progress: called with the hulls taken up and the hulls in all.
+
+        Raises:
+            RuntimeError: the address is taken or is none of this machine's.
+            JournalError: the stored data cannot be used.
+        """
+        service = HullService(
+            self._engine,
+            self._metrics,
+            create_on_write=self._settings.create_on_write,
+            max_watch_lag=self._settings.max_watch_lag,
+        )
+        self._server.add_generic_rpc_handlers((method_handlers(service, self._calls),))
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
         reflection.enable_server_reflection((SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME), self._server)
-        port = self._server.add_insecure_port(f"{self._settings.host}:{self._settings.port}")
+        port = self._listen()
         self.address = f"{self._settings.host}:{port}"
-        await self._health.set(SERVICE, health_pb2.HealthCheckResponse.SERVING)
+        self._serve_metrics()
+        await self._health.set("", NOT_SERVING)
+        await self._health.set(SERVICE, NOT_SERVING)
         await self._server.start()
+        for note in await self._engine.restore(progress):
+            log.warning("lost", extra={"what": note})
+        self._calls.ready()
+        for name in ("", SERVICE, SCRUB):
+            await self._health.set(name, SERVING)
+        if not self._settings.in_memory:
+            self._snapshots = asyncio.create_task(keep_snapshots(self._engine, self._settings.snapshot_points))
+        if self._settings.scrub_cpu:
+            self._scrub = asyncio.create_task(
+                scrub(
+                    self._engine,
+                    self._settings.scrub_cpu,
+                    self._settings.scrub_pause,
+                    self._compared,
+                    self._metrics.scrub_round,
+                )
+            )
+        log.info("serving", extra={"address": self.address})
 
-    async def drain(self, grace: float) -> None:
-        """Refuse new calls, end those that wait, and give the others `grace` seconds to finish."""
+    async def drain(self) -> None:
+        """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
+        log.info("draining")
         await self._health.enter_graceful_shutdown()
-        await self._calls.drain(grace)
+        for task in (self._scrub, self._snapshots):
+            if task is not None:
+                task.cancel()
+        await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_WORDS)
+        self._stop_metrics()
         self._engine.close()
+        log.info("stopped")
+
+    def _listen(self) -> int:
+        address = f"{self._settings.host}:{self._settings.port}"
+        settings = self._settings
+        if settings.tls_cert is None or settings.tls_key is None:
+            return self._server.add_insecure_port(address)
+        client_ca = None if settings.tls_client_ca is None else settings.tls_client_ca.read_bytes()
+        credentials = grpc.ssl_server_credentials(
+            [(settings.tls_key.read_bytes(), settings.tls_cert.read_bytes())],
+            client_ca,
+            require_client_auth=client_ca is not None,
+        )
+        return self._server.add_secure_port(address, credentials)
+
+    def _serve_metrics(self) -> None:
+        if self._settings.metrics_port is None:
+            return
+        registry = self._metrics.registry
+        registry.register(StateCollector(self._engine, self._metrics, asyncio.get_running_loop()))
+        host, port = self._settings.metrics_host, self._settings.metrics_port
+        try:
+            server, thread = start_http_server(port, host, registry)
+        except OSError as error:
+            raise OSError(f"no metrics on {host}:{port}: {error.strerror}") from None
+        self.metrics_address = f"{host}:{server.server_port}"
+
+        def stop() -> None:
+            server.shutdown()
+            server.server_close()
+            thread.join()
+
+        self._stop_metrics = stop
+
+    def _compared(self, hull: LiveHull, outcome: Verification) -> None:
+        equal = outcome.difference is None
+        self._metrics.verified("scrub", equal, outcome.seconds)
+        if not equal:
+            log.error(
+                "a hull differs from Chan's algorithm", extra={"hull": hull.name, "difference": outcome.difference}
+            )
+            asyncio.get_running_loop().create_task(self._health.set(SCRUB, NOT_SERVING))
+
+
+def _anonymous(_: Mapping[str, Any]) -> Access:
+    return EVERYTHING

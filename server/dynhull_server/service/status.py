@@ -4,13 +4,25 @@ from collections.abc import Mapping
 
 from google.protobuf.any_pb2 import Any
 from google.protobuf.message import DecodeError, Message
-from google.rpc.code_pb2 import ALREADY_EXISTS, FAILED_PRECONDITION, INVALID_ARGUMENT, NOT_FOUND, RESOURCE_EXHAUSTED
-from google.rpc.code_pb2 import UNAVAILABLE as CODE_UNAVAILABLE
+from google.rpc import code_pb2 as code
 from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFailure, QuotaFailure, ResourceInfo
 from google.rpc.status_pb2 import Status
 
-from ..engine.errors import HullExistsError, HullNotFoundError, LimitExceededError, PointMissingError, RefusedError
-from .codec import InvalidFieldError
+from ..engine.errors import (
+    HullEmptyError,
+    HullExistsError,
+    HullNotFoundError,
+    HullReplacedError,
+    LimitExceededError,
+    PointMissingError,
+    RefusedError,
+    RevisionForgottenError,
+    SequenceGapError,
+    StorageError,
+    StorageFullError,
+)
+from .access import PermissionDeniedError, UnauthenticatedError
+from .decode import InvalidFieldError
 
 DOMAIN = "dynhull.v1"
 HULL_TYPE = "dynhull.v1.Hull"
@@ -24,7 +36,11 @@ class DrainingError(Exception):
     """The server is about to stop."""
 
 
-ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError)
+class StartingError(Exception):
+    """The server is not ready yet."""
+
+
+ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError, StartingError)
 
 
 def error_status(error: Exception, batch: int | None = None) -> Status:
@@ -42,34 +58,65 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             detail.field_violations.add(field=field, description=f"{error.problem}, got {value}")
             message = f"{field} is {value}: {error.problem}"
             metadata = {"field": error.field, **row, "value": value, **where}
-            return _status(INVALID_ARGUMENT, message, "INVALID_FIELD", metadata, detail)
+            return _status(code.INVALID_ARGUMENT, message, "INVALID_FIELD", metadata, detail)
         case PointMissingError():
             field, value = PART_FIELDS[error.part], _short(error.point)
             failure = PreconditionFailure()
             failure.violations.add(type="POINT_MISSING", subject=f"{field}[{error.row}]", description=str(error))
             message = f"{field}[{error.row}] is {value}: no such point to delete; nothing of the batch was applied"
             metadata = {"field": field, "row": str(error.row), "value": value, **where}
-            return _status(FAILED_PRECONDITION, message, "POINT_MISSING", metadata, failure)
+            return _status(code.FAILED_PRECONDITION, message, "POINT_MISSING", metadata, failure)
         case HullNotFoundError():
             resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
-            return _status(NOT_FOUND, str(error), "HULL_NOT_FOUND", {"value": error.name, **where}, resource)
+            return _status(code.NOT_FOUND, str(error), "HULL_NOT_FOUND", {"value": error.name, **where}, resource)
         case HullExistsError():
             resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
-            return _status(ALREADY_EXISTS, str(error), "HULL_EXISTS", {"value": error.name}, resource)
+            return _status(code.ALREADY_EXISTS, str(error), "HULL_EXISTS", {"value": error.name}, resource)
+        case SequenceGapError():
+            failure = PreconditionFailure()
+            failure.violations.add(type="SEQUENCE_GAP", subject="sequence", description=str(error))
+            metadata = {"field": "sequence", "value": str(error.sequence), "expected": str(error.expected), **where}
+            return _status(code.FAILED_PRECONDITION, str(error), "SEQUENCE_GAP", metadata, failure)
+        case HullEmptyError():
+            failure = PreconditionFailure()
+            failure.violations.add(type="HULL_EMPTY", subject=error.name, description=str(error))
+            return _status(code.FAILED_PRECONDITION, str(error), "HULL_EMPTY", {"value": error.name}, failure)
+        case RevisionForgottenError():
+            metadata = {"field": "resume.revision", "value": str(error.revision)}
+            metadata |= {"oldest": str(error.oldest), "newest": str(error.newest)}
+            return _status(code.OUT_OF_RANGE, str(error), "REVISION_FORGOTTEN", metadata)
+        case HullReplacedError():
+            metadata = {"field": "resume.uid", "value": error.name, "uid": error.uid}
+            return _status(code.OUT_OF_RANGE, str(error), "HULL_REPLACED", metadata)
+        case UnauthenticatedError():
+            return _status(code.UNAUTHENTICATED, str(error), "UNAUTHENTICATED", {})
+        case PermissionDeniedError():
+            metadata = {"scope": error.scope, "value": error.name}
+            return _status(code.PERMISSION_DENIED, str(error), "PERMISSION_DENIED", metadata)
         case LimitExceededError():
             quota = QuotaFailure()
             quota.violations.add(subject=error.limit, description=str(error))
             metadata = {"limit": error.limit, "value": str(error.maximum), **where}
-            return _status(RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
+            return _status(code.RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
         case DecodeError():
-            return _status(INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where)
+            return _status(
+                code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where
+            )
+        case StorageFullError():
+            quota = QuotaFailure()
+            quota.violations.add(subject="disk", description=str(error))
+            return _status(code.RESOURCE_EXHAUSTED, str(error), "DISK_FULL", {"limit": "disk", **where}, quota)
+        case StorageError():
+            return _status(code.UNAVAILABLE, str(error), "STORAGE_FAILED", where)
+        case StartingError():
+            return _status(code.UNAVAILABLE, "the server is reading its data", "STARTING", where)
         case DrainingError():
-            return _status(CODE_UNAVAILABLE, "the server is shutting down", "DRAINING", where)
+            return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error
 
 
-def _status(code: int, message: str, reason: str, metadata: Mapping[str, str], *details: Message) -> Status:
-    status = Status(code=code, message=message)
+def _status(number: int, message: str, reason: str, metadata: Mapping[str, str], *details: Message) -> Status:
+    status = Status(code=number, message=message)
     for detail in (ErrorInfo(reason=reason, domain=DOMAIN, metadata=metadata), *details):
         packed = Any()
         packed.Pack(detail)

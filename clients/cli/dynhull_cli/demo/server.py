@@ -11,7 +11,7 @@ STOP_SECONDS = 10
 @contextmanager
 def server_process() -> Iterator[str]:
     """Start `dynhull serve` on a free port; yields its address, stops it in the end."""
-    command = [sys.executable, "-m", "dynhull_server", "--port", "0", "--in-memory"]
+    command = [sys.executable, "-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:  # noqa: S603  (our own module)
         try:
             assert process.stdout is not None

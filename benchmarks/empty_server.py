@@ -1,0 +1,39 @@
+"""The fastest handlers that grpcio allows: they read, acknowledge and do nothing else. `server.py` measures them."""
+
+import asyncio
+import sys
+
+import grpc
+
+ACKNOWLEDGEMENT = b"\x0a\x02\x08\x01"
+
+
+async def stream(_, context):
+    while await context.read() is not grpc.aio.EOF:
+        await context.write(ACKNOWLEDGEMENT)
+
+
+async def unary(_request, _context):
+    return ACKNOWLEDGEMENT
+
+
+async def main() -> None:
+    server = grpc.aio.server(options=[("grpc.max_receive_message_length", 64 * 2**20)])
+    handlers = {
+        "Stream": grpc.stream_stream_rpc_method_handler(stream),
+        "Locate": grpc.unary_unary_rpc_method_handler(unary),
+    }
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("dynhull.v1.HullService", handlers),))
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    print(f"empty serving on 127.0.0.1:{port}", flush=True)
+    await server.wait_for_termination()
+
+
+if __name__ == "__main__":
+    if "--uvloop" in sys.argv:
+        import uvloop
+
+        uvloop.run(main())
+    else:
+        asyncio.run(main())

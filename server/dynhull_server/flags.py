@@ -1,0 +1,47 @@
+"""Flags for a command, one for each setting."""
+
+import inspect
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .settings import PREFIX, Settings, SettingsError, load, origins
+
+
+def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callable[..., None]:
+    """A typer command with a flag for each setting; `command` gets the settings and where each comes from."""
+
+    def run(config: Path | None, **given: Any) -> None:
+        flags = {name: value for name, value in given.items() if value is not None}
+        try:
+            settings, where = load(flags, config), origins(flags, config)
+        except SettingsError as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(1) from None
+        command(settings, where)
+
+    file_help = "TOML file of settings, named as the flags are, with _ for -."
+    parameters = [_parameter("config", Path, typer.Option(help=file_help, envvar=f"{PREFIX}CONFIG", dir_okay=False))]
+    for name, field in Settings.model_fields.items():
+        default = False if field.default is None or field.annotation is bool else str(field.default)
+        option = typer.Option(help=field.description, show_default=default)
+        parameters.append(_parameter(name, field.annotation, option))
+    run.__doc__ = command.__doc__
+    run.__name__ = command.__name__
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return run
+
+
+def as_toml(value: Any) -> str:
+    """A setting as it would stand in the file."""
+    return json.dumps(str(value) if isinstance(value, Path) else value)
+
+
+def _parameter(name: str, kind: Any, option: Any) -> inspect.Parameter:
+    # None stands for a flag that is not given.
+    annotation = Annotated[kind | None, option]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)

@@ -1,0 +1,219 @@
+"""Messages to values, checked. What cannot be raises InvalidFieldError."""
+
+import math
+import re
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynhull.arrays import Points
+from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+
+from ..engine.batch import Batch
+from ..engine.live_hull import Config
+
+NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
+NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
+DEFAULT_PAGE = 100
+LARGEST_PAGE = 1000
+LONGEST_INTERVAL = 24 * 3600
+BYTES_PER_POINT = 16
+ONE_POINT = struct.Struct("<dd")
+NO_POINTS = np.empty((0, 2))
+MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
+LARGEST_SEQUENCE = 2**63 - 1
+
+
+class InvalidFieldError(Exception):
+    """A field of a request holds what it cannot hold.
+
+    Attributes:
+        field: its path in the request.
+        row: the row of the points at fault, None where the field as a whole is.
+        value: what it holds.
+        problem: what is wrong with it.
+    """
+
+    def __init__(self, field: str, value: object, problem: str, row: int | None = None) -> None:
+        super().__init__(field, value, problem, row)
+        self.field = field
+        self.row = row
+        self.value = value
+        self.problem = problem
+
+
+def decode_name(name: str) -> str:
+    """A hull's name."""
+    if not NAME.fullmatch(name):
+        raise InvalidFieldError("name", name, 'a hull\'s name is 1 to 200 letters, digits and "._-/"')
+    return name
+
+
+def decode_producer(producer: str) -> str:
+    """A producer's name, or none."""
+    if producer and not NAME.fullmatch(producer):
+        raise InvalidFieldError("producer", producer, 'a producer\'s name is 1 to 200 letters, digits and "._-/"')
+    return producer
+
+
+def decode_sequence(producer: str, sequence: int) -> int:
+    """A number where there is a producer, 0 where there is none."""
+    if not producer and sequence:
+        raise InvalidFieldError("sequence", sequence, "only a producer numbers its batches")
+    if producer and not 1 <= sequence <= LARGEST_SEQUENCE:
+        raise InvalidFieldError("sequence", sequence, f"a producer numbers its batches from 1 to {LARGEST_SEQUENCE}")
+    return sequence
+
+
+def decode_config(config: hull_pb2.HullConfig) -> Config:
+    """The configuration of a hull to be; as yet there is one identity."""
+    if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
+        raise InvalidFieldError("config.identity", config.identity, "not an identity this server knows")
+    return Config(max_points=config.max_points)
+
+
+def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:
+    """The prefix, the name to begin after, and the size of a page."""
+    if not NAME_CHARACTERS.fullmatch(request.prefix):
+        raise InvalidFieldError("prefix", request.prefix, 'names consist of letters, digits and "._-/"')
+    if request.page_token and not (
+        NAME.fullmatch(request.page_token) and request.page_token.startswith(request.prefix)
+    ):
+        raise InvalidFieldError("page_token", request.page_token, "not a token of a call with this prefix")
+    if request.page_size < 0:
+        raise InvalidFieldError("page_size", request.page_size, "must not be negative")
+    return request.prefix, request.page_token, min(request.page_size or DEFAULT_PAGE, LARGEST_PAGE)
+
+
+def rows(points: points_pb2.Points) -> int:
+    """How many points there are, about: nothing is checked."""
+    return len(points.packed) // BYTES_PER_POINT + len(points.coordinates) // 2
+
+
+def batch_rows(batch: batch_pb2.Batch) -> int:
+    """How many points a batch names, about."""
+    count = rows(batch.inserts)
+    if batch.HasField("deletes"):
+        count += rows(batch.deletes)
+    if batch.HasField("moves"):
+        count += rows(batch.moves.origins) + rows(batch.moves.destinations)
+    return count
+
+
+def decode_points(points: points_pb2.Points, field: str) -> Points:
+    """An (n, 2) array of finite doubles without negative zeros."""
+    packed, coordinates = points.packed, points.coordinates
+    if len(packed) == BYTES_PER_POINT and not coordinates:  # a live feed: numpy would take longer than all the rest
+        x, y = ONE_POINT.unpack(packed)
+        if math.isfinite(x) and math.isfinite(y):
+            return np.array(((x + 0.0, y + 0.0),))
+    if packed and coordinates:
+        raise InvalidFieldError(field, "packed and coordinates", "use one encoding or the other")
+    if len(packed) % BYTES_PER_POINT:
+        problem = f"{BYTES_PER_POINT} bytes a point, so the number of bytes must be a multiple of that"
+        raise InvalidFieldError(f"{field}.packed", f"{len(packed)} bytes", problem)
+    if len(coordinates) % 2:
+        problem = "two coordinates a point, so their number must be even"
+        raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
+    values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
+    xy = values.reshape(-1, 2)
+    finite = np.isfinite(xy)
+    if not finite.all():
+        row = int(np.argmin(finite.all(axis=1)))
+        raise InvalidFieldError(field, tuple(xy[row].tolist()), "coordinates must be finite", row)
+    # Adding zero turns -0.0 into 0.0, and any byte order into the machine's.
+    return np.asarray(xy + 0.0, np.float64)
+
+
+def decode_directions(directions: points_pb2.Points) -> Points:
+    """An (n, 2) array of vectors, none of them 0."""
+    vectors = decode_points(directions, "directions")
+    zero = np.flatnonzero(~vectors.any(axis=1))
+    if zero.size:
+        raise InvalidFieldError("directions", (0.0, 0.0), "has no direction", int(zero[0]))
+    return vectors
+
+
+def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Points, Points]:
+    """As many origins as targets, each another point than its target."""
+    origins = decode_points(request.origins, "origins")
+    targets = decode_points(request.targets, "targets")
+    if len(origins) != len(targets):
+        problem = f"there must be as many as there are origins, {len(origins)}"
+        raise InvalidFieldError("targets", f"{len(targets)} points", problem)
+    same = np.flatnonzero((origins == targets).all(axis=1))
+    if same.size:
+        row = int(same[0])
+        raise InvalidFieldError("targets", tuple(targets[row].tolist()), "the same point as the origin: no line", row)
+    return origins, targets
+
+
+def decode_batch(batch: batch_pb2.Batch) -> Batch:
+    """A batch whose moves have as many destinations as origins."""
+    if batch.missing_points not in MISSING_POINT_POLICIES:
+        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy this server knows")
+    inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
+    deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
+    origins = destinations = NO_POINTS
+    if batch.HasField("moves"):
+        origins = decode_points(batch.moves.origins, "batch.moves.origins")
+        destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
+        if len(origins) != len(destinations):
+            problem = f"there must be as many as there are origins, {len(origins)}"
+            raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
+    return Batch(inserts, deletes, origins, destinations, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
+
+
+def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:
+    """A known encoding."""
+    if encoding not in points_pb2.PointEncoding.values():
+        raise InvalidFieldError("encoding", encoding, "not an encoding this server knows")
+    return encoding
+
+
+def decode_view(view: hull_service_pb2.HullView) -> bool:
+    """Whether vertices and measures are wanted."""
+    if view not in hull_service_pb2.HullView.values():
+        raise InvalidFieldError("view", view, "not a view this server knows")
+    return view != hull_service_pb2.HULL_VIEW_BASIC
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """What a watcher holds already."""
+
+    uid: str
+    revision: int
+
+
+def decode_resume(request: hull_service_pb2.WatchRequest) -> Resume | None:
+    """What the watcher holds, None where it begins."""
+    if not request.HasField("resume"):
+        return None
+    if request.HasField("directions"):
+        raise InvalidFieldError("resume", "resume and directions", "a sketch is sent whole, there is nothing to resume")
+    if not request.resume.uid:
+        raise InvalidFieldError("resume.uid", "", "which hull is to be resumed? Its uid came with the snapshot")
+    return Resume(request.resume.uid, request.resume.revision)
+
+
+def decode_rate(events_per_second: float) -> float:
+    """The least number of seconds between two events."""
+    if not 0 <= events_per_second < math.inf:
+        raise InvalidFieldError("max_events_per_second", events_per_second, "must be finite and not negative")
+    # A rate so low that an event would be a day away is as good as that.
+    return min(1 / events_per_second, LONGEST_INTERVAL) if events_per_second else 0.0
+
+
+def decode_interval(request: hull_service_pb2.WatchRequest) -> float | None:
+    """Seconds from an event to a progress mark, None for no marks."""
+    if not request.HasField("progress_interval"):
+        return None
+    interval = request.progress_interval
+    seconds = interval.seconds + interval.nanos / 1e9
+    if not 0 < seconds <= LONGEST_INTERVAL:
+        raise InvalidFieldError(
+            "progress_interval", f"{seconds} s", f"must be positive and at most {LONGEST_INTERVAL} s"
+        )
+    return seconds

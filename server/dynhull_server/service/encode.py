@@ -1,0 +1,120 @@
+"""Values to messages."""
+
+import asyncio
+
+import numpy as np
+
+from dynhull import measure
+from dynhull.arrays import Points
+from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+
+from ..engine.batch import Applied
+from ..engine.live_hull import Counts, LiveHull
+from ..engine.verification import Verification
+from ..engine.views import Change, Event, Progress, Snapshot
+
+
+def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.Points:
+    """Points in the encoding asked for."""
+    if encoding == points_pb2.POINT_ENCODING_COORDINATES:
+        return points_pb2.Points(coordinates=xy.ravel().tolist())
+    return points_pb2.Points(packed=np.asarray(xy, "<f8").tobytes())
+
+
+def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
+    """A hull with its counts at one revision."""
+    message = hull_pb2.Hull(
+        name=hull.name,
+        config=hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_MULTISET, max_points=hull.config.max_points),
+        revision=counts.revision,
+        point_count=counts.points,
+        distinct_point_count=counts.distinct,
+        uid=hull.uid,
+    )
+    message.create_time.FromDatetime(hull.created)
+    return message
+
+
+def encode_measures(vertices: Points) -> hull_pb2.Measures:
+    """The measures of the hull with these vertices."""
+    x, y = measure.centroid(vertices)
+    min_x, min_y, max_x, max_y = measure.bounds(vertices)
+    return hull_pb2.Measures(
+        area=measure.area(vertices),
+        perimeter=measure.perimeter(vertices),
+        centroid_x=x,
+        centroid_y=y,
+        min_x=min_x,
+        min_y=min_y,
+        max_x=max_x,
+        max_y=max_y,
+    )
+
+
+def encode_applied(applied: Applied) -> batch_pb2.BatchResult:
+    """What a batch did."""
+    return batch_pb2.BatchResult(
+        revision=applied.revision,
+        inserted=applied.inserted,
+        deleted=applied.deleted,
+        missing=applied.missing,
+        hull_changed=applied.hull_changed,
+        point_count=applied.points,
+        duplicate=applied.duplicate,
+    )
+
+
+def encode_event(event: Event, encoding: points_pb2.PointEncoding, measures: bool) -> hull_service_pb2.WatchResponse:
+    """What a watcher is told."""
+    message = hull_service_pb2.WatchResponse(revision=event.counts.revision, point_count=event.counts.points)
+    match event:
+        case Snapshot():
+            message.snapshot.uid = event.uid
+            message.snapshot.vertices.CopyFrom(encode_points(event.vertices, encoding))
+        case Change():
+            removed, added = event.difference.removed, event.difference.added
+            message.change.removed.CopyFrom(encode_points(event.before[removed], encoding))
+            message.change.removed_indices.extend(removed.tolist())
+            message.change.added.CopyFrom(encode_points(event.vertices[added], encoding))
+            message.change.added_indices.extend(added.tolist())
+            message.change.rotation = event.difference.rotation
+        case Progress():
+            message.progress.SetInParent()
+            return message
+        case _:
+            message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
+    if measures and event.vertices is not None:
+        message.measures.CopyFrom(encode_measures(event.vertices))
+    return message
+
+
+async def encode_event_aside(
+    event: Event, encoding: points_pb2.PointEncoding, measures: bool
+) -> hull_service_pb2.WatchResponse:
+    """`encode_event`, in another thread where it takes long."""
+    if isinstance(event, Progress) or not measures:
+        return encode_event(event, encoding, measures)
+    return await asyncio.to_thread(encode_event, event, encoding, measures)
+
+
+def encode_verification(
+    counts: Counts, verification: Verification, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.VerifyResponse:
+    """The outcome of a verification."""
+    message = hull_service_pb2.VerifyResponse(
+        revision=counts.revision,
+        equal=verification.difference is None,
+        point_count=verification.points,
+        vertex_count=verification.vertices,
+        rounds=[
+            hull_service_pb2.ChanRound(
+                guess=each.guess, groups=each.groups, steps=each.steps, cost=each.cost, closed=each.closed
+            )
+            for each in verification.rounds
+        ],
+    )
+    if verification.difference is not None:
+        message.first_difference.index = verification.difference.index
+        message.first_difference.live.CopyFrom(encode_points(verification.difference.live, encoding))
+        message.first_difference.recomputed.CopyFrom(encode_points(verification.difference.recomputed, encoding))
+    return message

@@ -1,0 +1,171 @@
+"""What Prometheus is told."""
+
+import asyncio
+import heapq
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from typing import Any
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, PlatformCollector, ProcessCollector
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.registry import Collector
+
+from ..engine.batch import Applied
+from ..engine.hulls import Engine
+
+# Seconds; from a small batch applied at once to one that fills a message.
+BUCKETS = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+# Hulls that get lines of their own: the largest. A hundred thousand would be too many for any Prometheus.
+NAMED_HULLS = 100
+# Seconds to wait for the event loop.
+PATIENCE = 5.0
+
+
+class Metrics:
+    """Counters of one server, in a registry of its own."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        ProcessCollector(registry=self.registry)
+        PlatformCollector(registry=self.registry)
+        self._calls = Counter(
+            "dynhull_calls", "Calls that have ended, by method and status.", ["method", "code"], registry=self.registry
+        )
+        self._durations = Histogram(
+            "dynhull_call_duration_seconds",
+            "From the beginning of a call to its end.",
+            ["method"],
+            buckets=BUCKETS,
+            registry=self.registry,
+        )
+        batches = Counter("dynhull_batches", "Batches, by what became of them.", ["outcome"], registry=self.registry)
+        self._applied, self._duplicates, self._refused = map(batches.labels, ("applied", "duplicate", "refused"))
+        updates = Counter("dynhull_updates", "Points inserted and deleted.", ["operation"], registry=self.registry)
+        self._inserted, self._deleted, self._missing = map(updates.labels, ("insert", "delete", "missing"))
+        self._batch_durations = Histogram(
+            "dynhull_batch_duration_seconds",
+            "From the arrival of a batch to its acknowledgement being ready.",
+            buckets=BUCKETS,
+            registry=self.registry,
+        )
+        self._events = Counter(
+            "dynhull_watch_events", "Events sent to watchers, by kind.", ["kind"], registry=self.registry
+        )
+        self._verifications = Counter(
+            "dynhull_verifications",
+            "Hulls compared with Chan's algorithm, by who asked and what came out.",
+            ["origin", "outcome"],
+            registry=self.registry,
+        )
+        for origin in ("scrub", "call"):
+            for outcome in ("equal", "different"):
+                self._verifications.labels(origin, outcome)
+        self._scrub_seconds = Counter(
+            "dynhull_scrub_cpu_seconds", "Processor time of the background scrub.", registry=self.registry
+        )
+        self._scrubbed = Gauge(
+            "dynhull_scrub_last_round_timestamp_seconds",
+            "When the scrub had last seen every hull.",
+            registry=self.registry,
+        )
+        self._watchers: dict[object, float | None] = {}
+
+    def call(self, method: str, code: str, seconds: float) -> None:
+        """A call has ended."""
+        self._calls.labels(method, code).inc()
+        self._durations.labels(method).observe(seconds)
+
+    def applied(self, applied: Applied, seconds: float) -> None:
+        """A batch has been applied, `seconds` after it came."""
+        self._batch_durations.observe(seconds)
+        if applied.duplicate:
+            self._duplicates.inc()
+            return
+        self._applied.inc()
+        if applied.inserted:
+            self._inserted.inc(applied.inserted)
+        if applied.deleted:
+            self._deleted.inc(applied.deleted)
+        if applied.missing:
+            self._missing.inc(applied.missing)
+
+    def refused(self) -> None:
+        """A batch has been refused."""
+        self._refused.inc()
+
+    def verified(self, origin: str, equal: bool, seconds: float = 0.0) -> None:
+        """A hull has been compared."""
+        self._verifications.labels(origin, "equal" if equal else "different").inc()
+        self._scrub_seconds.inc(seconds)
+
+    def scrub_round(self) -> None:
+        """The scrub has seen every hull."""
+        self._scrubbed.set_to_current_time()
+
+    @contextmanager
+    def watcher(self) -> Iterator[object]:
+        """A watcher is there; yields what `sending` calls it."""
+        watcher = object()
+        self._watchers[watcher] = None
+        try:
+            yield watcher
+        finally:
+            del self._watchers[watcher]
+
+    @contextmanager
+    def sending(self, watcher: object, kind: str) -> Iterator[None]:
+        """An event is on its way to the watcher."""
+        self._watchers[watcher] = time.monotonic()
+        yield
+        self._watchers[watcher] = None
+        self._events.labels(kind).inc()
+
+    @property
+    def watchers(self) -> int:
+        """How many there are."""
+        return len(self._watchers)
+
+    @property
+    def lag(self) -> float:
+        """For how many seconds the slowest watcher has not taken its event."""
+        now = time.monotonic()
+        return max((now - since for since in self._watchers.values() if since is not None), default=0.0)
+
+
+class StateCollector(Collector):
+    """What is there at the moment of asking: hulls and watchers. Asked in other threads than the event loop's."""
+
+    def __init__(self, engine: Engine, metrics: Metrics, loop: asyncio.AbstractEventLoop) -> None:
+        self._engine = engine
+        self._metrics = metrics
+        self._loop = loop
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """Gauges of the state."""
+        yield from _on(self._loop, self._gauges)
+
+    def _gauges(self) -> list[GaugeMetricFamily]:
+        hulls = list(self._engine)
+        points = GaugeMetricFamily("dynhull_hull_points", "Points of the largest hulls.", labels=["hull"])
+        vertices = GaugeMetricFamily("dynhull_hull_vertices", "Their vertices when last told.", labels=["hull"])
+        for hull in heapq.nlargest(NAMED_HULLS, hulls, key=lambda hull: hull.counts.points):
+            points.add_metric([hull.name], hull.counts.points)
+            vertices.add_metric([hull.name], hull.vertex_count)
+        total = sum(hull.counts.points for hull in hulls)
+        lag = "For how long the slowest watcher has not taken its event."
+        return [
+            GaugeMetricFamily("dynhull_hulls", "Hulls.", value=len(hulls)),
+            GaugeMetricFamily("dynhull_points", "Points of all hulls.", value=total),
+            GaugeMetricFamily("dynhull_watchers", "Watchers.", value=self._metrics.watchers),
+            GaugeMetricFamily("dynhull_watch_lag_seconds", lag, value=self._metrics.lag),
+            points,
+            vertices,
+        ]
+
+
+def _on(loop: asyncio.AbstractEventLoop, function: Any) -> Any:
+    future: Future[Any] = Future()
+    loop.call_soon_threadsafe(lambda: future.set_result(function()))
+    return future.result(PATIENCE)

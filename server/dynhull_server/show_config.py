@@ -1,0 +1,18 @@
+"""`dynhull config`: what `dynhull serve` would run with."""
+
+import typer
+
+from .flags import as_toml, with_settings
+from .settings import Settings
+
+
+@with_settings
+def config(settings: Settings, origins: dict[str, str]) -> None:
+    """Show the settings `dynhull serve` would run with, as a file for --config, and where each comes from."""
+    lines = {}
+    for name in Settings.model_fields:
+        value = getattr(settings, name)
+        lines[name] = f"# {name} =" if value is None else f"{name} = {as_toml(value)}"
+    width = max(map(len, lines.values()))
+    for name, line in lines.items():
+        typer.echo(f"{line:{width}}  # {origins[name]}")

@@ -1,0 +1,155 @@
+"""Diameter, width, smallest box, distances and crossings, against definitions in rational arithmetic."""
+
+from fractions import Fraction
+from itertools import combinations
+from math import inf, isqrt, nextafter
+
+import numpy as np
+import oracle
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from inputs import CIRCLE, points
+
+from dynhull import DynamicHull
+
+grid_points = st.lists(st.tuples(*[st.integers(-6, 6).map(float)] * 2), min_size=1, max_size=12)
+any_points = st.one_of(grid_points, points(12).filter(len), st.lists(st.sampled_from(CIRCLE), min_size=1, max_size=9))
+
+
+def exact(p):
+    return Fraction(p[0]), Fraction(p[1])
+
+
+def squared(p, q):
+    (px, py), (qx, qy) = exact(p), exact(q)
+    return (px - qx) ** 2 + (py - qy) ** 2
+
+
+def root(value):
+    """The root of a rational number, to 100 bits more than a double has."""
+    scale = Fraction(2) ** (2 * (2200 + 160))
+    scaled = isqrt(int(value * scale))
+    return Fraction(scaled) / Fraction(2) ** (2200 + 160)
+
+
+def assert_rounded(measured, value):
+    """The double next to a rational value, or one beside that; inf where it is too large."""
+    try:
+        nearest = float(value)
+    except OverflowError:
+        nearest = inf
+    assert measured in (nearest, nextafter(nearest, inf), nextafter(nearest, 0))
+
+
+def cross(o, a, b):
+    return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0])
+
+
+def edges(rows):
+    corners = [exact(p) for p in oracle.hull(rows)]
+    return list(zip(corners, corners[1:] + corners[:1], strict=True)) if len(corners) > 1 else []
+
+
+@given(any_points)
+def test_diameter(rows):
+    assert_rounded(
+        DynamicHull(rows).diameter(), root(max((squared(p, q) for p, q in combinations(rows, 2)), default=Fraction(0)))
+    )
+
+
+@given(any_points)
+def test_width(rows):
+    widths = [Fraction(max(cross(a, b, exact(p)) for p in rows)) ** 2 / squared(a, b) for a, b in edges(rows)]
+    assert_rounded(DynamicHull(rows).width(), root(min(widths, default=Fraction(0))))
+
+
+@given(grid_points)
+def test_min_box(rows):
+    box = DynamicHull(rows).min_box()
+    a, b, c, d = box
+    area = float(cross(a, b, d))
+    areas = []
+    for p, q in edges(rows):
+        u = (q[0] - p[0], q[1] - p[1])
+        along = [u[0] * Fraction(x) + u[1] * Fraction(y) for x, y in rows]
+        height = max(cross(p, q, exact(r)) for r in rows)
+        areas.append((max(along) - min(along)) * height / (u[0] ** 2 + u[1] ** 2))
+    assert area == pytest.approx(float(min(areas, default=0)), abs=1e-9)
+    np.testing.assert_allclose(b - a, c - d, atol=1e-12)
+    assert abs(float(np.dot(b - a, d - a))) < 1e-9
+    for p in rows:
+        for q, r in ((a, b), (b, c), (c, d), (d, a)):
+            assert cross(q, r, p) >= -1e-9
+
+
+def segment_distance(p, a, b):
+    (px, py), (ax, ay), (bx, by) = exact(p), exact(a), exact(b)
+    ux, uy = bx - ax, by - ay
+    share = ((px - ax) * ux + (py - ay) * uy) / (ux * ux + uy * uy) if (ux, uy) != (0, 0) else 0
+    share = max(min(share, Fraction(1)), Fraction(0))
+    return (px - ax - share * ux) ** 2 + (py - ay - share * uy) ** 2
+
+
+@given(any_points, any_points)
+def test_distance(rows, queries):
+    corners = oracle.hull(rows)
+    sides = list(zip(corners, corners[1:] + corners[:1], strict=True))
+    for measured, q in zip(DynamicHull(rows).distance(queries), queries, strict=True):
+        if oracle.locate(corners, q) >= 0:
+            assert measured == 0
+        else:
+            assert_rounded(measured, root(min(segment_distance(q, a, b) for a, b in sides)))
+
+
+def crossings(corners, p, q):
+    """The ends of a line's part inside, exactly, by clipping it against every edge."""
+    p, q = exact(p), exact(q)
+    corners = [exact(c) for c in corners]
+    found = set()
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        at_a, at_b = cross(p, q, a), cross(p, q, b)
+        found |= {v for v, at in ((a, at_a), (b, at_b)) if at == 0}
+        if at_a * at_b < 0:
+            share = at_a / (at_a - at_b)
+            found.add((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+    found = sorted(found, key=lambda v: (q[0] - p[0]) * v[0] + (q[1] - p[1]) * v[1])
+    return [found[0], found[-1]] if found else None
+
+
+@given(any_points, any_points, any_points)
+def test_intersect_lines(rows, starts, ends):
+    lines = [(p, q) for p, q in zip(starts, ends, strict=False) if p != q and (p[0] + 0.0, p[1] + 0.0) != q]
+    if not lines:
+        return
+    p, q = zip(*lines, strict=True)
+    for line, found in zip(lines, DynamicHull(rows).intersect_lines(p, q), strict=True):
+        expected = crossings(oracle.hull(rows), *line)
+        if expected is None:
+            assert np.isnan(found).all()
+        else:
+            assert found.tolist() == [[float(x), float(y)] for x, y in expected]
+
+
+def test_no_points():
+    hull = DynamicHull()
+    assert (hull.diameter(), hull.width()) == (0.0, 0.0)
+    assert np.isnan(hull.min_box()).all()
+    assert hull.distance([[1, 2]]).tolist() == [inf]
+    assert np.isnan(hull.intersect_lines([[0, 0]], [[1, 1]])).all()
+
+
+def test_known_values():
+    hull = DynamicHull([[0, 0], [4, 0], [4, 3], [0, 3], [2, 1]])
+    assert (hull.diameter(), hull.width()) == (5.0, 3.0)
+    assert hull.min_box().tolist() == [[0, 0], [4, 0], [4, 3], [0, 3]]
+    assert hull.distance([[-3, -4], [2, 5], [2, 2], [6, 1]]).tolist() == [5, 2, 0, 2]
+    assert hull.intersect_lines([[2, 9]], [[2, 8]]).tolist() == [[[2, 3], [2, 0]]]
+
+
+def test_bad_lines():
+    hull = DynamicHull([[0, 0]])
+    with pytest.raises(ValueError, match="p and q row 1 are the same point: no line"):
+        hull.intersect_lines([[0, 0], [1, 1]], [[0, 1], [1, 1]])
+    with pytest.raises(ValueError, match="p and q must have the same length, got 1 and 2"):
+        hull.intersect_lines([[0, 0]], [[0, 1], [1, 1]])

@@ -1,0 +1,66 @@
+"""The compiler keeps to the predicates' arithmetic, and the fuzzer finds nothing."""
+
+import platform
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynhull import _kernel
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+SEEDS = (HERE / "seeds.txt").read_text().split()
+
+
+@given(st.floats(0.5, 1), st.floats(0.5, 1))
+def test_no_operation_is_fused(x, y):
+    """The filter must see the same two rounded products, whichever side they are on.
+
+    With a multiply-add fused, x * y - y * x is the rounding error of one product; with fast-math the bounds are gone.
+    """
+    assert _kernel.plain_difference_of_products(x, y, y, x) == 0.0
+
+
+def test_infinities_and_nans_are_respected():
+    """What -ffast-math takes away: an overflowing filter has to find that it cannot tell."""
+    big = 1.7e308
+    assert _kernel.orientation((-big, -big), (big, big), (big, -big)) == -1
+    assert _kernel.orientation((-big, -big), (0.0, 0.0), (big, big)) == 0
+    assert _kernel.plain_difference_of_products(big, big, big, big) != _kernel.plain_difference_of_products(
+        big, big, big, big
+    )
+
+
+def test_the_build_forbids_fusing(compiler, tmp_path):
+    """Even for a processor that can, with the flags of CMakeLists.txt; without the one that forbids it, it happens."""
+    options = re.search(r"target_compile_options\(_kernel PRIVATE (-.*)\)", (ROOT / "CMakeLists.txt").read_text())
+    flags = options.group(1).split()
+    source = tmp_path / "filter.cpp"
+    source.write_text(
+        f'#include "{ROOT}/dynhull/kernel/predicates.hpp"\n'
+        "int filter(dynhull::Point a, dynhull::Point b, dynhull::Point c) { return orientation_filter(a, b, c); }"
+    )
+    able = ["-mfma"] if platform.machine() in ("x86_64", "AMD64") else []
+
+    def fused(flags):
+        command = [compiler, "-std=c++20", *flags, *able, "-S", str(source), "-o", "-"]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        return bool(re.search(r"\bv?fn?m(add|sub|la|ls)", text))
+
+    assert not fused(flags)
+    assert fused([flag if not flag.startswith("-ffp-contract") else "-ffp-contract=fast" for flag in flags])
+
+
+@pytest.mark.parametrize("leaf", [4, 62])
+def test_fuzz(compiler, leaf, tmp_path):
+    """A short run of `make fuzz`, without sanitizers to be quick: kept seeds, then random ones."""
+    program = tmp_path / "fuzz"
+    build = [compiler, "-std=c++20", "-O1", "-ffp-contract=off", "-DDYNHULL_FAIL_ALLOCATIONS", f"-DDYNHULL_LEAF={leaf}"]
+    subprocess.run([*build, str(HERE / "fuzz.cpp"), "-o", str(program)], check=True)
+    for arguments in (SEEDS, ["--seconds", "2"]):
+        run = subprocess.run([str(program), *arguments], capture_output=True, text=True, check=False)
+        assert run.returncode == 0, run.stdout

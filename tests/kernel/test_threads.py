@@ -1,0 +1,122 @@
+"""Several threads use one hull: readers together, one writer, and the interpreter goes on meanwhile."""
+
+import os
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from dynhull import _kernel
+
+ROWS = 4000
+
+
+@pytest.fixture
+def impatient():
+    """Switch threads at every chance."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_writers_and_readers():
+    """Every writer has points of its own, so what has to be there in the end is known."""
+    tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
+    before = tree.points()
+    wrong = []
+
+    def write(number):
+        random = np.random.default_rng(number)
+        mine = random.random((ROWS, 2)) + number
+        for _ in range(10):
+            tree.apply(np.ones(ROWS, np.int8), mine, False)
+            tree.insert(*mine[0])
+            tree.apply(np.full(ROWS, -1, np.int8), mine, False)
+            tree.delete(*mine[0])
+        tree.apply(np.ones(100, np.int8), np.ascontiguousarray(mine[:100]), False)
+
+    def read(number):
+        random = np.random.default_rng(number)
+        queries = random.random((ROWS, 2))
+        for _ in range(30):
+            if not (tree.locate(before) >= 0).all():
+                wrong.append("a point of the beginning was outside")
+            tree.support(queries)
+            tree.tangents(queries)
+            if len(tree.vertices()) < 3 or len(tree) < 1000 or not tree.count(*before[0]):
+                wrong.append("the hull was in pieces")
+            tree.copy().check()
+
+    with ThreadPoolExecutor(8) as pool:
+        jobs = [pool.submit(write, number) for number in range(1, 5)] + [pool.submit(read, n) for n in range(4)]
+        for job in jobs:
+            job.result()
+    assert not wrong
+    tree.check()
+    expected = [before] + [np.random.default_rng(n).random((ROWS, 2))[:100] + n for n in range(1, 5)]
+    np.testing.assert_array_equal(tree.points(), _kernel.HullTree(np.concatenate(expected)).points())
+
+
+def test_other_threads_run_during_a_batch():
+    """A batch lets go of the interpreter: another thread counts while it runs."""
+    rows = np.random.default_rng(0).random((1_000_000, 2))
+    counted = []
+    done = threading.Event()
+
+    def count():
+        steps = 0
+        while not done.is_set():
+            steps += 1
+        counted.append(steps)
+
+    counter = threading.Thread(target=count)
+    tree = _kernel.HullTree()
+    counter.start()
+    began = len(counted)
+    tree.apply(np.ones(len(rows), np.int8), rows, False)
+    done.set()
+    counter.join()
+    assert began == 0
+    assert counted[0] > 1000
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+@pytest.mark.usefixtures("impatient")
+def test_fork_during_batches():
+    """Whenever the fork comes, the child's hull is whole, and both processes go on."""
+    tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
+    stop = threading.Event()
+    plus, minus = np.ones(ROWS, np.int8), np.full(ROWS, -1, np.int8)
+    rows = np.random.default_rng(1).random((ROWS, 2))
+
+    def write():
+        while not stop.is_set():
+            tree.apply(plus, rows, False)
+            tree.apply(minus, rows, False)
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(20):
+            child = os.fork()
+            if child == 0:
+                status = 1
+                try:
+                    tree.check()
+                    tree.apply(plus, rows, False)
+                    tree.insert(0.5, 0.5)
+                    tree.check()
+                    status = 0
+                finally:
+                    os._exit(status)
+            assert os.waitpid(child, 0)[1] == 0
+    finally:
+        stop.set()
+        writer.join()
+    tree.check()
+    assert len(tree) == 1000

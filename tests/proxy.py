@@ -1,0 +1,72 @@
+"""A way to a server that can be cut."""
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+
+class Proxy:
+    """Forwards connections on `address` to a server; `cut` severs all of them at once."""
+
+    def __init__(self, server: str) -> None:
+        host, port = server.rsplit(":", 1)
+        self._server = host, int(port)
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._open: set[socket.socket] = set()
+        self._threads: list[threading.Thread] = []
+        self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
+        self._start(self._accept)
+
+    def cut(self) -> None:
+        for each in list(self._open):
+            shut(each)
+
+    def close(self) -> None:
+        shut(self._listener)
+        self.cut()
+        for thread in self._threads:
+            thread.join()
+        self._listener.close()
+
+    def _start(self, target: Callable[..., None], *arguments: socket.socket) -> threading.Thread:
+        thread = threading.Thread(target=target, args=arguments)
+        self._threads.append(thread)
+        thread.start()
+        return thread
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                client, _ = self._listener.accept()
+                self._start(self._connect, client)
+
+    def _connect(self, client: socket.socket) -> None:
+        with client, socket.create_connection(self._server) as server:
+            self._open |= {client, server}
+            back = self._start(forward, server, client)
+            forward(client, server)
+            back.join()
+            self._open -= {client, server}
+
+
+def forward(source: socket.socket, sink: socket.socket) -> None:
+    with suppress(OSError):
+        while data := source.recv(65536):
+            sink.sendall(data)
+    shut(source)
+    shut(sink)
+
+
+def shut(end: socket.socket) -> None:
+    with suppress(OSError):
+        end.shutdown(socket.SHUT_RDWR)
+
+
+@contextmanager
+def proxy(server: str) -> Iterator[Proxy]:
+    running = Proxy(server)
+    try:
+        yield running
+    finally:
+        running.close()

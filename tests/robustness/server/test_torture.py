@@ -1,0 +1,16 @@
+"""A short run of the torture; `make robustness` is the long one."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+
+def test_no_promise_is_broken():
+    torture = Path(__file__).with_name("torture.py")
+    run = subprocess.run([sys.executable, torture, "--faults", "18"], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    counts = run.stdout.splitlines()[-1]
+    assert "faults: 2 full disk, 10 kill, 2 pause, 4 sever;" in counts
+    assert "lost: 0, doubled: 0" in counts
+    assert int(re.search(r"batches acknowledged: (\d+)", counts)[1]) > 100

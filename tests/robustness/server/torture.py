@@ -1,0 +1,441 @@
+"""Torture of a real server, after etcd's robustness suite: writers, readers, watchers, and a process that keeps dying.
+
+    python tests/robustness/server/torture.py --faults 50
+
+Writers number their batches and keep a few under way; what a broken connection leaves open they ask the server about
+and send again. After every fault a model, the multiset of all batches, checks each promise of docs/guarantees.md:
+
+* an acknowledged batch is there; an unacknowledged one is there whole or not at all; none is there twice
+* no reader ever sees a revision below one it has seen
+* a watcher's copy is the exact hull at the revision named
+* the hull is the one that a static algorithm finds, here and in the server
+"""
+
+import argparse
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import grpc
+import numpy as np
+
+import dynhull
+from dynhull_client import HullCopy
+from dynhull_client.messages import decode_event
+from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+HULL = "tortured"
+COMMAND = str(Path(sys.executable).with_name("dynhull"))
+IN_FLIGHT = 12
+PATIENCE = 60.0  # seconds, for anything to happen at all
+DISK = "64m"
+# What a client hears when a server dies, stalls, or is cut off; all of it may be tried again.
+PASSING = {
+    grpc.StatusCode.UNAVAILABLE,
+    grpc.StatusCode.DEADLINE_EXCEEDED,
+    grpc.StatusCode.CANCELLED,
+    grpc.StatusCode.UNKNOWN,
+    grpc.StatusCode.RESOURCE_EXHAUSTED,
+}
+
+
+class BrokenPromiseError(AssertionError):
+    """The server did what it says it never does."""
+
+
+def require(condition: object, what: str) -> None:
+    if not condition:
+        raise BrokenPromiseError(what)
+
+
+class Proxy:
+    """A connection to the server that can be cut. Listens on a port of its own for as long as the run lasts."""
+
+    def __init__(self) -> None:
+        self.server_port = 0
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self._pairs: set[tuple[socket.socket, socket.socket]] = set()
+        self._lock = threading.Lock()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def sever(self) -> None:
+        with self._lock:
+            pairs, self._pairs = self._pairs, set()
+        for pair in pairs:
+            for end in pair:
+                with suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+
+    def _accept(self) -> None:
+        while True:
+            client, _ = self._listener.accept()
+            try:
+                server = socket.create_connection(("127.0.0.1", self.server_port))
+            except OSError:
+                client.close()
+                continue
+            with self._lock:
+                self._pairs.add((client, server))
+            for source, target in ((client, server), (server, client)):
+                threading.Thread(target=self._pump, args=(source, target), daemon=True).start()
+
+    @staticmethod
+    def _pump(source: socket.socket, target: socket.socket) -> None:
+        with suppress(OSError):
+            while data := source.recv(65536):
+                target.sendall(data)
+        for end in (source, target):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+
+class Server:
+    """`dynhull serve` on a folder; it keeps its port over its lives."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._port = 0
+        self.log = (folder / "server.log").open("ab")
+
+    def start(self) -> int:
+        command = [COMMAND, "serve", "--port", str(self._port), "--data", str(self._folder / "data")]
+        command += ["--snapshot-points", "2000", "--log-level", "warning", "--scrub-cpu", "0"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True)
+        line = self.process.stdout.readline()
+        require("serving on" in line, f"the server did not start, see {self.log.name}")
+        self._port = int(line.rsplit(":", 1)[1])
+        return self._port
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+@dataclass
+class Shared:
+    """What all threads see."""
+
+    target: str
+    gate: threading.Event = field(default_factory=threading.Event)  # open: writers write
+    over: threading.Event = field(default_factory=threading.Event)
+    failures: list[BaseException] = field(default_factory=list)
+
+    def stub(self) -> tuple[grpc.Channel, HullServiceStub]:
+        options = [("grpc.initial_reconnect_backoff_ms", 20), ("grpc.max_reconnect_backoff_ms", 200)]
+        channel = grpc.insecure_channel(self.target, options=[*options, ("grpc.use_local_subchannel_pool", 1)])
+        return channel, HullServiceStub(channel)
+
+
+class Actor(threading.Thread):
+    """Does one thing again and again; a passing failure makes it begin anew."""
+
+    def __init__(self, shared: Shared, name: str) -> None:
+        super().__init__(name=name, daemon=True)
+        self.shared = shared
+
+    def run(self) -> None:
+        while not self.shared.over.is_set():
+            channel, stub = self.shared.stub()
+            try:
+                self.act(stub)
+            except grpc.RpcError as error:
+                if error.code() not in PASSING:
+                    self.shared.failures.append(error)
+                    return
+                time.sleep(0.02)
+            except BaseException as error:
+                self.shared.failures.append(error)
+                return
+            finally:
+                channel.close()
+
+    def act(self, stub: HullServiceStub) -> None:
+        raise NotImplementedError
+
+
+class Writer(Actor):
+    """Inserts points, deletes some of its own again; `batches` is all it ever sent, in order."""
+
+    def __init__(self, shared: Shared, number: int, seed: int) -> None:
+        super().__init__(shared, f"writer-{number}")
+        self.batches: list[tuple[np.ndarray, np.ndarray]] = []
+        self.acknowledged = 0
+        self.idle = threading.Event()
+        self._random = np.random.default_rng(seed)
+        self._own: list[tuple[float, float]] = []
+        self._revision = 0
+
+    def act(self, stub: HullServiceStub) -> None:
+        if not self.shared.gate.is_set() and self.acknowledged == len(self.batches):
+            self.idle.set()
+            self.shared.gate.wait(0.1)
+            return
+        self.idle.clear()
+        last = stub.GetProducer(pb.GetProducerRequest(name=HULL, producer=self.name), timeout=10).last_sequence
+        require(last >= self.acknowledged, f"{self.name}: batch {self.acknowledged} was acknowledged and is lost")
+        require(last <= len(self.batches), f"{self.name}: batch {last} was never sent")
+        self.acknowledged = last
+        room = threading.Semaphore(IN_FLIGHT)
+        for response in stub.Stream(self._requests(last, room), timeout=30):
+            room.release()
+            self.acknowledged += 1
+            require(response.sequence == self.acknowledged, f"{self.name}: acknowledged out of order")
+            require(response.result.revision > self._revision, f"{self.name}: a revision was given twice")
+            self._revision = response.result.revision
+
+    def _requests(self, last: int, room: threading.Semaphore):
+        yield pb.StreamRequest(name=HULL, producer=self.name)
+        sequence = last
+        while True:
+            if not room.acquire(timeout=10):
+                return
+            sequence += 1
+            if sequence > len(self.batches):
+                if not self.shared.gate.is_set():
+                    return
+                self.batches.append(self._next())
+            inserts, deletes = self.batches[sequence - 1]
+            batch = batch_pb2.Batch()
+            batch.inserts.packed, batch.deletes.packed = inserts.tobytes(), deletes.tobytes()
+            yield pb.StreamRequest(batch=batch, sequence=sequence)
+
+    def _next(self) -> tuple[np.ndarray, np.ndarray]:
+        rng = self._random
+        inserts = rng.normal(size=(rng.integers(1, 30), 2)).round(rng.integers(0, 4)) + 0.0
+        deletes = []
+        if len(self._own) > 400:
+            deletes = [self._own.pop(rng.integers(len(self._own))) for _ in range(rng.integers(1, 60))]
+        self._own += map(tuple, inserts.tolist())
+        return inserts, np.array(deletes, dtype=float).reshape(-1, 2)
+
+
+class Reader(Actor):
+    """Never sees a revision below one it has seen."""
+
+    seen = 0
+    reads = 0
+
+    def act(self, stub: HullServiceStub) -> None:
+        while not self.shared.over.is_set():
+            revision = stub.GetHull(pb.GetHullRequest(name=HULL), timeout=10).hull.revision
+            require(revision >= self.seen, f"revision {revision} after {self.seen}")
+            self.seen = revision
+            self.reads += 1
+            time.sleep(0.005)
+
+
+class Watcher(Actor):
+    """Keeps a copy over all its connections."""
+
+    def __init__(self, shared: Shared, name: str) -> None:
+        super().__init__(shared, name)
+        self.copy = HullCopy()
+        self.moved = threading.Condition()
+        self.resumed = 0
+        self._uid = ""
+
+    def act(self, stub: HullServiceStub) -> None:
+        request = pb.WatchRequest(name=HULL)
+        request.progress_interval.FromMilliseconds(200)
+        if self._uid:
+            request.resume.uid, request.resume.revision = self._uid, self.copy.revision
+        try:
+            for response in stub.Watch(request):
+                self._take(response)
+        except grpc.RpcError as error:
+            if error.code() is not grpc.StatusCode.OUT_OF_RANGE:
+                raise
+            self._uid = ""  # the server has trimmed its history: begin anew
+
+    def _take(self, response: pb.WatchResponse) -> None:
+        with self.moved:
+            if response.HasField("snapshot"):
+                self._uid = response.snapshot.uid
+            else:
+                self.resumed += 1
+                require(response.revision >= self.copy.revision, f"{self.name}: revision {response.revision} came back")
+            self.copy.update(decode_event(response))
+            self.moved.notify_all()
+
+    def vertices_at(self, revision: int) -> np.ndarray:
+        with self.moved:
+            reached = self.moved.wait_for(lambda: self.copy.revision >= revision or self.shared.failures, PATIENCE)
+            require(reached, f"{self.name} stays at revision {self.copy.revision}, {revision} was reached")
+            require(self.copy.revision == revision, f"{self.name} is at {self.copy.revision} of {revision}")
+            return self.copy.vertices
+
+
+class Torture:
+    def __init__(self, folder: Path, seed: int, writers: int) -> None:
+        self._folder = folder
+        self._random = random.Random(seed)
+        self._proxy = Proxy()
+        self.server = Server(folder)
+        self._proxy.server_port = self.server.start()
+        self.shared = Shared(f"127.0.0.1:{self._proxy.port}")
+        self._channel, self._stub = self.shared.stub()
+        self._call(self._stub.CreateHull, pb.CreateHullRequest(name=HULL))
+        self.writers = [Writer(self.shared, i, seed + i) for i in range(writers)]
+        self.readers = [Reader(self.shared, "reader")]
+        self.watchers = [Watcher(self.shared, f"watcher-{i}") for i in range(2)]
+        self.faults: Counter[str] = Counter()
+        for actor in (*self.writers, *self.readers, *self.watchers):
+            actor.start()
+        self.shared.gate.set()
+
+    def round(self, fault: str) -> None:
+        """Traffic, a fault in the middle of it, what must be true at once, and what must be true in the end."""
+        self.faults[fault] += 1
+        time.sleep(self._random.uniform(0.05, 0.6))
+        getattr(self, f"_{fault}")()
+        self.shared.gate.set()
+        time.sleep(self._random.uniform(0.05, 0.3))
+        self._settle()
+        self._check()
+        self.shared.gate.set()
+
+    def _kill(self) -> None:
+        self.shared.gate.clear()
+        self.server.kill()
+        self._proxy.sever()
+        self._proxy.server_port = self.server.start()
+
+    def _pause(self) -> None:
+        self.server.process.send_signal(signal.SIGSTOP)
+        time.sleep(self._random.uniform(0.1, 1.0))
+        self.server.process.send_signal(signal.SIGCONT)
+
+    def _sever(self) -> None:
+        self._proxy.sever()
+
+    def _full_disk(self) -> None:
+        ballast = self._folder / "ballast"
+        with suppress(OSError), ballast.open("wb") as file:
+            while True:
+                file.write(bytes(2**16))
+        time.sleep(self._random.uniform(0.2, 0.8))
+        if self._random.random() < 0.5:
+            self.server.kill()
+            ballast.unlink()
+            self._proxy.server_port = self.server.start()
+        else:
+            ballast.unlink()
+
+    def _settle(self) -> None:
+        """Everything sent is acknowledged, and nobody writes."""
+        self.shared.gate.clear()
+        for writer in self.writers:
+            deadline = time.monotonic() + PATIENCE
+            while not (writer.idle.wait(0.05) and writer.acknowledged == len(writer.batches)):
+                self._raise_failures()
+                require(time.monotonic() < deadline, f"{writer.name} does not get its batches acknowledged")
+
+    def _check(self) -> None:
+        self._raise_failures()
+        points = self._model()
+        revision = sum(len(writer.batches) for writer in self.writers)
+        answer = self._call(self._stub.GetHull, pb.GetHullRequest(name=HULL, min_revision=revision))
+        require(answer.hull.revision == revision, f"revision {answer.hull.revision} after {revision} batches")
+        require(answer.hull.point_count == points.total(), f"{answer.hull.point_count} points of {points.total()}")
+        expected = dynhull.static.monotone_chain(np.array(sorted(points), dtype=float).reshape(-1, 2))
+        held = self._call(self._stub.Verify, pb.VerifyRequest(name=HULL))
+        require(held.equal, "the live hull differs from Chan's recomputation")
+        for watcher in self.watchers:
+            copy = watcher.vertices_at(revision)
+            require(np.array_equal(copy, expected), f"{watcher.name}'s copy is not the hull at {revision}")
+        sample = self._random.sample(sorted(points), min(50, len(points)))
+        query = pb.CountRequest(name=HULL)
+        query.points.packed = np.array(sample, dtype=float).tobytes()
+        counts = list(self._call(self._stub.Count, query).counts)
+        require(counts == [points[p] for p in sample], "points are there more or less often than they were inserted")
+        self._raise_failures()
+
+    def _model(self) -> Counter[tuple[float, float]]:
+        points: Counter[tuple[float, float]] = Counter()
+        for writer in self.writers:
+            for inserts, deletes in writer.batches:
+                points.update(map(tuple, inserts.tolist()))
+                points.subtract(map(tuple, deletes.tolist()))
+        return +points
+
+    def _call(self, method, request):
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            try:
+                return method(request, timeout=10)
+            except grpc.RpcError as error:
+                if error.code() not in PASSING or time.monotonic() > deadline:
+                    raise
+                time.sleep(0.05)
+
+    def _raise_failures(self) -> None:
+        if self.shared.failures:
+            raise self.shared.failures[0]
+
+    def finish(self) -> None:
+        self.shared.over.set()
+        self.shared.gate.set()
+        self._channel.close()
+        self.server.process.terminate()
+        self.server.process.wait()
+
+
+def torture(folder: Path, faults: int, seed: int, writers: int = 3) -> str:
+    """Run so many rounds. Returns the counts; raises BrokenPromiseError with what was broken."""
+    run = Torture(folder, seed, writers)
+    kinds = ["kill"] * 5 + ["pause", "sever", "sever", "full_disk"]
+    try:
+        for i in range(faults):
+            run.round(kinds[i % len(kinds)])
+            print(f"\r{i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
+    finally:
+        run.finish()
+    acknowledged = sum(writer.acknowledged for writer in run.writers)
+    kinds_seen = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in sorted(run.faults.items()))
+    return (
+        f"faults: {kinds_seen}; batches acknowledged: {acknowledged}, lost: 0, doubled: 0; "
+        f"reads: {sum(reader.reads for reader in run.readers)}, revisions back: 0; "
+        f"watch events after a resume: {sum(watcher.resumed for watcher in run.watchers)}"
+    )
+
+
+def in_namespace(arguments: list[str]) -> list[str]:
+    """The command that runs this file where it can mount a small disk of its own."""
+    unshare = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--mount", "--map-root-user"]
+    return [*unshare, sys.executable, __file__, "--mounted", *arguments]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Kill, pause, cut off and starve a server while a model watches.")
+    parser.add_argument("--faults", type=int, default=50, help="how many (default 50)")
+    parser.add_argument("--seed", type=int, default=0, help="what the faults and the batches depend on (default 0)")
+    parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if not options.mounted:
+        sys.exit(subprocess.run(in_namespace(sys.argv[1:]), check=False).returncode)
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "none", folder], check=True)
+        try:
+            print("\n" + torture(Path(folder), options.faults, options.seed))
+        except BaseException:
+            print((Path(folder) / "server.log").read_text(), file=sys.stderr)
+            raise
+        finally:
+            subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,106 @@
+"""Clients that do not read: they cost no memory, and are told so in the end."""
+
+import grpc
+import numpy as np
+from metrics import measured, scrape
+from refusal import refusal
+
+from dynhull_client import HullClient, HullCopy
+from dynhull_client.messages import decode_event
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+# Without this a client takes in megabytes that nobody reads.
+SMALL_WINDOW = [("grpc.http2.bdp_probe", 0)]
+VERTICES = 1_000
+STALLED = 40
+WARM_UP, BATCHES = 150, 600
+
+
+def ring(i: int) -> np.ndarray:
+    """So many vertices, all of them others for each i."""
+    angles = np.linspace(0, 2 * np.pi, VERTICES, endpoint=False) + i
+    return 1e6 * np.stack((np.cos(angles), np.sin(angles)), axis=1)
+
+
+def turn(client: HullClient, begin: int, end: int) -> None:
+    """Replace the ring by the next, so many times: every batch changes the whole hull."""
+    with client.ingest("a") as stream:
+        for i in range(begin, end):
+            stream.apply(move=(ring(i), ring(i + 1)))
+
+
+def resident(address: str) -> float:
+    return scrape(address)["process_resident_memory_bytes"]
+
+
+def test_watchers_that_do_not_read_cost_no_memory() -> None:
+    with (
+        measured("--scrub-cpu", "0", "--history-bytes", "1000000") as (server, address),
+        HullClient(server.address) as client,
+        grpc.insecure_channel(server.address, SMALL_WINDOW) as channel,
+    ):
+        client.create_hull("a")
+        client.apply("a", insert=ring(0))
+        stub = HullServiceStub(channel)
+        watches = [stub.Watch(pb.WatchRequest(name="a")) for _ in range(STALLED)]
+        copies = [HullCopy() for _ in watches]
+        for watch, copy in zip(watches, copies, strict=True):
+            copy.update(decode_event(next(watch)))
+        turn(client, 0, WARM_UP)
+        before = resident(address)
+        turn(client, WARM_UP, WARM_UP + BATCHES)
+        assert resident(address) < 1.05 * before
+        assert scrape(address)["dynhull_watch_lag_seconds"] > 0
+        live = client.get_hull("a")
+        for watch, copy in zip(watches, copies, strict=True):
+            events = 0
+            while copy.revision < live.revision:
+                copy.update(decode_event(next(watch)))
+                events += 1
+            assert copy.vertices.tolist() == live.vertices.tolist()
+            assert events < BATCHES / 2
+            watch.cancel()
+
+
+def test_a_stream_whose_acknowledgements_are_not_read_is_not_read_either() -> None:
+    """The client would send for ever; what it got rid of is bounded."""
+    with (
+        measured("--scrub-cpu", "0") as (server, address),
+        HullClient(server.address) as client,
+        grpc.insecure_channel(server.address, SMALL_WINDOW) as channel,
+    ):
+        client.create_hull("a")
+        taken = 0
+
+        def requests():
+            nonlocal taken
+            while True:
+                taken += 1
+                yield pb.StreamRequest(name="a", batch={"inserts": {"packed": bytes(16)}})
+
+        stream = HullServiceStub(channel).Stream(requests())
+        applied = -1.0
+        while applied < (now := scrape(address)['dynhull_batches_total{outcome="applied"}']):
+            applied = now
+        assert next(stream).result.revision == 1
+        stream.cancel()
+        assert taken < 1_000_000
+
+
+def test_a_watcher_that_takes_too_long_is_told() -> None:
+    with (
+        measured("--max-watch-lag", "0.01", "--scrub-cpu", "0") as (server, address),
+        HullClient(server.address) as client,
+        grpc.insecure_channel(server.address, SMALL_WINDOW) as channel,
+    ):
+        client.create_hull("a")
+        client.apply("a", insert=ring(0))
+        watch = HullServiceStub(channel).Watch(pb.WatchRequest(name="a"))
+        done = 0
+        while scrape(address)["dynhull_watch_lag_seconds"] < 0.02:
+            turn(client, done, done + 20)
+            done += 20
+        code, info, _ = refusal(lambda: list(watch))
+        assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
+        assert dict(info.metadata) == {"limit": "max_watch_lag", "value": "0.01"}

@@ -1,0 +1,121 @@
+"""Questions about a hull, answered as the library answers them."""
+
+from collections.abc import Iterator
+
+import grpc
+import numpy as np
+import pytest
+from refusal import refusal
+
+from dynhull import DynamicHull
+from dynhull_client import HullClient, HullEmptyError
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1 import points_pb2
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+POINTS = np.round(np.random.default_rng(6).normal(scale=9, size=(400, 2)))
+QUESTIONS = np.round(np.random.default_rng(7).normal(scale=30, size=(300, 2)), 1)
+
+
+@pytest.fixture
+def filled(address: str, hull: str) -> str:
+    """A hull of the points."""
+    with HullClient(address) as client:
+        client.apply(hull, insert=POINTS)
+    return hull
+
+
+@pytest.fixture
+def client(address: str) -> Iterator[HullClient]:
+    with HullClient(address) as client:
+        yield client
+
+
+def test_support(client: HullClient, filled: str) -> None:
+    answer = client.support(filled, QUESTIONS)
+    assert answer.revision == 1
+    assert answer.vertices.tolist() == DynamicHull(POINTS).support(QUESTIONS).tolist()
+
+
+def test_tangents(client: HullClient, filled: str) -> None:
+    answer = client.tangents(filled, QUESTIONS)
+    expected = DynamicHull(POINTS).tangents(QUESTIONS)
+    assert answer.revision == 1
+    assert np.isnan(expected).any()
+    assert np.array_equal(answer.tangents, expected, equal_nan=True)
+
+
+def test_distance(client: HullClient, filled: str) -> None:
+    answer = client.distance(filled, QUESTIONS)
+    assert answer.revision == 1
+    assert answer.distances.tolist() == DynamicHull(POINTS).distance(QUESTIONS).tolist()
+
+
+def test_intersect_lines(client: HullClient, filled: str) -> None:
+    answer = client.intersect_lines(filled, QUESTIONS[:-1], QUESTIONS[1:])
+    expected = DynamicHull(POINTS).intersect_lines(QUESTIONS[:-1], QUESTIONS[1:])
+    assert answer.revision == 1
+    assert np.isnan(expected).any()
+    assert np.array_equal(answer.crossings, expected, equal_nan=True)
+
+
+def test_a_line_needs_two_points(stub: HullServiceStub, filled: str) -> None:
+    one, two = (points_pb2.Points(coordinates=each) for each in ([1, 2], [3, 4, 1, 2]))
+    same = pb.IntersectLinesRequest(name=filled, origins=two, targets=points_pb2.Points(coordinates=[0, 0, 1, 2]))
+    _, info, _ = refusal(lambda: stub.IntersectLines(same))
+    assert dict(info.metadata) == {"field": "targets", "row": "1", "value": "(1.0, 2.0)"}
+    fewer = pb.IntersectLinesRequest(name=filled, origins=two, targets=one)
+    _, info, _ = refusal(lambda: stub.IntersectLines(fewer))
+    assert dict(info.metadata) == {"field": "targets", "value": "1 points"}
+
+
+def test_count(client: HullClient, filled: str) -> None:
+    reference = DynamicHull(POINTS)
+    asked = np.concatenate((POINTS[:50], QUESTIONS))
+    answer = client.count(filled, asked)
+    assert answer.counts.tolist() == [reference.count(x, y) for x, y in asked]
+
+
+def test_coordinates_instead_of_bytes(client: HullClient, stub: HullServiceStub, filled: str) -> None:
+    coordinates = points_pb2.POINT_ENCODING_COORDINATES
+    one = points_pb2.Points(coordinates=[100, 0])
+    support = stub.Support(pb.SupportRequest(name=filled, directions=one, encoding=coordinates))
+    assert list(support.vertices.coordinates) == client.support(filled, [[100, 0]]).vertices.ravel().tolist()
+    tangents = stub.Tangents(pb.TangentsRequest(name=filled, points=one, encoding=coordinates))
+    both = [*tangents.left.coordinates, *tangents.right.coordinates]
+    assert both == client.tangents(filled, [[100, 0]]).tangents.ravel().tolist()
+
+
+def test_counts_alone(stub: HullServiceStub, filled: str) -> None:
+    response = stub.GetHull(pb.GetHullRequest(name=filled, view=pb.HULL_VIEW_BASIC))
+    assert response.hull.point_count == len(POINTS)
+    assert response.hull.distinct_point_count == DynamicHull(POINTS).distinct
+    assert not response.HasField("vertices")
+    assert not response.HasField("measures")
+
+
+@pytest.mark.parametrize("ask", ["locate", "support", "tangents", "distance", "count"])
+def test_questions_wait_for_their_revision(client: HullClient, filled: str, ask: str) -> None:
+    with pytest.raises(TimeoutError):
+        getattr(client, ask)(filled, [[1, 2]], min_revision=2, timeout=0.05)
+    client.apply(filled, insert=[[1, 2]])
+    assert getattr(client, ask)(filled, [[1, 2]], min_revision=2).revision == 2
+
+
+def test_an_empty_hull(client: HullClient, stub: HullServiceStub, hull: str) -> None:
+    with pytest.raises(HullEmptyError):
+        client.support(hull, [[1, 0]])
+    assert np.isnan(client.tangents(hull, [[1, 0]]).tangents).all()
+    assert client.count(hull, [[1, 0]]).counts.tolist() == [0]
+    directions = points_pb2.Points(coordinates=[1, 0])
+    code, info, details = refusal(lambda: stub.Support(pb.SupportRequest(name=hull, directions=directions)))
+    assert (code, info.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "HULL_EMPTY")
+    assert details[0].violations[0].subject == hull
+
+
+def test_a_direction_that_is_none(stub: HullServiceStub, filled: str) -> None:
+    directions = points_pb2.Points(coordinates=[1, 0, 0, -0.0])
+    _, info, _ = refusal(lambda: stub.Support(pb.SupportRequest(name=filled, directions=directions)))
+    assert dict(info.metadata) == {"field": "directions", "row": "1", "value": "(0.0, 0.0)"}
+    _, info, _ = refusal(lambda: list(stub.Watch(pb.WatchRequest(name=filled, directions=directions))))
+    assert info.metadata["field"] == "directions"

@@ -1,0 +1,283 @@
+"""Who may talk to the server, and what it says to those who may not."""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import grpc
+import pytest
+import trustme
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from refusal import refusal
+from server_process import Server, run, server_process
+
+from dynhull_client import (
+    HullClient,
+    HullNotFoundError,
+    PermissionDeniedError,
+    UnauthenticatedError,
+    UnavailableError,
+)
+from dynhull_proto.v1 import batch_pb2, points_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+ROOT, FLEET, READER = "root-token", "fleet-token", "reader-token"
+
+
+def entry(token: str, read: list[str], write: list[str]) -> str:
+    digest = hashlib.sha256(token.encode()).hexdigest()
+    return f'[[token]]\nsha256 = "{digest}"\nread = {read}\nwrite = {write}\n'
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    tokens = tmp_path_factory.mktemp("tokens") / "tokens.toml"
+    tokens.write_text(
+        entry(ROOT, [""], [""]) + entry(FLEET, ["fleet/"], ["fleet/truck-"]) + entry(READER, ["fleet/", "port"], [])
+    )
+    with server_process("--tokens", str(tokens), "--log-level", "error", "--create-on-write") as server:
+        with HullClient(server.address, token=ROOT) as root:
+            for name in ("fleet/truck-1", "fleet/van-1", "plane", "port", "port/a"):
+                root.apply(name, insert=[[0, 0], [1, 1]])
+        yield server
+
+
+EVERY_CALL = {
+    "CreateHull": lambda stub, name: stub.CreateHull(pb.CreateHullRequest(name=name)),
+    "DeleteHull": lambda stub, name: stub.DeleteHull(pb.DeleteHullRequest(name=name)),
+    "Apply": lambda stub, name: stub.Apply(pb.ApplyRequest(name=name, batch=batch_pb2.Batch())),
+    "Ingest": lambda stub, name: stub.Ingest(iter([pb.IngestRequest(name=name)])),
+    "Stream": lambda stub, name: list(stub.Stream(iter([pb.StreamRequest(name=name)]))),
+    "GetProducer": lambda stub, name: stub.GetProducer(pb.GetProducerRequest(name=name, producer="p")),
+    "Locate": lambda stub, name: stub.Locate(pb.LocateRequest(name=name)),
+    "Count": lambda stub, name: stub.Count(pb.CountRequest(name=name)),
+    "Support": lambda stub, name: stub.Support(pb.SupportRequest(name=name)),
+    "Tangents": lambda stub, name: stub.Tangents(pb.TangentsRequest(name=name)),
+    "Distance": lambda stub, name: stub.Distance(pb.DistanceRequest(name=name)),
+    "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
+    "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
+    "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
+    "Verify": lambda stub, name: stub.Verify(pb.VerifyRequest(name=name)),
+}
+WRITES = {"CreateHull", "DeleteHull", "Apply", "Ingest", "Stream", "GetProducer"}
+
+
+def test_every_call_is_tried() -> None:
+    methods = pb.DESCRIPTOR.services_by_name["HullService"].methods
+    assert {method.name for method in methods} == {*EVERY_CALL, "ListHulls"}
+
+
+@pytest.mark.parametrize("call", [*EVERY_CALL, "ListHulls"])
+@pytest.mark.parametrize("metadata", [None, "Bearer wrong", "Basic root-token", "root-token", "Bearer "])
+def test_without_a_token_nothing_is_answered(guarded: Server, call: str, metadata: str | None) -> None:
+    """Not even whether a request is well-formed, or a name one of a hull."""
+    with grpc.insecure_channel(guarded.address) as channel:
+        if metadata is not None:
+            channel = grpc.intercept_channel(channel, Metadata(metadata))
+        stub = HullServiceStub(channel)
+        answers = []
+        for name in ("plane", "nobody", "not a name"):
+            if call == "ListHulls":
+                refused = refusal(lambda name=name: stub.ListHulls(pb.ListHullsRequest(prefix=name)))
+            else:
+                refused = refusal(lambda name=name: EVERY_CALL[call](stub, name))
+            answers.append(refused)
+        assert answers[0][0] == grpc.StatusCode.UNAUTHENTICATED
+        assert answers[0] == answers[1] == answers[2]
+
+
+class Metadata(
+    grpc.UnaryUnaryClientInterceptor,
+    grpc.UnaryStreamClientInterceptor,
+    grpc.StreamUnaryClientInterceptor,
+    grpc.StreamStreamClientInterceptor,
+):
+    def __init__(self, authorization: str) -> None:
+        self._authorization = authorization
+
+    def _intercept(self, proceed, details, request):
+        return proceed(details._replace(metadata=[("authorization", self._authorization)]), request)
+
+    intercept_unary_unary = intercept_unary_stream = intercept_stream_unary = intercept_stream_stream = _intercept
+
+
+@pytest.mark.parametrize("call", EVERY_CALL)
+def test_out_of_scope_the_answer_is_the_same_whether_there_is_a_hull_or_not(guarded: Server, call: str) -> None:
+    with grpc.insecure_channel(guarded.address) as plain:
+        stub = HullServiceStub(grpc.intercept_channel(plain, Metadata(f"Bearer {FLEET}")))
+        for name in ("plane", "nobody"):
+            code, info, _ = refusal(lambda name=name: EVERY_CALL[call](stub, name))
+            assert (code, info.reason) == (grpc.StatusCode.PERMISSION_DENIED, "PERMISSION_DENIED")
+            assert dict(info.metadata) == {"scope": "write" if call in WRITES else "read", "value": name}
+
+
+def test_scopes(guarded: Server) -> None:
+    with HullClient(guarded.address, token=FLEET) as fleet, HullClient(guarded.address, token=ROOT) as root:
+        assert fleet.get_hull("fleet/van-1").info.points == 2
+        with pytest.raises(HullNotFoundError):
+            fleet.get_hull("fleet/van-2")
+        with pytest.raises(PermissionDeniedError):
+            fleet.apply("fleet/van-1", insert=[[5, 5]])
+        with pytest.raises(PermissionDeniedError):
+            fleet.apply("fleet/van-2", insert=[[5, 5]])
+        with pytest.raises(PermissionDeniedError), fleet.ingest("fleet/van-1") as stream:
+            stream.apply(insert=[[5, 5]])
+        assert fleet.apply("fleet/truck-1", insert=[[5, 5]]).points == 3
+        assert root.get_hull("fleet/van-1").info.revision == 1
+        assert "fleet/van-2" not in [info.name for info in root.list_hulls()]
+
+
+@pytest.mark.parametrize(
+    ("token", "prefix", "names"),
+    [
+        (ROOT, "", ["fleet/truck-1", "fleet/van-1", "plane", "port", "port/a"]),
+        (FLEET, "", ["fleet/truck-1", "fleet/van-1"]),
+        (FLEET, "fleet/v", ["fleet/van-1"]),
+        (FLEET, "p", []),
+        (READER, "", ["fleet/truck-1", "fleet/van-1", "port", "port/a"]),
+        (READER, "port/", ["port/a"]),
+    ],
+)
+def test_lists_show_what_may_be_read(guarded: Server, token: str, prefix: str, names: list[str]) -> None:
+    with HullClient(guarded.address, token=token) as client:
+        assert [info.name for info in client.list_hulls(prefix)] == names
+
+
+def test_health_needs_no_token(guarded: Server) -> None:
+    with grpc.insecure_channel(guarded.address) as channel:
+        response = health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest())
+        assert response.status == health_pb2.HealthCheckResponse.SERVING
+
+
+def test_tokens_are_read_again_when_they_change(tmp_path: Path) -> None:
+    tokens = tmp_path / "tokens.toml"
+
+    def replace(text: str) -> None:
+        # As editors and configuration tools do it: never half a file.
+        new = tmp_path / "new"
+        new.write_text(text)
+        new.rename(tokens)
+
+    replace(entry("old", [""], [""]))
+    options = ("--tokens", str(tokens), "--log-level", "error")
+    with (
+        server_process(*options, complaints="stay as they were") as server,
+        HullClient(server.address, token="old") as old,
+        HullClient(server.address, token="new") as new,
+    ):
+        old.create_hull("a")
+        with pytest.raises(UnauthenticatedError):
+            new.get_hull("a")
+        replace(entry("new", [""], []))
+        with pytest.raises(UnauthenticatedError):
+            old.get_hull("a")
+        assert new.get_hull("a").info.name == "a"
+        replace("[[token")
+        assert new.get_hull("a").info.name == "a"
+
+
+def test_a_new_token_and_its_entry(tmp_path: Path) -> None:
+    made = run("token", "--name", "x", "--read", "", "--write", "fleet/")
+    assert made.returncode == 0
+    tokens = tmp_path / "tokens.toml"
+    tokens.write_text(made.stdout)
+    token = made.stderr.removeprefix("token: ").strip()
+    options = ("--tokens", str(tokens), "--log-level", "error")
+    with server_process(*options) as server, HullClient(server.address, token=token) as client:
+        client.create_hull("fleet/a")
+        with pytest.raises(PermissionDeniedError):
+            client.create_hull("plane")
+
+
+@pytest.fixture(scope="module")
+def authority() -> trustme.CA:
+    return trustme.CA()
+
+
+@pytest.fixture(scope="module")
+def certificate(authority: trustme.CA, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """The options that make a server use a certificate of the authority's."""
+    folder = tmp_path_factory.mktemp("tls")
+    issued = authority.issue_cert("localhost", "127.0.0.1")
+    (folder / "cert.pem").write_bytes(b"".join(blob.bytes() for blob in issued.cert_chain_pems))
+    issued.private_key_pem.write_to_path(folder / "key.pem")
+    authority.cert_pem.write_to_path(folder / "ca.pem")
+    return ["--tls-cert", str(folder / "cert.pem"), "--tls-key", str(folder / "key.pem")]
+
+
+def test_tls(authority: trustme.CA, certificate: list[str]) -> None:
+    trusting = grpc.ssl_channel_credentials(authority.cert_pem.bytes())
+    suspicious = grpc.ssl_channel_credentials(trustme.CA().cert_pem.bytes())
+    with server_process(*certificate) as server:
+        with HullClient(server.address, tls=trusting) as client:
+            client.create_hull("a")
+            assert client.apply("a", insert=[[1, 2]]).points == 1
+        for tls in (None, suspicious):
+            with HullClient(server.address, tls=tls) as client, pytest.raises(UnavailableError):
+                client.get_hull("a")
+
+
+def test_mutual_tls(authority: trustme.CA, certificate: list[str]) -> None:
+    ca = authority.cert_pem.bytes()
+
+    def credentials(issuer: trustme.CA) -> grpc.ChannelCredentials:
+        issued = issuer.issue_cert("client@example.org")
+        chain = b"".join(blob.bytes() for blob in issued.cert_chain_pems)
+        return grpc.ssl_channel_credentials(ca, issued.private_key_pem.bytes(), chain)
+
+    client_ca = str(Path(certificate[1]).with_name("ca.pem"))
+    with server_process(*certificate, "--tls-client-ca", client_ca) as server:
+        with HullClient(server.address, tls=credentials(authority)) as client:
+            assert client.create_hull("a").revision == 0
+        for tls in (grpc.ssl_channel_credentials(ca), credentials(trustme.CA())):
+            with HullClient(server.address, tls=tls) as client, pytest.raises(UnavailableError):
+                client.get_hull("a")
+
+
+def test_other_machines_only_with_tls_and_tokens_or_when_told(tmp_path: Path, certificate: list[str]) -> None:
+    tokens = tmp_path / "tokens.toml"
+    tokens.write_text(entry("t", [""], [""]))
+    for options in ([], certificate, ["--tokens", str(tokens)]):
+        refused = run("serve", "--host", "0.0.0.0", "--port", "0", *options)
+        assert refused.returncode == 1
+        assert "--insecure" in refused.stderr
+    for options in ([*certificate, "--tokens", str(tokens)], ["--insecure"]):
+        with server_process("--host", "0.0.0.0", *options) as server:
+            assert server.address.startswith("0.0.0.0:")
+
+
+@pytest.mark.parametrize(
+    ("options", "text", "message"),
+    [
+        (["--tls-cert", "x.pem"], None, "--tls-cert and --tls-key go together"),
+        (["--tls-client-ca", "x.pem"], None, "--tls-client-ca needs --tls-cert"),
+        (["--tls-cert", "no.pem", "--tls-key", "no.pem"], None, "no.pem"),
+        (["--tokens", "no.toml"], None, "no.toml"),
+        (["--tokens", "bad.toml"], "[[token", "bad.toml"),
+        (["--tokens", "bad.toml"], '[[token]]\nsha256 = "abc"', "bad.toml: token.0.sha256"),
+        (["--tokens", "bad.toml"], '[[token]]\ntoken = "abc"', "bad.toml: token.0"),
+    ],
+)
+def test_what_cannot_protect_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], text: str | None, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if text is not None:
+        Path("bad.toml").write_text(text)
+    refused = run("serve", "--port", "0", *options)
+    assert refused.returncode == 1
+    assert message in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+def test_a_point_is_not_told_either(guarded: Server) -> None:
+    with HullClient(guarded.address, token=READER) as reader, HullClient(guarded.address, token=ROOT) as root:
+        before = root.get_hull("port")
+        with pytest.raises(PermissionDeniedError):
+            reader.apply("port", delete=[[8, 8]])
+        with pytest.raises(PermissionDeniedError):
+            reader.delete_hull("port")
+        after = root.get_hull("port")
+        assert (after.revision, after.info.uid) == (before.revision, before.info.uid)
+        assert points_pb2.Points(packed=after.vertices.tobytes()) == points_pb2.Points(packed=before.vertices.tobytes())

@@ -1,0 +1,93 @@
+"""Settings from flags, environment and file; the log."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+from server_process import COMMAND, PATIENCE, run, server_process
+
+from dynhull_client import HullClient, LimitExceededError
+
+
+def shown(*arguments: str) -> dict[str, tuple[str, str]]:
+    """The settings and their origins, as `dynhull config` shows them."""
+    result = run("config", *arguments)
+    assert (result.returncode, result.stderr) == (0, "")
+    settings = {}
+    for line in result.stdout.splitlines():
+        setting, _, origin = line.rpartition("#")
+        name, _, value = setting.strip("# ").partition("=")
+        settings[name.strip()] = value.strip(), origin.strip()
+    return settings
+
+
+def test_a_flag_goes_before_the_environment_and_that_before_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "dynhull.toml"
+    file.write_text('port = 1\nmax_hulls = 1\nmax_points = 1\nlog_format = "json"\n')
+    monkeypatch.setenv("DYNHULL_PORT", "2")
+    monkeypatch.setenv("DYNHULL_MAX_HULLS", "2")
+    settings = shown("--config", str(file), "--port", "3")
+    assert settings["port"] == ("3", "flag")
+    assert settings["max_hulls"] == ("2", "DYNHULL_MAX_HULLS")
+    assert settings["max_points"] == ("1", str(file))
+    assert settings["log_format"] == ('"json"', str(file))
+    assert settings["host"] == ('"127.0.0.1"', "default")
+    assert settings["tokens"] == ("", "default")
+
+
+def test_what_config_shows_is_a_file_for_config(tmp_path: Path) -> None:
+    file = tmp_path / "dynhull.toml"
+    file.write_text(run("config", "--max-hulls", "7", "--create-on-write").stdout)
+    settings = shown("--config", str(file))
+    assert settings["max_hulls"] == ("7", str(file))
+    assert settings["create_on_write"] == ("true", str(file))
+
+
+def test_the_server_uses_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "dynhull.toml"
+    file.write_text("max_hulls = 1\n")
+    monkeypatch.setenv("DYNHULL_CREATE_ON_WRITE", "true")
+    with server_process("--config", str(file)) as server, HullClient(server.address) as client:
+        client.apply("a", insert=[[1, 2]])
+        with pytest.raises(LimitExceededError):
+            client.apply("b", insert=[[1, 2]])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("port = 70000", "port: Input should be less than or equal to 65535"),
+        ("prot = 1", "prot: Extra inputs are not permitted"),
+        ('max_hulls = "many"', "max_hulls: Input should be a valid integer"),
+        ("port 1", "settings.toml"),
+    ],
+)
+def test_a_wrong_file_is_explained(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text(text)
+    result = run("config", "--config", str(file))
+    assert result.returncode == 1
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_help_shows_every_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    helped = run("serve", "--help").stdout
+    for name in shown():
+        assert f"--{name.replace('_', '-')}" in helped
+
+
+def test_the_log_is_json_where_told() -> None:
+    command = [COMMAND, "serve", "--port", "0", "--in-memory", "--log-format", "json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        address = process.stdout.readline().split()[-1]
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+        lines = [json.loads(line) for line in process.stderr]
+    assert [line["event"] for line in lines] == ["serving", "draining", "stopped"]
+    assert lines[0]["address"] == address
+    assert {"level", "logger", "timestamp"} <= set(lines[0])
