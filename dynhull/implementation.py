@@ -4,6 +4,7 @@ The environment variable DYNHULL_KERNEL, read at import, forces one: "python" or
 """
 
 import os
+from importlib import import_module
 from types import ModuleType
 from typing import Literal
 
@@ -15,12 +16,11 @@ def _load() -> ModuleType | None:
     if wanted == "python":
         return None
     try:
-        from . import _kernel
+        return import_module("dynhull._kernel")
     except ModuleNotFoundError:
         if wanted == "cpp":
             raise
         return None
-    return _kernel
 
 
 kernel = _load()

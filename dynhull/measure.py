@@ -144,7 +144,8 @@ def _squared_distance(corners: Sequence[Point], first: int, edges: int, p: Point
 def intersect_lines(vertices: Points, p: Points, q: Points) -> npt.NDArray[np.float64]:
     """(k, 2, 2) where the line through each p and q enters and leaves the hull, in the order from p to q.
 
-    Each coordinate is the exact value rounded once. A line that touches a vertex has it twice, one along an edge has its
+        _Box.on_edge(a, b, corners[front], corners[far], corners[back])
+        for a, b, front, far, back in _calipers(corners)
     ends; NaN for a line that misses. O(h + k log h).
     """
     corners = _corners(vertices)
@@ -190,7 +191,7 @@ def _chord(lower: Sequence[Point], upper: Sequence[Point], p: Point, q: Point) -
 
 
 def _meet(p: Point, q: Point, a: Point, b: Point) -> Point:
-    """Where the line through p and q crosses the segment from a to b, whose ends are on different sides or b is on it."""
+    """Where the line through p and q crosses the segment from a to b: their sides differ, or b is on the line."""
     at_a, at_b = _doubled_triangle(p, q, a), _doubled_triangle(p, q, b)
     share = at_a / (at_a - at_b)
     ax, ay = Fraction(a[0]), Fraction(a[1])
@@ -276,7 +277,7 @@ def _doubled_triangle(a: Point, b: Point, c: Point) -> Fraction:
 
 
 def _root(value: Fraction) -> float:
-    """The square root of a rational number, within one unit in the last place; inf where that is beyond every double."""
+    """The square root of a rational number, within one unit in the last place; inf where no double is so large."""
     if value == 0:
         return 0.0
     # A quotient of at least 2 * 64 bits whose power of two is even: its root has 64 bits or more.

@@ -37,7 +37,7 @@ class Commit {
   }
 
  private:
-  // Up to so many changes run one by one in the subtree that they share: measured, see docs/performance.md.
+  // Up to so many changes run one by one in the subtree that they share.
   static constexpr std::size_t FEW = LEAF * 3 / 8;
   static constexpr std::size_t LOOKAHEAD = 4;
 

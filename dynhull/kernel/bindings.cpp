@@ -239,16 +239,12 @@ nb::object convex_hull(const Rows& rows, std::optional<bool> discard, std::optio
     hull.emplace(static_hull(points_of(rows), rows.shape(0), {discard, threads}));
   }
   if (!hull->finite()) return nb::none();
-  const auto [lower, upper] = hull->chains();
-  const std::size_t between = upper.size() > 2 ? upper.size() - 2 : 0;
-  Output<double> output(2 * (lower.size() + between));
-  {
-    nb::gil_scoped_release release;
-    Point* end = std::copy(lower.begin(), lower.end(), reinterpret_cast<Point*>(output.data));
-    std::reverse_copy(upper.begin() + (between > 0), upper.begin() + (between > 0) + between, end);
-    hull.reset();
-  }
-  return output.array({lower.size() + between, 2});
+  const std::span<const Point> vertices = hull->vertices();
+  const std::size_t count = vertices.size();
+  if (2 * count <= hull->room()) return array_of({vertices.begin(), vertices.end()});
+  Point* const memory = hull->take_memory().release();  // numpy's from here on
+  const nb::capsule owner(memory, [](void* points) noexcept { delete[] static_cast<Point*>(points); });
+  return nb::cast(nb::ndarray<nb::numpy, double>(reinterpret_cast<double*>(memory), {count, 2}, owner));
 }
 
 nb::tuple chan(const Rows& rows) {

@@ -7,7 +7,7 @@ namespace dynhull {
 
 class FlatChains {
  public:
-  // Whether so many queries since the last change pay for flattening: measured, see docs/performance.md.
+  // Whether so many queries since the last change pay for flattening, which costs about as much as a query a vertex.
   bool worthwhile(std::uint64_t queries) const { return queries > vertices_ / 20 + 200; }
   bool fresh(const HullTree& tree) const { return version_ == tree.version(); }
 

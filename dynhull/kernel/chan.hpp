@@ -33,13 +33,39 @@ std::size_t first_where(std::size_t first, std::size_t last, Holds holds) {
   return first;
 }
 
+// The same in O(log distance) from `first`, or from `last`: tangent points mostly lie next to where the search begins.
+template <class Holds>
+std::size_t first_where_from_first(std::size_t first, std::size_t last, Holds holds) {
+  for (std::size_t step = 1; first < last; step *= 2) {
+    const std::size_t probe = first + std::min(step, last - first) - 1;
+    if (holds(probe)) {
+      last = probe;
+      break;
+    }
+    first = probe + 1;
+  }
+  return first_where(first, last, holds);
+}
+template <class Holds>
+std::size_t first_where_from_last(std::size_t first, std::size_t last, Holds holds) {
+  for (std::size_t step = 1; first < last; step *= 2) {
+    const std::size_t probe = last - std::min(step, last - first);
+    if (!holds(probe)) {
+      first = probe + 1;
+      break;
+    }
+    last = probe;
+  }
+  return first_where(first, last, holds);
+}
+
 // The ring's point that has all of the ring on or to the left of the ray from p; the farthest of several. p is a vertex
 // of the hull of all rings. p where the ring is p alone. O(log size).
 inline Point tangent(Point p, const Ring& ring) {
   const auto rightward = [&](std::size_t first) {  // to the lower chain from index `first` on
     const std::size_t last = ring.lower_size() - 1;
     if (first > last) return ring.size > 1 ? ring.upper(ring.upper_size() - 2) : p;  // p is the greatest point
-    return ring.lower(first_where(
+    return ring.lower(first_where_from_first(
         first, last, [&](std::size_t i) { return orientation(ring.lower(i), ring.lower(i + 1), p) > 0; }));
   };
   const std::size_t i = first_where(0, ring.lower_size(), [&](std::size_t k) { return p <= ring.lower(k); });
@@ -49,7 +75,7 @@ inline Point tangent(Point p, const Ring& ring) {
     if (orientation(ring.lower(i - 1), ring.lower(i), p) < 0) return rightward(i);
   }
   const std::size_t j = first_where(0, ring.upper_size(), [&](std::size_t k) { return p <= ring.upper(k); });
-  return ring.upper(first_where(
+  return ring.upper(first_where_from_last(
       0, j - 1, [&](std::size_t k) { return orientation(ring.upper(k), ring.upper(k + 1), p) >= 0; }));
 }
 
@@ -98,12 +124,12 @@ class Chan {
 
   Ring ring_of(Point* first, Point* last) {
     sort_points(first, scratch_.data(), static_cast<std::size_t>(last - first));
-    Chain upper(UPPER, scratch_.data()), lower(LOWER, first);
-    for (const Point* p = first; p < last; ++p) upper.push(*p);
+    Chain upper(scratch_.data()), lower(first);
+    for (const Point* p = last; p > first;) upper.push(*--p);
     for (const Point* p = first; p < last; ++p) lower.push(*p);
-    const std::size_t turning = lower.points().size() - 1;
-    Point* end = first + turning + 1;
-    if (turning > 0) end = std::reverse_copy(upper.points().begin() + 1, upper.points().end() - 1, end);
+    const auto turning = static_cast<std::size_t>(lower.end() - first) - 1;
+    Point* end = lower.end();
+    if (turning > 0) end = std::copy(upper.begin() + 1, upper.end() - 1, end);
     return {first, static_cast<std::size_t>(end - first), turning};
   }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -35,12 +36,12 @@ class Columns {
   double least_ = 0, last_ = 0, scale_ = 0;
 };
 
-// Linear for points that are almost in order.
-inline void insertion_sort(Point* first, Point* last) {
-  for (Point* next = first + (first < last); next < last; ++next) {
-    const Point p = *next;
-    Point* gap = next;
-    for (; gap > first && p < gap[-1]; --gap) *gap = gap[-1];
+// Insertion sort from one place to another, or in place. Linear for points that are almost in order.
+inline void insert_in_order(const Point* from, std::size_t count, Point* to) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point p = from[i];
+    Point* gap = to + i;
+    for (; gap > to && p < gap[-1]; --gap) *gap = gap[-1];
     *gap = p;
   }
 }
@@ -49,7 +50,7 @@ inline void insertion_sort(Point* first, Point* last) {
 inline void sort_points(Point* points, Point* scratch, std::size_t count, int depth = 0) {
   constexpr std::size_t FEW = 24, MOST_COLUMNS = 2048;
   constexpr int DEEPEST = 3;
-  if (count <= FEW) return insertion_sort(points, points + count);
+  if (count <= FEW) return insert_in_order(points, count, points);
   double least = points[0].x, greatest = least;
   bool sorted = true;
   for (std::size_t i = 1; i < count; ++i) {
@@ -61,14 +62,15 @@ inline void sort_points(Point* points, Point* scratch, std::size_t count, int de
   const auto width = static_cast<unsigned>(std::min(std::bit_ceil(count / 2), MOST_COLUMNS));
   const Columns columns(least, greatest, width);
   if (depth == DEEPEST || !columns.usable()) return std::sort(points, points + count);
-  std::size_t ends[MOST_COLUMNS + 1] = {};  // of each column, once all are placed
+  std::array<std::size_t, MOST_COLUMNS + 1> ends;  // of each column, once all are placed
+  std::fill_n(ends.begin(), width + 1, 0);
   for (std::size_t i = 0; i < count; ++i) ++ends[columns(points[i].x) + 1];
   for (unsigned c = 1; c < width; ++c) ends[c] += ends[c - 1];
   for (std::size_t i = 0; i < count; ++i) scratch[ends[columns(points[i].x)]++] = points[i];
   std::size_t from = 0;
   for (unsigned c = 0; c < width; from = ends[c++])
-    sort_points(scratch + from, points + from, ends[c] - from, depth + 1);
-  std::copy_n(scratch, count, points);
+    if (ends[c] - from > FEW) sort_points(scratch + from, points + from, ends[c] - from, depth + 1);
+  insert_in_order(scratch, count, points);
 }
 
 }  // namespace dynhull

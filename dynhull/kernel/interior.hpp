@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <iterator>
+#include <vector>
 
 #include "chain.hpp"
 #include "columns.hpp"
@@ -13,14 +15,19 @@ namespace dynhull {
 // open box is no vertex. The points of a column lie between two x that are in other columns.
 class Interior {
  public:
-  explicit Interior(const Chains& hull) {
+  // Of a hull given by its vertices, counter-clockwise from the least.
+  explicit Interior(std::span<const Point> vertices) {
     boxes_.fill({INFINITY, -INFINITY});
-    if (hull.lower.size() < 2) return;
-    const double left = hull.lower.front().x, right = hull.lower.back().x;
+    if (vertices.size() < 3) return;
+    const auto greatest = std::max_element(vertices.begin(), vertices.end());
+    const std::vector<Point> lower(vertices.begin(), greatest + 1);
+    std::vector<Point> upper = {vertices.front()};
+    upper.insert(upper.end(), vertices.rbegin(), std::make_reverse_iterator(greatest));
+    const double left = lower.front().x, right = lower.back().x;
     columns_ = Columns(left, right, COLUMNS);
     const double width = (right - left) / (COLUMNS - 1);
     const auto of_column = [&](unsigned column, double x) { return columns_(x) == column; };
-    Walk lower_from(hull.lower), lower_to(hull.lower), upper_from(hull.upper), upper_to(hull.upper);
+    Walk lower_from(lower), lower_to(lower), upper_from(upper), upper_to(upper);
     for (unsigned j = 1; j + 1 < COLUMNS; ++j) {
       const double from = left + (j - OVERLAP) * width, to = left + (j + 1 + OVERLAP) * width;
       if (!(left < from && to < right && of_column(j - 1, from) && of_column(j + 1, to))) continue;
@@ -61,7 +68,7 @@ class Interior {
 
   // A chain's edge at growing x, strictly between the chain's ends.
   struct Walk {
-    explicit Walk(std::span<const Point> chain) : edge(chain.data()) {}
+    explicit Walk(const std::vector<Point>& chain) : edge(chain.data()) {}
     void advance(double x) {
       while (edge[1].x < x) ++edge;
     }

@@ -29,23 +29,30 @@ void both(bool threads, First first, Second second) {
   other.valid() ? other.get() : second();
 }
 
-// The hull of points in two parts. Its memory outlives the points; it reads each of them at most three times, and stays
-// in its bounds even where they change meanwhile.
+// The hull of points in two parts. It stays in its bounds even where the points change meanwhile.
 class StaticHull {
  public:
   using Part = std::span<const Point>;
 
   StaticHull(Part first, Part second, bool threads) : threads_(threads), parts_{first, second} {
     find_ends();
-    if (finite_ && size() > 0) {
-      place();
-      both(
-          threads_, [&] { chain(LOWER); }, [&] { chain(UPPER); });
-    }
+    if (!finite_ || size() == 0) return;
+    place();
+    Point *lower_end, *upper_end;
+    both(
+        threads_, [&] { lower_end = chain(0, least_, greatest_); },
+        [&] { upper_end = chain(width_, greatest_, least_); });
+    // Both have both ends.
+    if (lower_end > memory_.get() + 1) lower_end = std::copy(memory_.get() + starts_[width_], upper_end - 1, lower_end);
+    vertices_ = {memory_.get(), lower_end};
   }
 
   bool finite() const { return finite_; }  // false: a coordinate is not, and there is no hull
-  Chains chains() const { return {chains_[LOWER], chains_[UPPER]}; }
+
+  // Counter-clockwise from the least; at the beginning of memory with room for more points.
+  std::span<const Point> vertices() const { return vertices_; }
+  std::size_t room() const { return room_; }
+  std::unique_ptr<Point[]> take_memory() { return std::move(memory_); }
 
  private:
   std::size_t size() const { return parts_[0].size() + parts_[1].size(); }
@@ -74,9 +81,10 @@ class StaticHull {
     greatest_ = positive_zeros(std::max(greatest[some], greatest[other]));
   }
 
-  // Put the points in columns: the lower chain's, then the upper chain's. Those on the line through the ends are none.
+  // Put the points in columns, those below the line through the ends from left to right, then those above it from right
+  // to left. Those on the line are no vertices.
   void place() {
-    constexpr std::size_t MOST_COLUMNS = 4096, A_COLUMN = 64;
+    constexpr std::size_t MOST_COLUMNS = 1024, A_COLUMN = 64;
     width_ = static_cast<unsigned>(std::min(std::bit_ceil(size() / A_COLUMN + 1), MOST_COLUMNS));
     const Columns columns(least_.x, greatest_.x, width_);
     const unsigned none = 2 * width_;
@@ -88,7 +96,8 @@ class StaticHull {
       std::uint16_t* key = keys[part].get();
       for (Point p : parts_[part]) {
         const int side = orientation(least_, greatest_, p);
-        const unsigned column = side == 0 ? none : columns(p.x) + (side > 0 ? width_ : 0);
+        const unsigned mirror = (none - 1) * static_cast<unsigned>(side > 0);
+        const unsigned column = side == 0 ? none : columns(p.x) ^ mirror;  // no branch: sides are as good as random
         ++next[part][column];
         *key++ = static_cast<std::uint16_t>(column);
       }
@@ -103,8 +112,8 @@ class StaticHull {
       starts_[column] = total;
       for (auto& part : next) total += std::exchange(part[column], total);
     }
-    total = starts_[none] - 1;
-    memory_ = std::make_unique_for_overwrite<Point[]>(total);
+    room_ = starts_[none] - 1;
+    memory_ = std::make_unique_for_overwrite<Point[]>(room_);
     const auto put = [&](int part) {
       const std::uint16_t* key = keys[part].get();
       for (Point p : parts_[part]) {
@@ -116,23 +125,23 @@ class StaticHull {
         threads_, [&] { put(0); }, [&] { put(1); });
   }
 
-  // Sort column by column and chain. The chain overwrites what it has read.
-  void chain(Side side) {
-    const std::size_t* start = &starts_[side == LOWER ? 0 : width_];
-    const auto end = [&](unsigned column) { return start[column + 1] - (column + 1 == width_ ? 2 : 0); };
+  // Sort column by column and chain, from the first column of one side on. The chain overwrites what it has read, from
+  // the place before. Returns its end.
+  Point* chain(unsigned first, Point from, Point to) {
+    const auto end = [&](unsigned column) { return starts_[column + 1] - (column + 1 == first + width_ ? 2 : 0); };
     std::size_t most = 0;
-    for (unsigned column = 0; column < width_; ++column) most = std::max(most, end(column) - start[column]);
+    for (unsigned column = first; column < first + width_; ++column) most = std::max(most, end(column) - starts_[column]);
     const auto scratch = std::make_unique_for_overwrite<Point[]>(most);
-    Chain chain(side, &memory_[start[0] - 1]);
-    chain.push(least_);
-    for (unsigned column = 0; column < width_; ++column) {
-      Point* const first = &memory_[start[column]];
-      const std::size_t count = end(column) - start[column];
-      sort_points(first, scratch.get(), count);
-      for (std::size_t i = 0; i < count; ++i) chain.push(first[i]);
+    Chain chain(&memory_[starts_[first] - 1]);
+    chain.push(from);
+    for (unsigned column = first; column < first + width_; ++column) {
+      const std::span<Point> points(&memory_[starts_[column]], &memory_[end(column)]);
+      sort_points(points.data(), scratch.get(), points.size());
+      if (first > 0) std::reverse(points.begin(), points.end());
+      for (Point p : points) chain.push(p);
     }
-    chain.push(greatest_);
-    chains_[side] = chain.points();
+    chain.push(to);
+    return chain.end();
   }
 
   static Point positive_zeros(Point p) { return {p.x + 0.0, p.y + 0.0}; }
@@ -142,8 +151,9 @@ class StaticHull {
   Point least_, greatest_;
   unsigned width_ = 0;
   std::vector<std::size_t> starts_;
+  std::size_t room_ = 0;
   std::unique_ptr<Point[]> memory_;
-  std::span<const Point> chains_[2];
+  std::span<const Point> vertices_;
 };
 
 // Whether to discard points by a sample's hull first, and to use two threads; decided by the input where not told.
@@ -151,37 +161,40 @@ struct Means {
   std::optional<bool> discard, threads;
 };
 
-// What to discard of these points; nothing where it would be too few to pay.
+// What to discard of these points; nothing where it would be too few to pay, unless told to.
 inline std::optional<Interior> interior_of(const Point* points, std::size_t count, bool always) {
-  constexpr std::size_t SAMPLE = 4096, WORTHWHILE = SAMPLE / 8;
-  if (count < 8 * SAMPLE && !always) return {};
-  std::vector<Point> sample(std::min(SAMPLE, count));
+  constexpr std::size_t FEW = 2048, LARGEST_SAMPLE = 4096, ONE_OF = 32;
+  if (count < FEW && !always) return {};
+  std::vector<Point> sample(std::min(LARGEST_SAMPLE, always ? count : count / ONE_OF));
   const std::size_t stride = count / std::max<std::size_t>(sample.size(), 1);
   for (std::size_t i = 0; i < sample.size(); ++i)
     sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, to follow no pattern of the input
   const StaticHull hull(sample, {}, false);
   if (!hull.finite()) return {};
-  const Interior interior(hull.chains());
+  if (2 * hull.vertices().size() > sample.size() && !always) return {};
+  const Interior interior(hull.vertices());
   const std::size_t kept = interior.discard(sample, sample.data());
-  if (sample.size() - kept < WORTHWHILE && !always) return {};
+  if (sample.size() - kept < sample.size() / 8 && !always) return {};
   return interior;
 }
 
 // O(n log n), and O(n) where few points are near the hull.
 inline StaticHull static_hull(const Point* points, std::size_t count, Means means = {}) {
-  constexpr std::size_t MANY = std::size_t{1} << 17;
-  const bool threads = means.threads.value_or(count >= MANY && std::thread::hardware_concurrency() > 1);
-  const std::size_t half = threads ? count / 2 : count;
-  const std::span<const Point> parts[] = {{points, half}, {points + half, count - half}};
-  const auto interior = means.discard.value_or(true) ? interior_of(points, count, means.discard.has_value()) : std::nullopt;
-  if (!interior) return StaticHull(parts[0], parts[1], threads);
-  const auto candidates = std::make_unique_for_overwrite<Point[]>(count + 1);
-  std::size_t kept[2];
+  constexpr std::size_t MANY = std::size_t{1} << 17, DISCARDED_FOR_ONE_PLACED = 16;  // in the same time
+  const auto threads = [&](std::size_t placed) {
+    return means.threads.value_or(placed >= MANY && std::thread::hardware_concurrency() > 1);
+  };
+  const std::size_t half = count / 2;
+  const StaticHull::Part first(points, half), second(points + half, count - half);
+  const bool may_discard = means.discard.value_or(true);
+  const auto interior = may_discard ? interior_of(points, count, means.discard.has_value()) : std::nullopt;
+  if (!interior) return StaticHull(first, second, threads(count));
+  const auto kept = std::make_unique_for_overwrite<Point[]>(count);
+  std::size_t kept_first, kept_second;
   both(
-      threads, [&] { kept[0] = interior->discard(parts[0], candidates.get()); },
-      [&] { kept[1] = interior->discard(parts[1], candidates.get() + half); });
-  return StaticHull({candidates.get(), kept[0]}, {candidates.get() + half, kept[1]},
-                    threads && (means.threads.has_value() || kept[0] + kept[1] >= MANY));
+      threads(count / DISCARDED_FOR_ONE_PLACED), [&] { kept_first = interior->discard(first, kept.get()); },
+      [&] { kept_second = interior->discard(second, kept.get() + half); });
+  return StaticHull({kept.get(), kept_first}, {kept.get() + half, kept_second}, threads(kept_first + kept_second));
 }
 
 }  // namespace dynhull

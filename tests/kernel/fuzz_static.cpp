@@ -42,19 +42,15 @@ void require(bool holds, const char* message) {
   if (!holds) throw std::logic_error(message);
 }
 
-Vertices ring_of(const Chains& chains) {
-  Vertices ring(chains.lower.begin(), chains.lower.end());
-  if (chains.upper.size() > 2) ring.insert(ring.end(), chains.upper.rbegin() + 1, chains.upper.rend() - 1);
-  return ring;
-}
-
 Vertices expected_of(const Vertices& points) {
   const std::set<Point> distinct(points.begin(), points.end());
-  Vertices memory[2] = {Vertices(distinct.size()), Vertices(distinct.size())};
-  Chain chains[] = {{UPPER, memory[UPPER].data()}, {LOWER, memory[LOWER].data()}};
-  for (Point p : distinct)
-    for (Side side : SIDES) chains[side].push({p.x + 0.0, p.y + 0.0});
-  return ring_of({chains[LOWER].points(), chains[UPPER].points()});
+  Vertices memory(2 * distinct.size());
+  Chain lower(memory.data()), upper(memory.data() + distinct.size());
+  for (auto p = distinct.begin(); p != distinct.end(); ++p) lower.push({p->x + 0.0, p->y + 0.0});
+  for (auto p = distinct.rbegin(); p != distinct.rend(); ++p) upper.push({p->x + 0.0, p->y + 0.0});
+  Vertices vertices(lower.begin(), lower.end());
+  if (vertices.size() > 1) vertices.insert(vertices.end(), upper.begin() + 1, upper.end() - 1);
+  return vertices;
 }
 
 bool same(const Vertices& p, const Vertices& q) {
@@ -75,7 +71,7 @@ class Input {
       const Means means = {choice % 2 == 1, choice / 2 == 1};
       with_failures([&] {
         const StaticHull hull = static_hull(points.data(), count, means);
-        require(hull.finite() && same(ring_of(hull.chains()), expected), "a static hull is wrong");
+        require(hull.finite() && same({hull.vertices().begin(), hull.vertices().end()}, expected), "a static hull is wrong");
       });
     }
     for (Point& p : points) p = {p.x + 0.0, p.y + 0.0};

@@ -1,5 +1,7 @@
 """The compiler keeps to the predicates' arithmetic, and the fuzzer finds nothing."""
 
+import platform
+import re
 import subprocess
 from pathlib import Path
 
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from dynhull import _kernel
 
 HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 SEEDS = (HERE / "seeds.txt").read_text().split()
 
 
@@ -30,6 +33,26 @@ def test_infinities_and_nans_are_respected():
     assert _kernel.plain_difference_of_products(big, big, big, big) != _kernel.plain_difference_of_products(
         big, big, big, big
     )
+
+
+def test_the_build_forbids_fusing(compiler, tmp_path):
+    """Even for a processor that can, with the flags of CMakeLists.txt; without the one that forbids it, it happens."""
+    options = re.search(r"target_compile_options\(_kernel PRIVATE (-.*)\)", (ROOT / "CMakeLists.txt").read_text())
+    flags = options.group(1).split()
+    source = tmp_path / "filter.cpp"
+    source.write_text(
+        f'#include "{ROOT}/dynhull/kernel/predicates.hpp"\n'
+        "int filter(dynhull::Point a, dynhull::Point b, dynhull::Point c) { return orientation_filter(a, b, c); }"
+    )
+    able = ["-mfma"] if platform.machine() in ("x86_64", "AMD64") else []
+
+    def fused(flags):
+        command = [compiler, "-std=c++20", *flags, *able, "-S", str(source), "-o", "-"]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        return bool(re.search(r"\bv?fn?m(add|sub|la|ls)", text))
+
+    assert not fused(flags)
+    assert fused([flag if not flag.startswith("-ffp-contract") else "-ffp-contract=fast" for flag in flags])
 
 
 @pytest.mark.parametrize("leaf", [4, 62])

