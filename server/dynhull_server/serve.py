@@ -37,8 +37,9 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
 async def _serve(settings: Settings) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
+    # Not the loop's own handlers: those end with it, and a second signal on the way out would kill.
     for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop.set)
+        signal.signal(number, lambda *_: None if loop.is_closed() else loop.call_soon_threadsafe(stop.set))
     server = Server(settings)
     with _restoring() as progress:
         await server.start(progress)

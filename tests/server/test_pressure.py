@@ -53,7 +53,9 @@ def test_watchers_that_do_not_read_cost_no_memory() -> None:
         assert resident(address) < 1.05 * before
         assert scrape(address)["dynhull_watch_lag_seconds"] > 0
         live = client.get_hull("a")
-        for watch, copy in zip(watches, copies, strict=True):
+        for watch in watches[::2]:  # with a message on its way
+            watch.cancel()
+        for watch, copy in zip(watches[1::2], copies[1::2], strict=True):
             events = 0
             while copy.revision < live.revision:
                 copy.update(decode_event(next(watch)))

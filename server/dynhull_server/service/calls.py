@@ -54,7 +54,11 @@ class Call:
         """
         self.check_size(message)
         begun = time.monotonic()
-        await self._context.write(message)
+        try:
+            await self._context.write(message)
+        except grpc.aio.InternalError:
+            # The client has gone while the message was on its way.
+            raise asyncio.CancelledError from None
         if patience is not None and time.monotonic() - begun > patience:
             raise LimitExceededError("max_watch_lag", patience)
 
