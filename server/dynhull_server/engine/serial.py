@@ -58,22 +58,20 @@ class SerialExecutor:
         writes: bool = False,
     ) -> None:
         """Call `function`, and `done` with its result or its exception, on the event loop."""
-        job = Job(function, done, writes)
-        loop = asyncio.get_running_loop()
         if small and not self._busy:
-            outcomes = _outcomes([job])
+            outcome = _outcome(function)
             pending = self._commit()
             if pending is None:
                 self._after()
-                done(*outcomes[0])
+                done(*outcome)
                 return
             self._busy = True
-            self._await(loop, [job], outcomes, pending)
+            self._await(asyncio.get_running_loop(), [Job(function, done, writes)], [outcome], pending)
             return
-        self._waiting.append(job)
+        self._waiting.append(Job(function, done, writes))
         if not self._busy:
             self._busy = True
-            self._start_trip(loop)
+            self._start_trip(asyncio.get_running_loop())
 
     async def run(self, function: Callable[[], T], *, small: bool, writes: bool = False) -> T:
         """The function's result, or its exception. A caller that is cancelled stops waiting, its function runs."""
@@ -94,7 +92,7 @@ class SerialExecutor:
         jobs, self._waiting = self._waiting, []
 
         def trip() -> None:
-            outcomes = _outcomes(jobs)
+            outcomes = [_outcome(job.function) for job in jobs]
             pending = self._commit()
             if pending is None:
                 loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)
@@ -117,7 +115,7 @@ class SerialExecutor:
 
     def _retreat(self, loop: asyncio.AbstractEventLoop, jobs: list[Job], failure: BaseException) -> None:
         error = self._roll_back(failure)
-        outcomes = [(None, error) if job.writes else _outcomes([job])[0] for job in jobs]
+        outcomes = [(None, error) if job.writes else _outcome(job.function) for job in jobs]
         loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)
 
     def _end_trip(self, loop: asyncio.AbstractEventLoop, jobs: list[Job], outcomes: list[Outcome]) -> None:
@@ -130,11 +128,8 @@ class SerialExecutor:
             job.done(*outcome)
 
 
-def _outcomes(jobs: list[Job]) -> list[Outcome]:
-    outcomes: list[Outcome] = []
-    for job in jobs:
-        try:
-            outcomes.append((job.function(), None))
-        except Exception as error:  # whatever it is, it belongs to the caller
-            outcomes.append((None, error))
-    return outcomes
+def _outcome(function: Callable[[], Any]) -> Outcome:
+    try:
+        return function(), None
+    except Exception as error:  # whatever it is, it belongs to the caller
+        return None, error
