@@ -26,7 +26,7 @@ fuzz:  ## random lives of the kernel under sanitizers, SECONDS for each size of 
 check: .venv/.check  ## format, lint, types, import rules, proto rules
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp
+	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/buf lint

@@ -73,8 +73,7 @@ class StaticHull {
       greatest[part] = high;
       finite[part] = all_finite;
     };
-    both(
-        threads_, [&] { find(0); }, [&] { find(1); });
+    both(threads_, [&] { find(0); }, [&] { find(1); });
     finite_ = finite[0] && finite[1];
     const int some = parts_[0].empty() ? 1 : 0, other = parts_[1].empty() ? 0 : 1;
     least_ = positive_zeros(std::min(least[some], least[other]));
@@ -102,8 +101,7 @@ class StaticHull {
         *key++ = static_cast<std::uint16_t>(column);
       }
     };
-    both(
-        threads_, [&] { count(0); }, [&] { count(1); });
+    both(threads_, [&] { count(0); }, [&] { count(1); });
 
     starts_.resize(none + 1);
     std::size_t total = 0;
@@ -121,8 +119,7 @@ class StaticHull {
         if (column != none) memory_[next[part][column]++] = positive_zeros(p);
       }
     };
-    both(
-        threads_, [&] { put(0); }, [&] { put(1); });
+    both(threads_, [&] { put(0); }, [&] { put(1); });
   }
 
   // Sort column by column and chain, from the first column of one side on. The chain overwrites what it has read, from

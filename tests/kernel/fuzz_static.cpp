@@ -102,8 +102,9 @@ class Input {
   double unit() { return static_cast<double>(random_()) * 0x1p-64; }
 
   double coordinate() {
-    static const double EXTREME[] = {0.0, -0.0, 5e-324, -5e-324, 1e-323, 2.2250738585072014e-308, 1e-160, -1e-160,
-                                     1.0, -3.0, 9e15,   1e160,   -1e160, 1.7e308,                 -1.7e308};
+    static const double EXTREME[] = {0.0,    -0.0,    5e-324,  -5e-324, 1e-323, 2.2250738585072014e-308,
+                                     1e-160, -1e-160, 1.0,     -3.0,    9e15,   1e160,
+                                     -1e160, 1.7e308, -1.7e308};
     switch (kind_) {
       case 0: return static_cast<double>(below(4));
       case 1: return static_cast<double>(below(40)) - 20;
