@@ -3,15 +3,13 @@
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from dynhull.arrays import Points
 
@@ -19,6 +17,7 @@ from .engine.stored import read_hull
 from .journal import copies
 from .journal.errors import JournalError
 from .journal.folder import DATABASE
+from .progress import progress_bar
 
 DATA = Path("dynhull-data")
 ROWS_A_STEP = 100_000
@@ -32,7 +31,7 @@ def backup(
 
     The copy is a data folder itself: `dynhull serve --data COPY` serves it.
     """
-    with _told(), _progress("pages") as progress:
+    with _told(), progress_bar("pages") as progress:
         copies.back_up(data, target, progress)
     typer.echo(f"{target}: {len(copies.hulls(target))} hulls")
 
@@ -46,7 +45,7 @@ def restore(
         if data.exists() and any(data.iterdir()):
             raise JournalError(f"{data} is not empty: move it away first, or name another folder with --data")
         rows = copies.hulls(backup)
-        with _progress("hulls") as progress:
+        with progress_bar("hulls") as progress:
             for done, row in enumerate(rows):
                 progress(done, len(rows))
                 notes = copies.look(backup, row.number).notes
@@ -70,7 +69,7 @@ def export(
         hull = read_hull(data, name)
         for note in hull.notes:
             typer.echo(note, err=True)
-        with _progress("points") as progress:
+        with progress_bar("points") as progress:
             writers[file.suffix](file, hull.points, progress)
     typer.echo(f"{file}: {len(hull.points):,} points of {name} at revision {hull.revision}")
 
@@ -117,12 +116,3 @@ def _told() -> Iterator[None]:
         yield
     except (JournalError, OSError) as error:
         sys.exit(f"error: {error}")
-
-
-@contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    console = Console(stderr=True)
-    columns = [BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeRemainingColumn()]
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)

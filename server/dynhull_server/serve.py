@@ -3,15 +3,11 @@
 import asyncio
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from . import logs
 from .flags import with_settings
 from .journal.errors import JournalError
+from .progress import progress_bar
 from .service.server import Server
 from .settings import Settings
 
@@ -41,20 +37,10 @@ async def _serve(settings: Settings) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: None if loop.is_closed() else loop.call_soon_threadsafe(stop.set))
     server = Server(settings)
-    with _restoring() as progress:
+    with progress_bar("hulls read") as progress:
         await server.start(progress)
     print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
     if server.metrics_address:
         print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
     await stop.wait()
     await server.drain()
-
-
-@contextmanager
-def _restoring() -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal for the hulls read from the disk, once there are any."""
-    console = Console(stderr=True)
-    columns = [TextColumn("reading hulls"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", visible=False)
-        yield lambda done, total: bar.update(task, completed=done, total=total, visible=total > 0)

@@ -10,7 +10,7 @@ import numpy as np
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from ..journal.errors import JournalFullError
+from ..journal.errors import JournalError, JournalFullError
 from ..journal.journal import NEWEST, HullRow, Journal
 from ..journal.records import Record
 from ..journal.recovery import Recovered
@@ -57,8 +57,8 @@ class HullStore:
         """Write a snapshot beside the traffic. Returns when it is done."""
         try:
             self._journal.snapshot(self._row.number, revision, points, json.dumps(dict(producers)).encode())
-        except JournalFullError as error:
-            raise StorageFullError(str(error)) from error
+        except JournalError as error:
+            raise storage_error(error) from error
 
     def oldest(self) -> int:
         """The oldest revision that `restore` can go back to."""
