@@ -31,8 +31,9 @@ def table(shown: Iterable[tuple[HullFeed, Look]]) -> str:
 
 
 def _row(feed: HullFeed, look: Look) -> str:
-    drawn, of = len(feed.outline.vertices), feed.outline.of
-    vertices = f"{of:,}" if drawn == of else f"{of:,} ({drawn:,} drawn)"
+    outline, _ = feed.drawings()
+    drawn = len(outline.points)
+    vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
     figures = (f"{feed.revision:,}", f"{feed.points:,}", vertices, _number(feed.area), _number(feed.rate, RATE_DIGITS))
     cells = "".join(
         f'<td data-heading="{heading}">{figure}</td>' for heading, figure in zip(HEADINGS[1:], figures, strict=False)

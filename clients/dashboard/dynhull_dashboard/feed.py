@@ -7,10 +7,11 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from dynhull_client import AsyncHullClient, DynhullError, Event, HullCopy, Progress, Sampled, Verification
+from dynhull_client import AsyncHullClient, DynhullError, Event, HullCopy, Progress, Verification
 
+from .drawing import Drawing, points_of, vertices_of
 from .history import History
-from .outline import Outline
+from .outline import Box, outline, without
 
 MAX_RATE = 10.0
 PROGRESS_SECONDS = 0.5
@@ -21,6 +22,8 @@ SAMPLE_SECONDS = 0.5
 VERIFY_SECONDS = 30.0
 # Samples and verifications cost the server work in proportion to the points: they get a twentieth of the time.
 REST = 19
+
+NO_POINTS = HullCopy().vertices
 
 log = logging.getLogger(__name__)
 
@@ -40,9 +43,9 @@ class HullFeed:
         name: the hull's.
         revision: its revision.
         points: how many points it has, with multiplicity.
+        vertices: how many vertices.
         area: its area; NaN before it is known.
-        outline: what to draw.
-        sample: some of its points; None before they are known.
+        bounds: the smallest box around it; None where it is empty.
         verified: the last verification; None before the first.
         trouble: why it is not followed at the moment; None where it is.
         rate: batches a second, over the last second.
@@ -53,9 +56,11 @@ class HullFeed:
         self.name = name
         self.revision = 0
         self.points = 0
+        self.vertices = 0
         self.area = math.nan
-        self.outline = Outline.around(0, HullCopy().vertices)
-        self.sample: Sampled | None = None
+        self.bounds: Box | None = None
+        self._outline = Drawing(vertices_of(name), 0, NO_POINTS)
+        self._inner = Drawing(points_of(name), 0, NO_POINTS)
         self.verified: Verified | None = None
         self.trouble: str | None = "waiting for the first event"
         self.rate = math.nan
@@ -63,6 +68,10 @@ class HullFeed:
         self._client = client
         self._verify_now = asyncio.Event()
         self._task = asyncio.create_task(self._run())
+
+    def drawings(self) -> tuple[Drawing, Drawing]:
+        """What to draw: the vertices, and some of the other points."""
+        return self._outline, self._inner
 
     def verify_now(self) -> None:
         """Do not wait until the next verification is due."""
@@ -98,9 +107,11 @@ class HullFeed:
         self.revision, self.points, self.trouble = event.revision, event.points, None
         if isinstance(event, Progress):
             return
-        self.outline = Outline.around(event.revision, copy.vertices)
-        if event.measures is not None:
-            self.area = event.measures.area
+        assert event.measures is not None  # asked for
+        self.vertices = len(copy.vertices)
+        self.area = event.measures.area
+        self.bounds = event.measures.bounds if self.vertices else None
+        self._outline = Drawing(vertices_of(self.name), event.revision, outline(copy.vertices))
 
     async def _count(self) -> None:
         """A row of the history every second."""
@@ -113,13 +124,15 @@ class HullFeed:
             self.rate = (revision - before) / (now - then) if steady else math.nan
             before, then = (0 if self.trouble else revision), now
             if self.trouble is None:
-                self.history.append(time.time() * 1000, self.points, self.outline.of, self.area, self.rate)
+                self.history.append(time.time() * 1000, self.points, self.vertices, self.area, self.rate)
             else:
                 self.history.append(time.time() * 1000, math.nan, math.nan, math.nan, math.nan)
 
     async def _sample(self) -> None:
-        if self.sample is None or self.sample.revision != self.revision:
-            self.sample = await self._client.sample_points(self.name, SAMPLE_SIZE)
+        if self._inner.revision != self.revision:
+            sampled = await self._client.sample_points(self.name, SAMPLE_SIZE)
+            others = without(sampled.points, self._outline.points)
+            self._inner = Drawing(points_of(self.name), sampled.revision, others)
 
     async def _verify(self) -> None:
         outcome = await self._client.verify(self.name, timeout=None)

@@ -1,13 +1,12 @@
-"""A hull as it is drawn, made once for all viewers."""
+"""What of a hull is drawn, and where."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Points = npt.NDArray[np.float64]
-Box = tuple[float, float, float, float]
+from .drawing import Points
+
+Box = tuple[float, float, float, float]  # least x, least y, greatest x, greatest y
 
 # More vertices than this no eye tells apart, and twenty viewers would be sent megabytes.
 MOST_DRAWN = 2_000
@@ -17,30 +16,14 @@ MARGIN = 0.08
 LEAST_FILLED = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class Outline:
-    """The vertices to draw, in boundary order: every one, or where they are too many, every k-th.
+def outline(vertices: Points) -> Points:
+    """The vertices to draw: every one, or where they are too many, every k-th."""
+    return vertices[:: max(1, -(-len(vertices) // MOST_DRAWN))]
 
-    Attributes:
-        revision: when the hull became so.
-        vertices: (h, 2), at most `MOST_DRAWN`.
-        of: how many vertices the hull has.
-        bounds: the hull's least x, least y, greatest x, greatest y; None where it is empty.
-    """
 
-    revision: int
-    vertices: Points
-    of: int
-    bounds: Box | None
-
-    @classmethod
-    def around(cls, revision: int, vertices: Points) -> "Outline":
-        """The outline of a hull."""
-        if not len(vertices):
-            return cls(revision, vertices, 0, None)
-        least, greatest = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
-        every = -(-len(vertices) // MOST_DRAWN)
-        return cls(revision, vertices[::every], len(vertices), (*least, *greatest))
+def without(points: Points, vertices: Points) -> Points:
+    """The points that are no vertices: those have a mark of their own."""
+    return points[~np.isin(points @ (1, 1j), vertices @ (1, 1j))]
 
 
 def frame_around(boxes: Iterable[Box], frame: Box | None) -> Box | None:

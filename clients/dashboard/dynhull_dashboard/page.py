@@ -48,12 +48,15 @@ class Page:
         self._hub = hub
         self._shown: dict[str, Shown] = {}
         self._ticks = 0
+        self._models = document.models
+        picked = (picked or hub.server.largest())[: len(LOOKS)]
+        self._untouched = not picked
         self._banner = Div(name="banner", visible=False, stylesheets=[STYLE], sizing_mode="stretch_width")
         self._picker = MultiChoice(
             name="picker",
             placeholder="Pick hulls",
             max_items=len(LOOKS),
-            value=picked[: len(LOOKS)],
+            value=picked,
             options=[*picked],
             stylesheets=[STYLE],
             sizing_mode="stretch_width",
@@ -66,18 +69,31 @@ class Page:
         if hub.metrics:
             plots = {**self._plots, "mean": self._plots["delay"], "percentile": self._plots["delay"]}
             self._server_lines = Lines(hub.metrics.history, "whole server", plots, SERVER_LOOKS)
-        self._picker.on_change("value", lambda _attribute, _old, new: self._pick(new))
+        self._picker.on_change("value", self._picked)
         self._verify.on_click(self._verify_now)
-        self._pick(self._picker.value)
+        self._pick(picked)
+        self._tick()
         document.title = "dynhull"
         document.template = TEMPLATE
         document.template_variables.update(address=hub.address, with_metrics=hub.metrics is not None)
         document.config.notify_connection_status = False  # the page's own banner does
-        for root in (self._banner, self._picker, self._verify, self._table, self._plane.plot, *self._plots.values()):
-            document.add_root(root)
+        with self._models.freeze():  # it looks through all of them whenever one comes or goes
+            for root in (
+                self._banner,
+                self._picker,
+                self._verify,
+                self._table,
+                self._plane.plot,
+                *self._plots.values(),
+            ):
+                document.add_root(root)
         document.add_periodic_callback(self._tick, TICK_MILLISECONDS)
         document.on_session_destroyed(lambda _context: self._pick([]))
-        self._tick()
+
+    def _picked(self, _attribute: str, _old: list[str], new: list[str]) -> None:
+        self._untouched = False
+        with self._models.freeze():
+            self._pick(new)
 
     def _pick(self, names: list[str]) -> None:
         for name in self._shown.keys() - set(names):
@@ -109,8 +125,8 @@ class Page:
         options: list[str | tuple[str, str]] = [*sorted({*server.hulls, *self._picker.value})]
         if options != self._picker.options:
             self._picker.options = options
-        if not self._picker.value and server.hulls and self._ticks <= TICKS_OF_TEXT:
-            self._picker.value = [max(server.hulls.values(), key=lambda hull: hull.points).name]
+        if self._untouched and server.hulls:
+            self._picker.value = server.largest()
         self._table.text = cards.table((shown.feed, shown.look) for shown in self._shown.values())
         for shown in self._shown.values():
             shown.lines.update()

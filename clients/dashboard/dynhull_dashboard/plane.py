@@ -12,9 +12,10 @@ from bokeh.models import (
 )
 from bokeh.plotting import figure
 
+from .drawing import points_of, vertices_of
 from .feed import HullFeed
 from .looks import Look
-from .outline import Box, Outline, Points, frame_around
+from .outline import Box, frame_around
 from .styles import bare, compact_ticks
 
 FILL_ALPHA, POINT_ALPHA = 0.12, 0.65
@@ -23,16 +24,14 @@ TOOLTIPS = [("", "$name"), ("x", "@x{%.12g}"), ("y", "@y{%.12g}"), ("revision", 
 
 
 class DrawnHull:
-    """One hull in the picture."""
+    """One hull in the picture. What is in its sources comes from a `HullSocket`."""
 
     def __init__(self, plot: figure, feed: HullFeed, look: Look) -> None:
         self.feed = feed
-        self._outline: Outline | None = None
-        self._sample: object = None
-        self._vertices, self._points = _source(), _source()
         name, colour = feed.name, look.colour
+        vertices, points = _source(vertices_of(name)), _source(points_of(name))
         surface = plot.patch(
-            source=self._vertices,
+            source=vertices,
             fill_color=colour,
             fill_alpha=FILL_ALPHA,
             line_color=colour,
@@ -40,24 +39,12 @@ class DrawnHull:
             line_dash=look.dash,
         )
         self.markers = [
+            plot.scatter(source=points, size=POINT_SIZE, color=colour, alpha=POINT_ALPHA, name=f"a point of {name}"),
             plot.scatter(
-                source=self._points, size=POINT_SIZE, color=colour, alpha=POINT_ALPHA, name=f"a point of {name}"
-            ),
-            plot.scatter(
-                source=self._vertices, marker=look.marker, size=VERTEX_SIZE, color=colour, name=f"a vertex of {name}"
+                source=vertices, marker=look.marker, size=VERTEX_SIZE, color=colour, name=f"a vertex of {name}"
             ),
         ]
         self.renderers = [surface, *self.markers]
-
-    def update(self) -> None:
-        """Draw what is new."""
-        outline, sample = self.feed.outline, self.feed.sample
-        if outline is not self._outline:
-            self._outline = outline
-            self._vertices.data = _columns(outline.vertices, outline.revision)
-        if sample is not None and sample is not self._sample:
-            self._sample = sample
-            self._points.data = _columns(sample.points, sample.revision)
 
 
 class Plane:
@@ -91,32 +78,28 @@ class Plane:
     def show(self, feed: HullFeed, look: Look) -> None:
         """One hull more."""
         self._drawn[feed.name] = DrawnHull(self.plot, feed, look)
-        self._set_hover()
+        self._tell_page()
 
     def hide(self, name: str) -> None:
         """One hull fewer."""
         gone = self._drawn.pop(name)
-        self._set_hover()
+        self._tell_page()
         self.plot.renderers = [each for each in self.plot.renderers if each not in gone.renderers]
         self._frame = None
 
     def update(self) -> None:
-        """Draw what is new."""
-        for drawn in self._drawn.values():
-            drawn.update()
-        boxes = [drawn.feed.outline.bounds for drawn in self._drawn.values()]
+        """Frame what there is now."""
+        boxes = [drawn.feed.bounds for drawn in self._drawn.values()]
         frame = frame_around([box for box in boxes if box is not None], self._frame)
         if frame is not None and frame is not self._frame:
             self._frame = frame
             self._corners.data = {"x": [frame[0], frame[2]], "y": [frame[1], frame[3]]}
 
-    def _set_hover(self) -> None:
+    def _tell_page(self) -> None:
         self._hover.renderers = [marker for drawn in self._drawn.values() for marker in drawn.markers]
+        self.plot.tags = list(self._drawn)  # the page asks for the hulls named here
 
 
-def _source() -> ColumnDataSource:
-    return ColumnDataSource({"x": [], "y": [], "revision": []})
-
-
-def _columns(xy: Points, revision: int) -> dict[str, list[float] | list[int]]:
-    return {"x": xy[:, 0].tolist(), "y": xy[:, 1].tolist(), "revision": [revision] * len(xy)}
+def _source(name: str) -> ColumnDataSource:
+    """Not synced: what the socket brings must not travel back."""
+    return ColumnDataSource({"x": [], "y": [], "revision": []}, name=name, syncable=False)

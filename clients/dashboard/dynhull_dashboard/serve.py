@@ -16,6 +16,7 @@ from tornado.ioloop import IOLoop
 from tornado.netutil import bind_sockets
 
 from .hub import Hub
+from .hull_socket import HullSocket
 from .page import Page
 
 
@@ -36,7 +37,8 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     # A page of another site must not get at the hulls through a browser that can.
     allowed = [f"{host}:{port}", f"localhost:{port}", *origins]
     page = Application(FunctionHandler(partial(_show, hub)))
-    application = BokehTornado({"/": page}, extra_websocket_origins=allowed)
+    hulls = ("/hulls", HullSocket, {"hub": hub})
+    application = BokehTornado({"/": page}, extra_websocket_origins=allowed, extra_patterns=[hulls])
     http = HTTPServer(application)
     http.add_sockets(sockets)
     server = BaseServer(IOLoop.current(), application, http)

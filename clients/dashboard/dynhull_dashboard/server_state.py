@@ -28,6 +28,10 @@ class ServerState:
         self._prefix = prefix
         self._task = asyncio.create_task(self._run())
 
+    def largest(self) -> list[str]:
+        """The hull with the most points; none where there are no hulls."""
+        return [hull.name for hull in sorted(self.hulls.values(), key=lambda hull: -hull.points)[:1]]
+
     async def close(self) -> None:
         """Ask no longer."""
         self._task.cancel()

@@ -22,7 +22,7 @@ class Lines:
         self._history = history
         self._seen = history.length
         self._plots = plots
-        self._source = ColumnDataSource(dict(history.since(0)))
+        self._source = ColumnDataSource(dict(history.since(0)), name=f"time lines of {name}")
         self._lines = {
             column: plots[column].line(
                 "time",
