@@ -46,4 +46,6 @@ async def _serve(settings: Settings) -> None:
         print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
     await stop.wait()
     await server.drain()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)  # Python gives back its own handlers before the process ends
     gc.unfreeze()
