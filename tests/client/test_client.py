@@ -6,7 +6,6 @@ from collections.abc import Iterator
 import grpc
 import numpy as np
 import pytest
-from client_kinds import CLIENTS
 from server_process import server_process
 
 from dynhull import DynamicHull
@@ -28,12 +27,6 @@ from dynhull_client import (
 
 SQUARE = [[0, 0], [4, 0], [5, 2], [4, 4], [2, 3], [0, 4], [1, 2], [2, 1]]
 CORNERS = [[0, 0], [4, 0], [5, 2], [4, 4], [0, 4]]
-
-
-@pytest.fixture(params=CLIENTS)
-def connect(request: pytest.FixtureRequest) -> type[HullClient]:
-    """HullClient, or AsyncHullClient behind the same face."""
-    return CLIENTS[request.param]
 
 
 @pytest.fixture

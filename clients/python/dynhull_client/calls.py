@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Generic, TypeVar
+from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
@@ -232,6 +233,57 @@ def ingest(name: str, *, missing: Missing = "raise", timeout: float | None = Non
     1440
     """
     return Ingesting(name, missing, timeout)
+
+
+@dataclass(frozen=True, slots=True)
+class Writing:
+    """A writer to be opened."""
+
+    name: str
+    producer: str
+    batch_points: int
+    linger: float
+    in_flight: int
+    missing: Missing
+    stop_on_error: bool
+    patience: float
+
+
+def writer(
+    name: str,
+    *,
+    producer: str | None = None,
+    batch_points: int = 8192,
+    linger: float = 0.02,
+    in_flight: int = 32,
+    missing: Missing = "raise",
+    stop_on_error: bool = False,
+    patience: float = 60.0,
+) -> Writing:
+    """A writer that gathers points into batches, each applied exactly once, for use in a with statement.
+
+    >>> with client.writer("fleet") as writer:  # doctest: +SKIP
+    ...     for before, after in moves:
+    ...         writer.put(move=(before, after))
+
+    It needs at most about `in_flight + 1` batches of memory: `put` waits while that many are not acknowledged.
+
+    Args:
+        name: the hull.
+        producer: who numbers the batches. A writer of the same name goes on where an earlier one was acknowledged;
+            without, a new name. Two at a time must not have the same.
+        batch_points: a batch is sent when it has so many points, or more.
+        linger: or so many seconds after its first ones.
+        in_flight: at most so many batches are under way at a time.
+        missing: as of `apply`.
+        stop_on_error: whether a refused batch ends the writer; else the batches after it are applied all the same.
+        patience: seconds without a server until the writer gives up.
+    """
+    for argument, value in (("batch_points", batch_points), ("in_flight", in_flight)):
+        if value < 1:
+            raise ValueError(f"{argument} must be at least 1, got {value}")
+    producer = f"writer-{uuid4().hex}" if producer is None else producer
+    return Writing(name, producer, batch_points, linger, in_flight, missing, stop_on_error, patience)
 
 
 @dataclass(frozen=True, slots=True)
