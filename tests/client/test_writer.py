@@ -174,7 +174,7 @@ def test_another_writer_goes_on_where_one_was_acknowledged(client: HullClient, n
 
 def test_two_writers_of_one_name_are_told(client: HullClient, name: str) -> None:
     first, second = (client.writer(name, producer="p") for _ in range(2))
-    with first, pytest.raises(ProducerInUseError, match="'p'"), second:
+    with first, pytest.raises(ProducerInUseError, match="'p'"), second:  # noqa: PT012  # leaving may raise it too
         first.put(insert=POINTS[0])
         first.flush()
         second.put(insert=POINTS[1])

@@ -291,6 +291,8 @@ class Watching:
     """A watch to be made."""
 
     request: pb.WatchRequest
+    copy: HullCopy | None
+    reconnect: bool
     timeout: float | None
 
 
@@ -301,11 +303,17 @@ def watch(
     max_rate: float = 0.0,
     progress_interval: float | None = None,
     measures: bool = False,
+    copy: HullCopy | None = None,
     resume: HullCopy | None = None,
     directions: npt.ArrayLike | None = None,
+    reconnect: bool = True,
     timeout: float | None = None,
 ) -> Watching:
     """Follow a hull: an iterator of events, with which a `HullCopy` keeps a copy of the hull.
+
+    >>> copy = HullCopy()
+    >>> for event in client.watch("fleet", copy=copy):  # doctest: +SKIP
+    ...     print(event.revision, len(copy.vertices))
 
     Args:
         name: the hull.
@@ -313,23 +321,30 @@ def watch(
         max_rate: at most so many events a second; 0 for no bound. Changes in between are taken together.
         progress_interval: a Progress after so many seconds without an event; None for none.
         measures: whether events carry measures.
-        resume: a copy to bring up to date: changes since then instead of a snapshot. RevisionForgottenError where
-            the server cannot.
+        copy: a copy that the watch brings up to date itself, before it returns an event. What it holds already is
+            gone on from.
+        resume: a copy that the caller brings up to date with the events: changes since then instead of a snapshot.
         directions: (k, 2) vectors; instead of vertices, `Sketch` events with the extreme vertices in these.
+        reconnect: whether the watch goes on by itself after a lost connection, for as long as it takes: with what has
+            changed since, or with a snapshot where the server has forgotten that. The first connection must come about.
+            Otherwise UnavailableError, and RevisionForgottenError where the server cannot go on from a copy.
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """
     request = pb.WatchRequest(
         name=name, min_revision=min_revision, max_events_per_second=max_rate, include_measures=measures
     )
-    if resume is not None:
-        request.resume.uid, request.resume.revision = resume.uid, resume.revision
+    if copy is not None and resume is not None:
+        raise ValueError("give a copy for the watch to keep, or one to resume from, not both")
+    held = copy if copy is not None and copy.uid else resume
+    if held is not None:
+        request.resume.uid, request.resume.revision = held.uid, held.revision
     if directions is not None:
         request.directions.CopyFrom(_encoded(directions, "directions"))
     if progress_interval is not None:
         duration = Duration()
         duration.FromTimedelta(timedelta(seconds=progress_interval))
         request.progress_interval.CopyFrom(duration)
-    return Watching(request, timeout)
+    return Watching(request, copy, reconnect, timeout)
 
 
 def _encoded(xy: npt.ArrayLike, name: str) -> Any:
