@@ -94,7 +94,7 @@ class Hull {
   nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing) {
     if (ops.shape(0) != rows.shape(0)) throw nb::value_error("ops and xy differ in length");
     const Applied applied = [&] {
-      const Writing turn(turns_);
+      const Writing turn(turns_, rows.shape(0));
       return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing);
     }();
     return nb::make_tuple(applied.rows, applied.first_missing);
@@ -136,7 +136,7 @@ class Hull {
     const Output<std::int8_t> output(count);
     flatten_for(count);
     {
-      const Reading turn(turns_);
+      const Reading turn(turns_, count);
       if (chains_.fresh(tree_)) {
         chains_.locate(tree_, points_of(rows), count, output.data);
       } else {
@@ -151,7 +151,7 @@ class Hull {
     const std::size_t count = directions.shape(0);
     const Output<double> output(2 * count);
     {
-      const Reading turn(turns_);
+      const Reading turn(turns_, count);
       auto* rows = reinterpret_cast<Point*>(output.data);
       if (tree_.distinct() > 0)
         for (std::size_t i = 0; i < count; ++i) rows[i] = dynhull::support(tree_.nodes(), points_of(directions)[i]);
@@ -165,7 +165,7 @@ class Hull {
     const std::size_t count = points.shape(0);
     const Output<double> output(4 * count);
     {
-      const Reading turn(turns_);
+      const Reading turn(turns_, count);
       constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
       auto* rows = reinterpret_cast<Edge*>(output.data);
       for (std::size_t i = 0; i < count; ++i)
