@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from dynhull_client import Change, HullClient, HullCopy, Measures, Snapshot, Watch
 from dynhull_client.messages import Event, Points
@@ -53,7 +54,7 @@ def _show(console: Console, name: str, stream: Watch, copy: HullCopy, events: in
     recent: deque[list[str]] = deque(maxlen=SHOWN_EVENTS)
 
     def table() -> Table:
-        lost = f"[red]connection lost, trying again: {stream.lost}[/red]" if stream.lost else ""
+        lost = Text(f"connection lost, trying again: {stream.lost}", "red") if stream.lost else None
         shown = Table(title=f"{name} at revision {copy.revision:,}", caption=lost)
         for heading in ("revision", "points", "vertices", "change", "area", "perimeter"):
             shown.add_column(heading, justify="right")
