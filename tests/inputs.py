@@ -30,6 +30,10 @@ def points(max_size: int) -> st.SearchStrategy[list[tuple[float, float]]]:
     return st.one_of(*(st.lists(kind, max_size=max_size) for kind in kinds))
 
 
+grid_points = st.lists(st.tuples(*[st.integers(-6, 6).map(float)] * 2), min_size=1, max_size=12)
+any_points = st.one_of(grid_points, points(12).filter(len), st.lists(st.sampled_from(CIRCLE), min_size=1, max_size=9))
+
+
 def cloud(kind, count, random):
     """Many points of one kind: (count, 2), from a numpy generator."""
     if kind == "uniform":

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from fractions import Fraction
+from math import inf, isqrt, nextafter
 
 Point = tuple[float, float]
 
@@ -62,3 +63,23 @@ def locate(corners: list[Point], p: Point) -> int:
 
 def dot(d: Point, p: Point) -> Fraction:
     return Fraction(d[0]) * Fraction(p[0]) + Fraction(d[1]) * Fraction(p[1])
+
+
+def exact(p):
+    return Fraction(p[0]), Fraction(p[1])
+
+
+def root(value):
+    """The root of a rational number, to 100 bits more than a double has."""
+    scale = Fraction(2) ** (2 * (2200 + 160))
+    scaled = isqrt(int(value * scale))
+    return Fraction(scaled) / Fraction(2) ** (2200 + 160)
+
+
+def assert_rounded(measured, value):
+    """The double next to a rational value, or one beside that; inf where it is too large."""
+    try:
+        nearest = float(value)
+    except OverflowError:
+        nearest = inf
+    assert measured in (nearest, nextafter(nearest, inf), nextafter(nearest, 0))
