@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
-from .arrays import Points, as_coordinate, as_operations, as_points
+from .arrays import Points, as_coordinate, as_directions, as_operations, as_points
 from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
@@ -56,6 +56,7 @@ class DynamicHull:
 
     __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
+    dimension: ClassVar[int] = 2
     _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
@@ -180,10 +181,7 @@ class DynamicHull:
         Raises:
             ValueError: a direction is (0, 0), or there are no points.
         """
-        vectors = as_points(directions, "directions")
-        zero = np.flatnonzero(~vectors.any(axis=1))
-        if zero.size:
-            raise ValueError(f"directions row {zero[0]} is (0.0, 0.0): no direction")
+        vectors = as_directions(directions, self.dimension)
         if len(vectors) and not len(self):
             raise ValueError("an empty hull has no extreme points: insert some first")
         return self._tree.support(vectors)

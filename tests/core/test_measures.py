@@ -9,7 +9,7 @@ import oracle
 import pytest
 from hypothesis import given
 from inputs import any_points, grid_points
-from oracle import assert_rounded, exact, root
+from oracle import assert_rounded, exact, root, segment_distance
 
 from dynhull import DynamicHull
 
@@ -58,14 +58,6 @@ def test_min_box(rows):
     for p in rows:
         for q, r in ((a, b), (b, c), (c, d), (d, a)):
             assert cross(q, r, p) >= -1e-9
-
-
-def segment_distance(p, a, b):
-    (px, py), (ax, ay), (bx, by) = exact(p), exact(a), exact(b)
-    ux, uy = bx - ax, by - ay
-    share = ((px - ax) * ux + (py - ay) * uy) / (ux * ux + uy * uy) if (ux, uy) != (0, 0) else 0
-    share = max(min(share, Fraction(1)), Fraction(0))
-    return (px - ax - share * ux) ** 2 + (py - ay - share * uy) ** 2
 
 
 @given(any_points, any_points)
