@@ -53,6 +53,11 @@ def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
     return vectors.reshape(-1, dimension)
 
 
+def as_tuples(points: Points) -> list[tuple[float, float]]:
+    """The rows of an (n, 2) array, for code that looks at one point at a time."""
+    return [(x, y) for x, y in points.tolist()]
+
+
 def as_vector(value: npt.ArrayLike, name: str) -> Points:
     """Return one point or vector of two or more finite coordinates."""
     array = np.asarray(value)

@@ -20,7 +20,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Points, as_directions, as_points, as_rows, as_vector
+from .arrays import Points, as_directions, as_points, as_rows, as_tuples, as_vector
 from .exact import as_integers
 from .predicates import EPSILON, Point, cross_sign
 from .static import convex_hull
@@ -289,7 +289,7 @@ def sum_of_polygons(p: npt.ArrayLike, q: npt.ArrayLike) -> Points:
 
 
 def _ways(corners: Points) -> list[tuple[Point, Point]]:
-    rows = [(x, y) for x, y in corners.tolist()]
+    rows = as_tuples(corners)
     return list(zip(rows, rows[1:] + rows[:1], strict=True)) if len(rows) > 1 else []
 
 

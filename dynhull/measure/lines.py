@@ -8,7 +8,7 @@ from math import inf, nan
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Points
+from ..arrays import Points, as_tuples
 from ..exact import doubled_triangle, root, rounded, squared_length
 from ..predicates import Point, cross_sign, dot_sign, orientation
 
@@ -23,7 +23,7 @@ def distance(vertices: Points, tangents: npt.NDArray[np.float64], xy: Points) ->
 
     Along the chain that a point sees the distance falls, then rises: O(h + k log h).
     """
-    corners = _corners(vertices)
+    corners = as_tuples(vertices)
     if not corners:
         return np.full(len(xy), inf)
     numbers = {corner: i for i, corner in enumerate(corners)}
@@ -62,7 +62,7 @@ def intersect_lines(vertices: Points, p: Points, q: Points) -> npt.NDArray[np.fl
     Each coordinate is the exact value rounded once. A line that touches a vertex has it twice, one along an edge has
     the edge's ends; NaN for a line that misses. O(h + k log h).
     """
-    corners = _corners(vertices)
+    corners = as_tuples(vertices)
     result = np.full((len(p), 2, 2), nan)
     if not corners:
         return result
@@ -110,7 +110,3 @@ def _meet(p: Point, q: Point, a: Point, b: Point) -> Point:
     share = at_a / (at_a - at_b)
     ax, ay = Fraction(a[0]), Fraction(a[1])
     return rounded(ax + share * (Fraction(b[0]) - ax)), rounded(ay + share * (Fraction(b[1]) - ay))
-
-
-def _corners(vertices: Points) -> list[Point]:
-    return [(x, y) for x, y in vertices.tolist()]
