@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import cmp_to_key
 from itertools import product
 from math import cos, isfinite, sin
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from .static import convex_hull
 Way = tuple[Point, Point, int]
 
 
+@runtime_checkable
 class Convex(Protocol):
     """A convex set in two or three dimensions (most functions take any number of them)."""
 

@@ -97,7 +97,7 @@ def contact(a: Shape, b: Shape) -> Contact:
 
 
 def _pieces(shape: Shape) -> Sequence[Convex]:
-    if not isinstance(shape, Sequence):
+    if isinstance(shape, Convex):
         return [shape]
     if not shape:
         raise ValueError("a union of no pieces is empty: it is nowhere")

@@ -106,3 +106,9 @@ def least(formula: Formula, *corners: Points) -> tuple[Fraction, int]:
         if n * ratios[best][1] < ratios[best][0] * d:
             best = i
     return Fraction(*ratios[best]) * unit**2, int(near[best])
+
+
+def squared_height(a: Integers, b: Integers, p: Integers) -> tuple[Integers, Integers, Integers]:
+    """A formula: the squared distance of p from the line through a and b."""
+    (ux, uy), (vx, vy) = (b - a).T, (p - a).T
+    return (ux * vy - uy * vx) ** 2, ux * ux + uy * uy, (abs(ux * vy) + abs(uy * vx)) ** 2

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Points
 from ..exact import Integers, root
-from .calipers import LEFT, edges, extremes, least
+from .calipers import LEFT, edges, extremes, least, squared_height
 
 
 def bounds(vertices: Points) -> tuple[float, float, float, float]:
@@ -39,14 +39,9 @@ def width(vertices: Points) -> float:
     if len(vertices) < 3:
         return 0.0
     a, b = edges(vertices)
-    return root(least(_squared_height, a, b, vertices[extremes(a, b, LEFT, vertices)])[0])
+    return root(least(squared_height, a, b, vertices[extremes(a, b, LEFT, vertices)])[0])
 
 
 def _negative_squared_length(p: Integers, q: Integers) -> tuple[Integers, Integers, Integers]:
     squares = ((q - p) ** 2).sum(axis=1)
     return -squares, squares * 0 + 1, squares
-
-
-def _squared_height(a: Integers, b: Integers, far: Integers) -> tuple[Integers, Integers, Integers]:
-    (ux, uy), (vx, vy) = (b - a).T, (far - a).T
-    return (ux * vy - uy * vx) ** 2, ux * ux + uy * uy, (abs(ux * vy) + abs(uy * vx)) ** 2
