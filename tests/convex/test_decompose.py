@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inputs import stars
 
 from dynhull import convex_hull, measure, orient2d
 from dynhull.convex import polygon
@@ -14,14 +15,6 @@ from dynhull.gjk import contact
 def doubled_area(corners):
     x, y = np.asarray(corners).T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-@st.composite
-def stars(draw):
-    """Simple polygons around the origin, their corners on rays of the integer grid in order of angle."""
-    rays = [(8, 1), (5, 4), (1, 6), (-3, 7), (-6, 2), (-7, -5), (-1, -8), (4, -7), (6, -1)]
-    lengths = draw(st.lists(st.integers(1, 9), min_size=len(rays), max_size=len(rays)))
-    return [(x * length, y * length) for (x, y), length in zip(rays, lengths, strict=True)]
 
 
 @given(stars(), st.booleans())

@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
-from convex.test_decompose import stars
 from hypothesis import given
 from hypothesis import strategies as st
+from inputs import stars
 
 from dynhull.defects import convexity_defects
 

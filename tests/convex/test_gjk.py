@@ -8,6 +8,7 @@ import oracle
 import pytest
 from hypothesis import given
 from inputs import any_points, grid_points
+from judges import fcl_body, fcl_distance
 from oracle import root
 
 from dynhull import DynamicHull
@@ -112,8 +113,6 @@ def bodies():
 
 
 def test_agrees_with_fcl_in_space(bodies):
-    from convex.judges import fcl_body, fcl_distance
-
     judged = [fcl_body(points) for points in bodies]
     shapes = [Cloud(points) for points in bodies]
     iterations = []
