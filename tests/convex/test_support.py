@@ -5,7 +5,7 @@ import oracle
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from inputs import any_points, finite
+from inputs import any_points, finite, grid_points
 
 from dynhull import DynamicHull
 from dynhull.convex import (
@@ -85,15 +85,10 @@ def test_a_live_hull_stays_live_inside_of_others():
     assert shape.support([[1, 0]]).tolist() == [[16, 0]]
 
 
-@given(any_points.filter(lambda rows: max(map(abs, sum(rows, ()))) < 100), any_points)
+@given(grid_points, grid_points)
 def test_sum_of_polygons(rows, others):
     sums = [(p[0] + q[0], p[1] + q[1]) for p in rows for q in others]
-    if not np.isfinite(sums).all():
-        return
-    found = sum_of_polygons(rows, others)
-    if all(x == int(x) for p in (*rows, *others) for x in p):
-        assert found.tolist() == [list(p) for p in oracle.hull(sums)]
-    assert {tuple(p) for p in found.tolist()} <= {(x + 0.0, y + 0.0) for x, y in sums}
+    assert sum_of_polygons(rows, others).tolist() == [list(p) for p in oracle.hull(sums)]
 
 
 def test_flat_images():
