@@ -50,7 +50,7 @@ def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
     zero = np.flatnonzero(~vectors.any(axis=1))
     if zero.size:
         raise ValueError(f"directions row {zero[0]} is {_text(vectors[zero[0]])}: no direction")
-    return vectors.reshape(-1, dimension)
+    return np.ascontiguousarray(vectors.reshape(-1, dimension))
 
 
 def as_tuples(points: Points) -> list[tuple[float, float]]:

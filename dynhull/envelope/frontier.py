@@ -58,7 +58,7 @@ class Frontier:
         return len(self._hull)
 
     def add(self, risk: float, gain: float) -> bool:
-        """Add a point. True where the efficient points changed. O(h log n) then, otherwise O(log² n)."""
+        """Add a point. True where the efficient points changed. O(log² n), and O(h log n) to tell."""
         (row,) = _as_risks([[risk, gain]])
         before = self.efficient()
         self._hull.insert(*row.tolist())
@@ -76,9 +76,7 @@ class Frontier:
 
     def efficient(self) -> Points:
         """(h, 2) corners of the frontier, from least risk to most return. O(h log n)."""
-        chain = self._hull.upper()
-        if len(chain) > 1 and chain[0, 0] == chain[1, 0]:  # the left end goes straight up
-            chain = chain[1:]
+        chain = self._upper()
         return chain[: int(chain[:, 1].argmax()) + 1] if len(chain) else chain
 
     def dominated(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
@@ -123,10 +121,12 @@ class Frontier:
 
     def tangencies(self) -> Tangencies:
         """How the tangency moves as the risk-free rate goes from far below to far above. O(h log n)."""
-        chain = self._hull.upper()
-        if len(chain) > 1 and chain[0, 0] == chain[1, 0]:
-            chain = chain[1:]
+        chain = self._upper()
         return Tangencies(chain, np.array([_at_no_risk(p, q) for p, q in pairwise(as_tuples(chain))]))
+
+    def _upper(self) -> Points:
+        chain = self._hull.upper()
+        return chain[1:] if len(chain) > 1 and chain[0, 0] == chain[1, 0] else chain  # without its way straight up
 
 
 def _at_no_risk(p: Point, q: Point) -> float:

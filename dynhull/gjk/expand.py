@@ -6,6 +6,7 @@ that side belongs to the difference, and its distance is the depth.
 
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
+from math import inf
 
 from .difference import Corner, Difference
 from .simplex import nearest
@@ -57,10 +58,8 @@ def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
         iterations += 1
         if dot(far.w, side.normal) - side.distance <= GAIN * size or iterations >= MOST_ITERATIONS:
             break
-        seen = _visible(sides, gone, i, far) if difference.dimension == 3 else [i]
+        seen = _visible(sides, gone, i, far, GAIN * size) if difference.dimension == 3 else [i]
         new = _cone([sides[k] for k in seen], far)
-        if any(s.normal == ORIGIN for s in new):
-            break
         gone.update(seen)
         for s in new:
             heappush(heap, (s.distance, len(sides)))
@@ -110,6 +109,8 @@ def _side(corners: tuple[Corner, ...]) -> Side:
     else:
         a, b, c = corners
         outwards = unit(normal(a.w, b.w, c.w))
+    if outwards == ORIGIN:  # without area: never the nearest, never seen
+        return Side(corners, outwards, inf)
     # Of the corners' distances, equal but for rounding, the one nearest to the origin is the most accurate.
     return Side(corners, outwards, dot(outwards, min((c.w for c in corners), key=lambda w: dot(w, w))))
 
@@ -126,7 +127,7 @@ def _outward_sides(corners: list[Corner]) -> list[Side]:
     return [_side(face) for face in ((i, j, k), (i, top, j), (j, top, k), (k, top, i))]
 
 
-def _visible(sides: list[Side], gone: set[int], first: int, far: Corner) -> list[int]:
+def _visible(sides: list[Side], gone: set[int], first: int, far: Corner, rounding: float) -> list[int]:
     """The numbers of the faces that the new corner sees, connected to the one it was found from."""
     seen, edges = {first}, {}
     for i, side in enumerate(sides):
@@ -138,7 +139,8 @@ def _visible(sides: list[Side], gone: set[int], first: int, far: Corner) -> list
         corners = sides[waiting.pop()].corners
         for k in range(3):
             i = edges[corners[k], corners[k - 1]]
-            if i not in seen and dot(sides[i].normal, far.w) > sides[i].distance:
+            # A face in one plane with the new corner is seen: beside it a new face might have no area.
+            if i not in seen and dot(sides[i].normal, far.w) >= sides[i].distance - rounding:
                 seen.add(i)
                 waiting.append(i)
     return list(seen)

@@ -14,6 +14,7 @@ from oracle import root
 from dynhull import DynamicHull
 from dynhull.convex import Cloud, ball, box, capsule, moved, point, polygon, rotated, scaled, segment, sum_of_polygons
 from dynhull.gjk import contact, distance_many, intersect, intersect_many
+from dynhull.static import hull_nd
 
 
 @given(any_points, any_points)
@@ -132,16 +133,29 @@ def test_few_iterations_in_the_plane():
     assert 2.5 <= np.mean([c.iterations for c in found]) <= 5
 
 
-def test_depth_in_space_by_definition(bodies):
-    """The least of the distances of the origin from the faces of the difference."""
-    from dynhull.static import hull_nd
+def depth_in_space(p, q):
+    """How far the origin is inside of the nearest face of the difference, negative outside; 0 where that is flat."""
+    difference = hull_nd((np.asarray(p)[:, None] - q).reshape(-1, 3))
+    if difference.dimension < 3:
+        return 0.0
+    return float((difference.normals * difference.vertices[difference.faces[:, 0]]).sum(axis=1).min())
 
+
+def test_depth_in_space_by_definition(bodies):
     for p, q in pairwise(bodies[:30]):
-        found = contact(Cloud(p), Cloud(q))
-        difference = hull_nd((p[:, None] - q).reshape(-1, 3))
-        away = (difference.normals * difference.vertices[difference.faces[:, 0]]).sum(axis=1)
-        assert found.intersect == (away.min() >= 0)
-        assert found.depth == pytest.approx(max(away.min(), 0), abs=1e-12)
+        found, depth = contact(Cloud(p), Cloud(q)), depth_in_space(p, q)
+        assert found.intersect == (depth >= 0)
+        assert found.depth == pytest.approx(max(depth, 0), abs=1e-12)
+
+
+def test_depth_of_bodies_with_faces_in_one_plane():
+    random = np.random.default_rng(2)
+    for _ in range(150):
+        p, q = (random.integers(0, 4, (random.integers(1, 12), 3)).astype(float) for _ in range(2))
+        found, depth = contact(Cloud(p), Cloud(q)), depth_in_space(p, q)
+        if abs(depth) > 1e-12:
+            assert found.intersect == (depth > 0)
+        assert found.depth == pytest.approx(max(depth, 0), abs=1e-12)
 
 
 def test_many_pairs_at_once_agree_with_one_by_one():
