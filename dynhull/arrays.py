@@ -98,6 +98,8 @@ def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
 
 
 def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:
+    if type(xy) is np.ndarray and xy.dtype == np.float64:
+        return xy
     if isinstance(xy, Iterable) and not hasattr(xy, "__len__") and not hasattr(xy, "__array__"):
         xy = list(xy)
     try:
@@ -123,8 +125,10 @@ def _first_not_a_number(xy: Any) -> int:
 
 def _as_double(array: npt.NDArray[Any], name: str) -> Points:
     """Convert an (n, 2) array to float64, refusing the first row that would not keep its value."""
+    if array.dtype == np.float64:
+        return array
     kind = array.dtype.kind
-    if kind == "b" or array.dtype in (np.float16, np.float32, np.float64):
+    if kind == "b" or array.dtype in (np.float16, np.float32):
         return np.asarray(array, dtype=np.float64)
     if kind in "iu":
         large = (array > LARGEST_EXACT_INTEGER) | (array < -LARGEST_EXACT_INTEGER)

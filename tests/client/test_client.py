@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import grpc
 import numpy as np
 import pytest
+from client_kinds import CLIENTS
 from server_process import server_process
 
 from dynhull import DynamicHull
@@ -29,9 +30,15 @@ SQUARE = [[0, 0], [4, 0], [5, 2], [4, 4], [2, 3], [0, 4], [1, 2], [2, 1]]
 CORNERS = [[0, 0], [4, 0], [5, 2], [4, 4], [0, 4]]
 
 
+@pytest.fixture(params=CLIENTS)
+def connect(request: pytest.FixtureRequest) -> type[HullClient]:
+    """HullClient, or AsyncHullClient behind the same face."""
+    return CLIENTS[request.param]
+
+
 @pytest.fixture
-def client(address: str) -> Iterator[HullClient]:
-    with HullClient(address) as client:
+def client(address: str, connect: type[HullClient]) -> Iterator[HullClient]:
+    with connect(address) as client:
         yield client
 
 
@@ -183,9 +190,9 @@ def test_errors_are_typed_and_say_what_is_at_fault(client: HullClient, hull: str
     assert all(isinstance(each.value, DynhullError) for each in errors)
 
 
-def test_limits_and_a_server_that_goes_away() -> None:
+def test_limits_and_a_server_that_goes_away(connect: type[HullClient]) -> None:
     limits = ("--max-hulls", "1", "--max-message-bytes", "4096")
-    with server_process(*limits) as server, HullClient(server.address) as client:
+    with server_process(*limits) as server, connect(server.address) as client:
         client.create_hull("one")
         with pytest.raises(LimitExceededError) as hulls:
             client.create_hull("two")
@@ -200,7 +207,7 @@ def test_limits_and_a_server_that_goes_away() -> None:
         server.process.wait()
         with pytest.raises(UnavailableError):
             client.get_hull("one")
-        with pytest.raises(DeadlineError), HullClient(server.address, wait_for_ready=True, timeout=0.1) as patient:
+        with pytest.raises(DeadlineError), connect(server.address, wait_for_ready=True, timeout=0.1) as patient:
             patient.get_hull("one")
 
 

@@ -7,6 +7,9 @@
 ...     print(client.get_hull("fleet").vertices)
 """
 
+from .async_client import AsyncHullClient
+from .async_ingest import AsyncIngest
+from .async_watch import AsyncWatch
 from .client import HullClient
 from .errors import (
     DeadlineError,
@@ -23,6 +26,7 @@ from .errors import (
     UnauthenticatedError,
     UnavailableError,
 )
+from .hull_copy import HullCopy
 from .ingest import Ingest
 from .messages import (
     Applied,
@@ -44,10 +48,13 @@ from .messages import (
     Tangents,
     Verification,
 )
-from .watch import HullCopy, Watch
+from .watch import Watch
 
 __all__ = [
     "Applied",
+    "AsyncHullClient",
+    "AsyncIngest",
+    "AsyncWatch",
     "ChanRound",
     "Change",
     "Counted",
