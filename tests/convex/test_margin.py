@@ -44,6 +44,17 @@ def test_two_live_hulls():
         assert live.normal == pytest.approx(static.normal, abs=1e-12)
 
 
+@pytest.mark.parametrize("n", [100, 1000, 10_000])
+def test_a_query_on_live_hulls_takes_about_log_n_steps(n):
+    """Of O(log n) each. Circles, where every point is a vertex, are the worst of common inputs."""
+    random = np.random.default_rng(n)
+    for _ in range(8):
+        angle = random.random((2, n)) * 2 * np.pi
+        a, b = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        found = max_margin(DynamicHull(a), DynamicHull(b + [2.5 + random.random(), random.random()]))
+        assert found.iterations <= np.log2(n) + 4
+
+
 def test_touching_and_overlapping():
     touching = max_margin([[0, 0], [1, 1]], [[1, 1], [2, 0]])
     assert (touching.separable, touching.margin, touching.depth) == (False, 0, 0)
