@@ -51,7 +51,7 @@ def test_a_query_on_live_hulls_takes_about_log_n_steps(n):
     for _ in range(8):
         angle = random.random((2, n)) * 2 * np.pi
         a, b = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        found = max_margin(DynamicHull(a), DynamicHull(b + [2.5 + random.random(), random.random()]))
+        found = max_margin(DynamicHull(a), DynamicHull(b + random.uniform([2.5, 0], [3.5, 1])))
         assert found.iterations <= np.log2(n) + 4
 
 
