@@ -39,9 +39,27 @@ void counting_pass(const R* rows, R* target, std::size_t count, std::size_t buck
   for (std::size_t i = 0; i < count; ++i) target[next[key(rows[i])]++] = rows[i];
 }
 
-// Stable sort by point. Counting passes over x, mapped affinely to as many keys as there are rows or more, leave short
-// runs for insertion sort; long runs of almost equal x (clusters, columns) are mapped again, or compared. O(n) on most
-// inputs, O(n log n) on all.
+template <class R>
+void sort_by_point(R* rows, R* scratch, std::size_t count);
+
+// Rows whose keys grow, from rows whose keys only never fall: the few runs of one key that are out of order are sorted.
+// False where most have one key.
+template <class R, class Key>
+bool sort_runs(R* rows, R* scratch, std::size_t count, Key key) {
+  for (std::size_t i = 1; i < count; ++i) {
+    if (!(rows[i].p < rows[i - 1].p)) continue;
+    const std::uint32_t k = key(rows[i]);
+    std::size_t from = i - 1;
+    while (from > 0 && key(rows[from - 1]) == k) --from;
+    while (i < count && key(rows[i]) == k) ++i;
+    if (i - from > count / 2 && count >= SMALL_SORT) return false;
+    sort_by_point(rows + from, scratch + from, i - from);
+  }
+  return true;
+}
+
+// Stable sort by point. Counting passes over x, mapped affinely to more keys than there are rows, leave few runs of
+// equal keys; long ones (clusters, columns) are mapped again, or compared. O(n) on most inputs, O(n log n) on all.
 template <class R>
 void sort_by_point(R* rows, R* scratch, std::size_t count) {
   if (count < SMALL_SORT) return insertion_sort(rows, rows + count);
@@ -59,7 +77,7 @@ void sort_by_point(R* rows, R* scratch, std::size_t count) {
   const double scale = static_cast<double>(keys - 1) / (greatest - least);
   if (!(scale > 0 && scale < INFINITE)) return compare();  // one column, or a width beyond every double
   const auto key = [=](const R& row) {                     // monotone in x, whatever the rounding
-    return static_cast<std::uint32_t>((row.p.x - least) * scale);
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>((row.p.x - least) * scale));
   };
   if (count < ONE_PASS) {
     counting_pass(rows, scratch, count, keys, key);
@@ -69,12 +87,7 @@ void sort_by_point(R* rows, R* scratch, std::size_t count) {
     counting_pass(rows, scratch, count, BUCKETS, [=](const R& row) { return key(row) % BUCKETS; });
     counting_pass(scratch, rows, count, BUCKETS, [=](const R& row) { return key(row) / BUCKETS; });
   }
-  for (std::size_t from = 0, to; from < count; from = to) {
-    const std::uint32_t k = key(rows[from]);
-    for (to = from + 1; to < count && key(rows[to]) == k;) ++to;
-    if (to - from > count / 2) return compare();
-    if (to - from > 1) sort_by_point(rows + from, scratch + from, to - from);
-  }
+  if (!sort_runs(rows, scratch, count, key)) compare();
 }
 
 // A balanced tree over leaves first..last.

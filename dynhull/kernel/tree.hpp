@@ -19,9 +19,10 @@ class HullTree {
 
   HullTree() = default;
   HullTree(const Point* points, std::size_t count) {
-    std::vector<Bare> sorted(count), scratch(count);
-    for (std::size_t i = 0; i < count; ++i) sorted[i] = {points[i]};
-    sort_by_point(sorted.data(), scratch.data(), count);
+    static_assert(sizeof(Bare) == sizeof(Point));
+    const Buffer<Bare> sorted(count);
+    std::transform(points, points + count, sorted.data(), [](Point p) { return Bare{p}; });
+    sort_by_point(sorted.data(), Buffer<Bare>(count).data(), count);
     std::size_t kept = 0;
     for (std::size_t i = 0, next; i < count; i = next) {
       for (next = i + 1; next < count && sorted[next].p == sorted[i].p; ++next) {
@@ -29,7 +30,6 @@ class HullTree {
       if (next - i > 1) copies_.emplace(sorted[i].p, next - i);
       sorted[kept++] = sorted[i];
     }
-    static_assert(sizeof(Bare) == sizeof(Point));
     nodes_ = built(reinterpret_cast<const Point*>(sorted.data()), kept);
     size_ = count;
     distinct_ = kept;
