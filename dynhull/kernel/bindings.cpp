@@ -37,10 +37,12 @@ struct Output {
   }
 };
 
-nb::object array_of(const std::vector<Point>& points) {
-  Output<double> output(2 * points.size());
-  std::copy(points.begin(), points.end(), reinterpret_cast<Point*>(output.data));
-  return output.array({points.size(), 2});
+// The points as an array, which takes over their memory.
+nb::object array_of(std::vector<Point> points) {
+  auto* const kept = new std::vector<Point>(std::move(points));
+  const nb::capsule owner(kept, [](void* memory) noexcept { delete static_cast<std::vector<Point>*>(memory); });
+  auto* const data = reinterpret_cast<double*>(kept->data());
+  return nb::cast(nb::ndarray<nb::numpy, double>(data, {kept->size(), 2}, owner));
 }
 
 // One coordinate, checked: what is not plainly a double goes the way of dynhull.arrays, which converts or refuses.
@@ -91,11 +93,11 @@ class Hull {
     return removal == HullTree::Removal::HULL_CHANGED;
   }
 
-  nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing) {
+  nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing, std::optional<bool> together) {
     if (ops.shape(0) != rows.shape(0)) throw nb::value_error("ops and xy differ in length");
     const Applied applied = [&] {
       const Writing turn(turns_, rows.shape(0));
-      return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing);
+      return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing, together);
     }();
     return nb::make_tuple(applied.rows, applied.first_missing);
   }
@@ -105,9 +107,11 @@ class Hull {
     {
       const Reading turn(turns_);
       all.reserve(tree_.size());
-      tree_.for_each([&](Point p, std::uint64_t copies) { all.insert(all.end(), copies, p); });
+      tree_.for_each([&](Point p, std::uint64_t copies) {
+        for (; copies > 0; --copies) all.push_back(p);
+      });
     }
-    return array_of(all);
+    return array_of(std::move(all));
   }
 
   nb::object chain(int side) {
@@ -117,7 +121,7 @@ class Hull {
       const Reading turn(turns_);
       chain = tree_.chain(static_cast<Side>(side));
     }
-    return array_of(chain);
+    return array_of(std::move(chain));
   }
 
   nb::object vertices() {
@@ -128,7 +132,7 @@ class Hull {
       const std::vector<Point> upper = tree_.chain(UPPER);
       if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
     }
-    return array_of(vertices);
+    return array_of(std::move(vertices));
   }
 
   nb::object locate(const Rows& rows) {
@@ -209,9 +213,9 @@ class Hull {
     if (settled().version() != asked_version_) queries_ = 0;
     asked_version_ = tree_.version();
     queries_ += queries;
-    if (chains_.fresh(tree_) || !chains_.worthwhile(queries_)) return;
+    if (!chains_.stale(tree_, queries_)) return;
     const Writing turn(turns_);
-    if (!chains_.fresh(tree_)) chains_.refresh(tree_);
+    if (chains_.stale(tree_, queries_)) chains_.refresh(tree_, queries_);
   }
 
   HullTree tree_;
@@ -300,10 +304,10 @@ NB_MODULE(_kernel, module) {
       .def("insert", &Hull::insert, "x"_a.none(), "y"_a.none(), "Add a point. True where the hull changed. O(log² n).")
       .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
            "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
-      .def("apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a,
-           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the "
-           "first "
-           "row that deletes what is not there, or -1.")
+      .def(
+          "apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+          "Insert the rows with +1 and delete those with -1, as a set, together or one by one: the batch decides where "
+          "not told. Returns how many rows were applied, and the first row that deletes what is not there, or -1.")
       .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
       .def("chain", &Hull::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")

@@ -10,6 +10,7 @@
 from .async_client import AsyncHullClient
 from .async_ingest import AsyncIngest
 from .async_watch import AsyncWatch
+from .async_writer import AsyncWriter
 from .client import HullClient
 from .errors import (
     DeadlineError,
@@ -21,6 +22,7 @@ from .errors import (
     LimitExceededError,
     PermissionDeniedError,
     PointMissingError,
+    ProducerInUseError,
     RevisionForgottenError,
     SequenceGapError,
     UnauthenticatedError,
@@ -51,12 +53,14 @@ from .messages import (
     Verification,
 )
 from .watch import Watch
+from .writer import Writer
 
 __all__ = [
     "Applied",
     "AsyncHullClient",
     "AsyncIngest",
     "AsyncWatch",
+    "AsyncWriter",
     "ChanRound",
     "Change",
     "Counted",
@@ -81,6 +85,7 @@ __all__ = [
     "Measures",
     "PermissionDeniedError",
     "PointMissingError",
+    "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
     "Sampled",
@@ -93,4 +98,5 @@ __all__ = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Writer",
 ]
