@@ -42,6 +42,31 @@ def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
     return _finite(_as_double(array, name), name) + 0.0
 
 
+def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
+    """Return (k, dimension) directions, checked like `as_points`; none of them is zero."""
+    vectors = as_rows(directions, "directions")
+    if len(vectors) and vectors.shape[1] != dimension:
+        raise ValueError(f"directions must have shape (k, {dimension}), got {vectors.shape}")
+    zero = np.flatnonzero(~vectors.any(axis=1))
+    if zero.size:
+        raise ValueError(f"directions row {zero[0]} is {_text(vectors[zero[0]])}: no direction")
+    return np.ascontiguousarray(vectors.reshape(-1, dimension))
+
+
+def as_tuples(points: Points) -> list[tuple[float, float]]:
+    """The rows of an (n, 2) array, for code that looks at one point at a time."""
+    return [(x, y) for x, y in points.tolist()]
+
+
+def as_vector(value: npt.ArrayLike, name: str) -> Points:
+    """Return one point or vector of two or more finite coordinates."""
+    array = np.asarray(value)
+    if array.ndim != 1 or len(array) < 2:
+        raise ValueError(f"{name} must have shape (d,), d at least 2, got {array.shape}")
+    vector: Points = as_rows(array[None], name)[0]
+    return vector
+
+
 def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
     """Return `xy` as a float64 array of shape (..., 2), checked like `as_points`."""
     array = _as_array(xy, name)
