@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 # What refuses the writer, not one of its batches.
 FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
 
-
 Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
 Settled = list[tuple[Any, Applied | DynhullError]]
 
@@ -187,6 +186,7 @@ class Window(Generic[Future]):
         self._refusal = self._refusal or error
         refused = self._under_way.popleft()
         self.settled += 1
+        self._lost_since = None
         for batch in self._under_way:
             assert batch.request is not None  # what is under way has been sent
             batch.request.sequence -= 1
