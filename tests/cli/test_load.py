@@ -233,7 +233,7 @@ def test_a_server_that_goes_and_comes_back(tmp_path):
                 loading.stdin.close()
             said = loading.stderr.read()
             assert loading.wait() == 3
-    assert "The same command with --resume loads the rest." in said
+    assert "The same command with --resume loads the rest" in said
     assert f"no answer from {server.address}" in said
     with server_process(*data) as server:
         command = [*load, "--address", server.address, "--resume"]

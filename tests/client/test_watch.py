@@ -1,15 +1,26 @@
 """A watch that goes on by itself: the copy it keeps is exact whatever happened to the connection and the server."""
 
+import asyncio
 import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from client_kinds import loop
 from proxy import proxy
 from server_process import server_process
 
-from dynhull_client import HullClient, HullCopy, HullNotFoundError, Sketch, Snapshot, UnavailableError
+from dynhull_client import (
+    AsyncHullClient,
+    Change,
+    HullClient,
+    HullCopy,
+    HullNotFoundError,
+    Sketch,
+    Snapshot,
+    UnavailableError,
+)
 
 BATCHES = np.random.default_rng(6).normal(size=(200, 3, 2)) * np.linspace(1, 2, 200)[:, None, None]
 
@@ -129,3 +140,20 @@ def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:
         closing = threading.Timer(0.2, watch.close)
         closing.start()
         assert list(watch) == []
+
+
+def test_a_wait_given_up_does_not_end_the_watch(address: str, name: str) -> None:
+    async def follow() -> HullCopy:
+        copy = HullCopy()
+        async with AsyncHullClient(address) as client:
+            await client.create_hull(name)
+            async with client.watch(name, copy=copy) as watch:
+                assert isinstance(await anext(watch), Snapshot)
+                with pytest.raises(TimeoutError):
+                    await asyncio.wait_for(anext(watch), 0.05)
+                await client.apply(name, insert=[[1, 2]])
+                assert isinstance(await anext(watch), Change)
+        return copy
+
+    copy = asyncio.run_coroutine_threadsafe(follow(), loop()).result()
+    assert copy.vertices.tolist() == [[1, 2]]

@@ -31,6 +31,8 @@ class AsyncWatch(AsyncIterator[Event]):
 
     async def __anext__(self) -> Event:
         while not self._closed.is_set():
+            if self._call.cancelled():  # as gRPC does when a wait for an event is given up
+                self._begin()
             try:
                 return self._place.take(await anext(self._events))
             except grpc.RpcError as failure:
