@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynhull.arrays import Points
+from dynhull.arrays import Points, all_finite
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
@@ -108,9 +108,8 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
     values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
     xy = values.reshape(-1, 2)
-    finite = np.isfinite(xy)
-    if not finite.all():
-        row = int(np.argmin(finite.all(axis=1)))
+    if not all_finite(xy):
+        row = int(np.argmin(np.isfinite(xy).all(axis=1)))
         raise InvalidFieldError(field, tuple(xy[row].tolist()), "coordinates must be finite", row)
     # Adding zero turns -0.0 into 0.0, and any byte order into the machine's.
     return np.asarray(xy + 0.0, np.float64)
