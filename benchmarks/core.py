@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -96,14 +96,19 @@ class Rivals:
     """The C++ program."""
 
     def __init__(self):
-        compiler = shutil.which("c++") or sys.exit("no C++ compiler")
+        compiler = shutil.which("c++") or sys.exit("no C++ compiler: --no-rivals measures without")
         self.program = str(Path(tempfile.mkdtemp()) / "rivals")
         source = str(Path(__file__).with_name("rivals.cpp"))
-        subprocess.run(
-            [compiler, "-std=c++20", "-O2", "-DNDEBUG", source, "-o", self.program, "-lgmp", "-lmpfr"], check=False
-        )
-        if not Path(self.program).exists():
-            subprocess.run([compiler, "-std=c++20", "-O2", "-DNO_CGAL", source, "-o", self.program], check=True)
+        build = [compiler, "-std=c++20", "-O2", "-DNDEBUG", source, "-o", self.program]
+        probe = [compiler, "-fsyntax-only", "-x", "c++", "-"]
+        if subprocess.run(probe, input=b"#include <CGAL/version.h>", capture_output=True, check=False).returncode != 0:
+            print("no CGAL among the rivals: its headers are not installed (Debian: libcgal-dev)\n")
+        else:
+            build += ["-lgmp", "-lmpfr"]
+        run = subprocess.run(build, capture_output=True, text=True, check=False)
+        if run.returncode != 0:
+            reason = run.stderr.strip().splitlines()[-1]
+            sys.exit(f"the C++ rivals cannot be built; CGAL needs libgmp-dev and libmpfr-dev as well: {reason}")
 
     def __call__(self, command: str, points: np.ndarray, *numbers: int) -> Iterator[Row]:
         run = subprocess.run(
@@ -211,8 +216,12 @@ def locate(n, make, random, rivals) -> Iterator[Row]:
 def build(n, make, random, rivals) -> Iterator[Row]:
     """Build from an array, and static hulls of it."""
     rows = make(n, random)
-    yield "dynhull.DynamicHull", clocked(lambda: DynamicHull(rows))
-    yield "dynhull.convex_hull", clocked(lambda: dynhull.convex_hull(rows))
+    for name, work in (("DynamicHull", DynamicHull), ("convex_hull", dynhull.convex_hull)):
+        began = time.perf_counter()
+        processor = clocked(partial(work, rows))
+        elapsed = time.perf_counter() - began
+        yield f"dynhull.{name}, elapsed", elapsed
+        yield f"dynhull.{name}, processor time of its threads", processor
     if rivals:
         import shapely
         from scipy.spatial import ConvexHull
@@ -231,6 +240,18 @@ def memory(n, make, random, rivals) -> Iterator[Row]:
     used, reserved = hull._tree.memory
     yield "dynhull, used", used / hull.distinct
     yield "dynhull, reserved", reserved / hull.distinct
+
+
+def crossover(n, make, random, rivals) -> Iterator[Row]:
+    """A batch of inserts and deletes applied one by one, or together."""
+    for size in (65_536, 131_072, 262_144, 524_288, 1_048_576):
+        if size <= n:
+            rows = make(n + size // 2, random)
+            batch = np.concatenate([rows[n:], rows[: size // 2]])
+            ops = np.repeat(np.array([1, -1], np.int8), size // 2)
+            for name, together in (("one by one", False), ("together", True)):
+                tree = DynamicHull(rows[:n])._tree
+                yield f"{size:,} {name}", clocked(partial(tree.apply, ops, batch, False, together), size)
 
 
 def call(n, make, random, rivals) -> Iterator[Row]:
@@ -260,7 +281,7 @@ def latency(n, make, random, rivals) -> Iterator[Row]:
     yield "dynhull, max", float(times.max())
 
 
-WORKS = {f.__name__: f for f in (window, vertex, locate, build, memory, call, latency)}
+WORKS = {f.__name__: f for f in (window, vertex, locate, build, memory, call, latency, crossover)}
 UNITS = {"build": (1e3, "ms"), "memory": (1, "bytes a point"), "locate": (1e9, "ns"), "call": (1e6, "µs")}
 
 
@@ -303,22 +324,33 @@ def row(result: dict) -> str:
     )
 
 
+def slope(points: list[tuple[int, float]]) -> float:
+    """Of the line that fits best on logarithmic scales: 0 where the cost does not grow, 1 where it grows like n."""
+    sizes, costs = np.log(np.array(points)).T
+    return float(np.polyfit(sizes, costs, 1)[0])
+
+
+def growth(results: list[dict]) -> dict[str, list[tuple[int, float]]]:
+    """Cost of an update over the number of points, for the first input, of who was measured at several sizes."""
+    lines: dict[str, list[tuple[int, float]]] = {}
+    for result in results:
+        if result["work"] == "window" and result["input"] == results[0]["input"]:
+            lines.setdefault(result["who"], []).append((result["n"], result["median"]))
+    return {who: points for who, points in lines.items() if len(points) > 1}
+
+
 def chart(results: list[dict], path: Path) -> None:
-    """Cost of an update over the number of points, for the first input."""
     import matplotlib as mpl
 
     mpl.use("svg" if path.suffix == ".svg" else "agg")
     import matplotlib.pyplot as plt
 
-    kind = results[0]["input"]
-    lines: dict[str, list[tuple[int, float]]] = {}
-    for result in results:
-        if result["work"] == "window" and result["input"] == kind:
-            lines.setdefault(result["who"], []).append((result["n"], result["median"]))
     figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
-    for who, points in lines.items():
-        axes.plot(*zip(*points, strict=True), marker="o", label=who, linewidth=2.5 if "dynhull" in who else 1)
-    axes.set(xscale="log", yscale="log", xlabel="points", ylabel="µs an update", title=f"A moving window, {kind}")
+    for who, points in growth(results).items():
+        label = f"{who}: slope {slope(points):.2f}"
+        axes.plot(*zip(*points, strict=True), marker="o", label=label, linewidth=2.5 if "dynhull" in who else 1)
+    axes.set(xscale="log", yscale="log", xlabel="points", ylabel="µs an update")
+    axes.set_title(f"A moving window, {results[0]['input']}")
     axes.grid(visible=True, which="both", alpha=0.2)
     axes.legend(fontsize=8)
     figure.savefig(path, dpi=120)
@@ -342,6 +374,8 @@ def main() -> None:
     print("| work | input | n | who | median | least | greatest | unit |")
     print("| --- | --- | ---: | --- | ---: | ---: | ---: | --- |")
     results = measure(arguments)
+    for who, points in growth(results).items():
+        print(f"slope of {who}: {slope(points):.2f}")
     if arguments.json:
         arguments.json.write_text(json.dumps(results, indent=1))
     if arguments.chart:

@@ -8,6 +8,7 @@
 // root exactly when the hull changed.
 #pragma once
 
+#include "build.hpp"
 #include "plan.hpp"
 
 namespace dynhull {
@@ -21,7 +22,7 @@ class Commit {
     if (count_ > FEW) {
       points_.resize(LEAF + count_);
       repeated_.resize(LEAF + count_);
-      leaves_.resize(leaves_for(LEAF + count_));
+      leaves_.resize(2 * leaves_for(LEAF + count_));
     }
     small_.reserve(count_);
   }
@@ -106,7 +107,7 @@ class Commit {
 
     nodes_.give_back(tree);
     if (total == 0) return found.tree = NONE, found;
-    found.tree = build(nodes_, points_.data(), total, leaves_.data());
+    found.tree = Building(nodes_, points_.data(), total, leaves_.data()).tree();
     std::size_t next = 0;
     for (std::size_t i = 0; i < leaves_for(total); ++i) {
       Leaf& part = nodes_.leaf(leaves_[i]);
@@ -215,8 +216,8 @@ class Commit {
   std::vector<std::uint32_t> candidates_[2];
   std::vector<Point> points_;  // of a leaf that is merged
   std::vector<std::uint8_t> repeated_;
-  std::vector<Ref> leaves_;
-  std::vector<Ref> small_;  // leaves to merge with their neighbours at the end
+  std::vector<Ref> leaves_;  // that it becomes, and room for their nodes
+  std::vector<Ref> small_;   // leaves to merge with their neighbours at the end
 };
 
 }  // namespace dynhull

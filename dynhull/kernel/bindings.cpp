@@ -93,11 +93,11 @@ class Hull {
     return removal == HullTree::Removal::HULL_CHANGED;
   }
 
-  nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing) {
+  nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing, std::optional<bool> together) {
     if (ops.shape(0) != rows.shape(0)) throw nb::value_error("ops and xy differ in length");
     const Applied applied = [&] {
       const Writing turn(turns_, rows.shape(0));
-      return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing);
+      return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing, together);
     }();
     return nb::make_tuple(applied.rows, applied.first_missing);
   }
@@ -213,9 +213,9 @@ class Hull {
     if (settled().version() != asked_version_) queries_ = 0;
     asked_version_ = tree_.version();
     queries_ += queries;
-    if (chains_.fresh(tree_) || !chains_.worthwhile(queries_)) return;
+    if (!chains_.stale(tree_, queries_)) return;
     const Writing turn(turns_);
-    if (!chains_.fresh(tree_)) chains_.refresh(tree_);
+    if (chains_.stale(tree_, queries_)) chains_.refresh(tree_, queries_);
   }
 
   HullTree tree_;
@@ -304,10 +304,10 @@ NB_MODULE(_kernel, module) {
       .def("insert", &Hull::insert, "x"_a.none(), "y"_a.none(), "Add a point. True where the hull changed. O(log² n).")
       .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
            "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
-      .def("apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a,
-           "Insert the rows with +1 and delete those with -1, as a set. Returns how many rows were applied, and the "
-           "first "
-           "row that deletes what is not there, or -1.")
+      .def(
+          "apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+          "Insert the rows with +1 and delete those with -1, as a set, together or one by one: the batch decides where "
+          "not told. Returns how many rows were applied, and the first row that deletes what is not there, or -1.")
       .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
       .def("chain", &Hull::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")

@@ -1,105 +1,50 @@
-// Building from sorted points, and sorting them.
+// Building from sorted points.
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include "shape.hpp"
+#include "threads.hpp"
 
 namespace dynhull {
 
-// Rows sort by their point, equal points by row number: a row has `p` and `row`.
-struct Row {
-  Point p;
-  std::int64_t row;
-};
-inline bool operator<(const Row& a, const Row& b) { return a.p < b.p || (a.p == b.p && a.row < b.row); }
-
-constexpr std::size_t SMALL_SORT = 32;       // below, insertion sort
-constexpr std::size_t ONE_PASS = 64 * LEAF;  // below, one counting pass instead of two
-
-// Insertion sort: linear for rows that are almost in order.
-template <class R>
-void insertion_sort(R* first, R* last) {
-  for (R* next = first + (first < last); next < last; ++next) {
-    const R row = *next;
-    R* gap = next;
-    for (; gap > first && row.p < gap[-1].p; --gap) *gap = gap[-1];
-    *gap = row;
-  }
-}
-
-// Scatter by a key below `buckets`, stably.
-template <class R, class Key>
-void counting_pass(const R* rows, R* target, std::size_t count, std::size_t buckets, Key key) {
-  std::vector<std::uint32_t> next(buckets);
-  for (std::size_t i = 0; i < count; ++i) ++next[key(rows[i])];
-  std::uint32_t sum = 0;
-  for (std::uint32_t& start : next) sum += std::exchange(start, sum);
-  for (std::size_t i = 0; i < count; ++i) target[next[key(rows[i])]++] = rows[i];
-}
-
-// Stable sort by point. Counting passes over x, mapped affinely to as many keys as there are rows or more, leave short
-// runs for insertion sort; long runs of almost equal x (clusters, columns) are mapped again, or compared. O(n) on most
-// inputs, O(n log n) on all.
-template <class R>
-void sort_by_point(R* rows, R* scratch, std::size_t count) {
-  if (count < SMALL_SORT) return insertion_sort(rows, rows + count);
-  const auto compare = [=] { std::stable_sort(rows, rows + count, [](const R& a, const R& b) { return a.p < b.p; }); };
-  double least = rows[0].p.x, greatest = least;
-  bool sorted = true;
-  for (std::size_t i = 1; i < count; ++i) {
-    least = std::min(least, rows[i].p.x);
-    greatest = std::max(greatest, rows[i].p.x);
-    sorted &= rows[i - 1].p <= rows[i].p;
-  }
-  if (sorted) return;
-  constexpr std::size_t DIGIT = 11;
-  const std::size_t keys = count < ONE_PASS ? std::bit_ceil(count) : std::size_t{1} << (2 * DIGIT);
-  const double scale = static_cast<double>(keys - 1) / (greatest - least);
-  if (!(scale > 0 && scale < INFINITE)) return compare();  // one column, or a width beyond every double
-  const auto key = [=](const R& row) {                     // monotone in x, whatever the rounding
-    return static_cast<std::uint32_t>((row.p.x - least) * scale);
-  };
-  if (count < ONE_PASS) {
-    counting_pass(rows, scratch, count, keys, key);
-    std::copy_n(scratch, count, rows);
-  } else {
-    constexpr std::uint32_t BUCKETS = 1u << DIGIT;
-    counting_pass(rows, scratch, count, BUCKETS, [=](const R& row) { return key(row) % BUCKETS; });
-    counting_pass(scratch, rows, count, BUCKETS, [=](const R& row) { return key(row) / BUCKETS; });
-  }
-  for (std::size_t from = 0, to; from < count; from = to) {
-    const std::uint32_t k = key(rows[from]);
-    for (to = from + 1; to < count && key(rows[to]) == k;) ++to;
-    if (to - from > count / 2) return compare();
-    if (to - from > 1) sort_by_point(rows + from, scratch + from, to - from);
-  }
-}
-
-// A balanced tree over leaves first..last.
-inline Ref balanced(Nodes& nodes, const Ref* first, const Ref* last) {
-  if (last - first == 1) return *first;
-  const Ref* middle = first + (last - first) / 2;
-  const Ref v = nodes.take_node();
-  nodes.link(v, 0, balanced(nodes, first, middle));
-  nodes.link(v, 1, balanced(nodes, middle, last));
-  nodes.node(v).separator = nodes.leaf(*middle).first();
-  refresh(nodes, v);
-  return v;
-}
-
 inline std::size_t leaves_for(std::size_t points) { return points <= LEAF ? 1 : (points + FILL - 1) / FILL; }
 
-// A detached subtree over sorted distinct points; `leaves` has room for leaves_for(count) of them, and so have nodes.
-inline Ref build(Nodes& nodes, const Point* points, std::size_t count, Ref* leaves) {
-  const std::size_t parts = leaves_for(count);
-  for (std::size_t i = 0; i < parts; ++i) {
-    const std::size_t from = count * i / parts, to = count * (i + 1) / parts;
-    leaves[i] = nodes.take_leaf();
-    nodes.leaf(leaves[i]).assign(points + from, static_cast<unsigned>(to - from));
+// A balanced tree over sorted distinct points. Its leaves and nodes are taken first, and two threads may fill them.
+class Building {
+ public:
+  // `refs` has room for twice leaves_for(count), and nodes have for as many leaves; the leaves come first.
+  Building(Nodes& nodes, const Point* points, std::size_t count, Ref* refs)
+      : nodes_(nodes), points_(points), count_(count), parts_(leaves_for(count)), leaves_(refs), inner_(refs + parts_) {
+    for (std::size_t i = 0; i < parts_; ++i) refs[i] = nodes.take_leaf();
+    for (std::size_t i = 1; i < parts_; ++i) refs[parts_ + i] = nodes.take_node();
   }
-  return balanced(nodes, leaves, leaves + parts);
-}
+
+  // The whole, detached. O(n).
+  Ref tree(bool threads = false) const { return subtree(0, parts_, threads); }
+
+ private:
+  std::size_t start(std::size_t leaf) const { return count_ * leaf / parts_; }
+
+  // The tree over the leaves first..last.
+  Ref subtree(std::size_t first, std::size_t last, bool threads) const {
+    if (last - first == 1) {
+      const std::size_t from = start(first), to = start(last);
+      nodes_.leaf(leaves_[first]).assign(points_ + from, static_cast<unsigned>(to - from));
+      return leaves_[first];
+    }
+    const std::size_t middle = first + (last - first) / 2;
+    const Ref v = inner_[middle];
+    both(
+        threads, [&] { nodes_.link(v, 0, subtree(first, middle, false)); },
+        [&] { nodes_.link(v, 1, subtree(middle, last, false)); });
+    nodes_.node(v).separator = points_[start(middle)];
+    refresh(nodes_, v);
+    return v;
+  }
+
+  Nodes& nodes_;
+  const Point* points_;
+  std::size_t count_, parts_;
+  const Ref *leaves_, *inner_;
+};
 
 }  // namespace dynhull

@@ -1,24 +1,34 @@
-// The two chains in flat arrays under a grid in x: for many queries between two changes of the hull.
+// The two chains in flat arrays under a grid in x, and before them boxes that tell of most points that they are inside:
+// for many queries between two changes of the hull.
 #pragma once
 
+#include <memory>
+
+#include "interior.hpp"
 #include "queries.hpp"
 
 namespace dynhull {
 
 class FlatChains {
  public:
-  // Whether so many queries since the last change pay for flattening, which costs about as much as a query a vertex.
-  bool worthwhile(std::uint64_t queries) const { return queries > vertices_ / 20 + 200; }
   bool fresh(const HullTree& tree) const { return version_ == tree.version(); }
 
+  // Whether so many queries since the hull's last change pay for a refresh: chains cost about as much as a query a
+  // vertex, boxes as much as BOXES_PAY queries.
+  bool stale(const HullTree& tree, std::uint64_t queries) const {
+    return fresh(tree) ? !interior_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
+  }
+
   // O(h log n).
-  void refresh(const HullTree& tree) {
+  void refresh(const HullTree& tree, std::uint64_t queries) {
     version_ = STALE;
     usable_ = false;
+    interior_.reset();
     for (Side side : SIDES) chain_[side] = tree.chain(side);
     const std::size_t longest = std::max(chain_[UPPER].size(), chain_[LOWER].size());
     vertices_ = chain_[UPPER].size() + chain_[LOWER].size();
     if (longest > 1 && longest < CELLS_LIMIT) lay_grid(2 * longest + 64);
+    if (queries > BOXES_PAY) interior_ = std::make_unique<Interior>(chain_[LOWER], chain_[UPPER]);
     version_ = tree.version();
   }
 
@@ -30,6 +40,7 @@ class FlatChains {
 
  private:
   static constexpr std::uint64_t STALE = ~std::uint64_t{0};
+  static constexpr std::uint64_t BOXES_PAY = 10'000;
   static constexpr std::size_t BLOCK = 32;  // queries whose memory accesses overlap
   static constexpr std::size_t CELLS_LIMIT = std::size_t{1} << 30;
   static constexpr std::uint32_t SCAN = 8;  // vertices of a cell to look through one by one
@@ -55,24 +66,32 @@ class FlatChains {
   std::size_t cell(double x) const { return static_cast<std::size_t>((x - least_) * scale_); }
 
   void locate_block(const HullTree& tree, const Point* points, std::size_t count, std::int8_t* where) const {
+    std::uint8_t rest[BLOCK];  // the queries that are left
+    std::size_t left_over = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      where[i] = 1;
+      rest[left_over] = static_cast<std::uint8_t>(i);
+      left_over += !(interior_ && interior_->holds(points[i]));
+    }
     std::size_t cells[BLOCK];
     std::uint32_t left[BLOCK][2];
-    for (std::size_t i = 0; i < count; ++i) {
-      const double x = points[i].x;
+    for (std::size_t k = 0; k < left_over; ++k) {
+      const double x = points[rest[k]].x;
       const bool within = usable_ & (x > least_) & (x < greatest_);
-      cells[i] = within ? cell(x) : NOWHERE;
-      prefetch(grid_.data() + (within ? cells[i] : 0));
+      cells[k] = within ? cell(x) : NOWHERE;
+      prefetch(grid_.data() + (within ? cells[k] : 0));
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (cells[i] == NOWHERE) continue;
+    for (std::size_t k = 0; k < left_over; ++k) {
+      if (cells[k] == NOWHERE) continue;
       for (Side side : SIDES) {
-        left[i][side] = std::max(grid_[cells[i]].before[side], 1u) - 1;
-        prefetch(chain_[side].data() + left[i][side]);
+        left[k][side] = std::max(grid_[cells[k]].before[side], 1u) - 1;
+        prefetch(chain_[side].data() + left[k][side]);
       }
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      const int found = cells[i] == NOWHERE ? 0 : filter(points[i], cells[i], left[i]);
-      where[i] = static_cast<std::int8_t>(found != 0 ? found : dynhull::locate(tree.nodes(), points[i]).where);
+    for (std::size_t k = 0; k < left_over; ++k) {
+      const Point p = points[rest[k]];
+      const int found = cells[k] == NOWHERE ? 0 : filter(p, cells[k], left[k]);
+      where[rest[k]] = static_cast<std::int8_t>(found != 0 ? found : dynhull::locate(tree.nodes(), p).where);
     }
   }
 
@@ -101,6 +120,7 @@ class FlatChains {
 
   std::vector<Point> chain_[2];
   std::vector<Cell> grid_;
+  std::unique_ptr<const Interior> interior_;
   double least_ = 0, greatest_ = 0, scale_ = 0;
   std::size_t vertices_ = 0;
   std::uint64_t version_ = STALE;

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "build.hpp"
+#include "sort.hpp"
 #include "update.hpp"
 
 namespace dynhull {

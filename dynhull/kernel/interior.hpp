@@ -1,4 +1,5 @@
-// Which points are certainly no vertices: a part of the inside of a hull, as one box for each column of x.
+// Which points are certainly inside, and so no vertices: a part of the inside of a hull, as one box for each column of
+// x.
 #pragma once
 
 #include <array>
@@ -17,12 +18,48 @@ class Interior {
  public:
   // Of a hull given by its vertices, counter-clockwise from the least.
   explicit Interior(std::span<const Point> vertices) {
-    boxes_.fill({INFINITY, -INFINITY});
-    if (vertices.size() < 3) return;
+    if (vertices.empty()) return;
     const auto greatest = std::max_element(vertices.begin(), vertices.end());
-    const std::vector<Point> lower(vertices.begin(), greatest + 1);
     std::vector<Point> upper = {vertices.front()};
     upper.insert(upper.end(), vertices.rbegin(), std::make_reverse_iterator(greatest));
+    lay_boxes({vertices.begin(), greatest + 1}, upper);
+  }
+  // Of a hull given by its chains, from left to right.
+  Interior(std::span<const Point> lower, std::span<const Point> upper) { lay_boxes(lower, upper); }
+
+  // False also where it cannot tell.
+  bool holds(Point p) const {
+    const Box& box = boxes_[columns_(p.x)];
+    return (box.low < p.y) & (p.y < box.high);
+  }
+
+  // How many of the points it does not hold; they go to `outside`, which has room for all. Those with coordinates that
+  // are not finite are among them.
+  std::size_t discard(std::span<const Point> points, Point* outside) const {
+    const Columns columns = columns_;  // a copy that `outside` cannot overlap stays in registers
+    std::size_t count = 0;
+    for (Point p : points) {
+      const Box& box = boxes_[columns(p.x)];
+      if (!(box.low < p.y && p.y < box.high)) outside[count++] = p;
+    }
+    return count;
+  }
+
+ private:
+  static constexpr unsigned COLUMNS = 1024;
+  static constexpr double OVERLAP = 0x1p-6;  // of columns, in widths, for rounding
+  static constexpr double MARGIN = 0x1p-20;  // of a box, in heights, for rounding
+  struct Box {
+    double low, high;
+  };
+  static std::array<Box, COLUMNS> no_boxes() {
+    std::array<Box, COLUMNS> boxes;
+    boxes.fill({INFINITY, -INFINITY});
+    return boxes;
+  }
+
+  void lay_boxes(std::span<const Point> lower, std::span<const Point> upper) {
+    if (lower.size() + upper.size() < 5) return;
     const double left = lower.front().x, right = lower.back().x;
     columns_ = Columns(left, right, COLUMNS);
     const double width = (right - left) / (COLUMNS - 1);
@@ -46,29 +83,9 @@ class Interior {
     }
   }
 
-  // How many of the points it does not hold; they go to `outside`, which has room for all. Those with coordinates that
-  // are not finite are among them.
-  std::size_t discard(std::span<const Point> points, Point* outside) const {
-    const Columns columns = columns_;  // a copy that `outside` cannot overlap stays in registers
-    std::size_t count = 0;
-    for (Point p : points) {
-      const Box& box = boxes_[columns(p.x)];
-      if (!(box.low < p.y && p.y < box.high)) outside[count++] = p;
-    }
-    return count;
-  }
-
- private:
-  static constexpr unsigned COLUMNS = 1024;
-  static constexpr double OVERLAP = 0x1p-6;  // of columns, in widths, for rounding
-  static constexpr double MARGIN = 0x1p-20;  // of a box, in heights, for rounding
-  struct Box {
-    double low, high;
-  };
-
   // A chain's edge at growing x, strictly between the chain's ends.
   struct Walk {
-    explicit Walk(const std::vector<Point>& chain) : edge(chain.data()) {}
+    explicit Walk(std::span<const Point> chain) : edge(chain.data()) {}
     void advance(double x) {
       while (edge[1].x < x) ++edge;
     }
@@ -80,7 +97,7 @@ class Interior {
   };
 
   Columns columns_;
-  std::array<Box, COLUMNS> boxes_;
+  std::array<Box, COLUMNS> boxes_ = no_boxes();
 };
 
 }  // namespace dynhull

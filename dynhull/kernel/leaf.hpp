@@ -120,39 +120,51 @@ struct Leaf {
     return {before ? (*this)[highest(before)] : LOWEST, after ? (*this)[lowest(after)] : HIGHEST};
   }
 
-  // The strict chain of the entries from..to, as a mask. The scan keeps to entries outside the chord: all vertices are.
+  // The strict chain of the entries from..to, as a mask (Andrew 1979).
   Mask scan(Side side, unsigned from, unsigned to) const {
-    Mask mask = bit(from) | bit(to);
-    const Point a = (*this)[from], b = (*this)[to];
-    for (unsigned i = from + 1; i < to; ++i) {
-      const Point p = (*this)[i];
-      if (turned(side, orientation(a, b, p)) <= 0) continue;
-      Mask kept = mask & below(i);
-      unsigned top = highest(kept);
+    Mask mask = bit(from);
+    unsigned top = from;
+    const auto push = [&](unsigned i) {
       while (top > from) {
-        const unsigned under = highest(kept & below(top));
-        if (turned(side, orientation((*this)[under], (*this)[top], p)) < 0) break;
-        kept &= ~bit(top);
+        const unsigned under = highest(mask & below(top));
+        if (turned(side, orientation((*this)[under], (*this)[top], (*this)[i])) < 0) break;
+        mask &= ~bit(top);
         top = under;
       }
-      mask = kept | bit(i) | bit(to);
-    }
-    return settled(side, mask, to);
+      mask |= bit(i);
+      top = i;
+    };
+    for (Mask rest = perhaps_vertices(side, from, to); rest; rest &= rest - 1) push(lowest(rest));
+    if (to > from) push(to);
+    return mask;
   }
 
  private:
   static Mask opened(Mask mask, unsigned i) { return (mask & below(i)) | (mask & ~below(i)) << 1; }
   static Mask closed(Mask mask, unsigned i) { return (mask & below(i)) | ((mask >> 1) & ~below(i)); }
 
-  // Drop what the last point of a scanned chain covers.
-  Mask settled(Side side, Mask mask, unsigned to) const {
-    Mask kept = mask & below(to);
-    while (several(kept)) {
-      const unsigned top = highest(kept), under = highest(kept & below(top));
-      if (turned(side, orientation((*this)[under], (*this)[top], (*this)[to])) < 0) break;
-      kept &= ~bit(top);
+  // The entries between two, but for those that lie inside the chord or inside the triangle of the chord and the entry
+  // farthest outside: as far as floating point can tell, which costs no branch.
+  Mask perhaps_vertices(Side side, unsigned from, unsigned to) const {
+    const Point a = (*this)[from], b = (*this)[to];
+    const Chord chord(side, a, b);
+    Mask outside = 0;
+    double most = 0;
+    unsigned apex = from;
+    for (unsigned i = from + 1; i < to; ++i) {
+      const Chord::Distance distance = chord.distance((*this)[i]);
+      outside |= Mask{!distance.certainly_inside()} << i;
+      apex = distance.value > most ? i : apex;
+      most = std::max(most, distance.value);
     }
-    return kept | bit(to);
+    if (!several(outside) || apex == from) return outside;
+    const Chord chords[] = {Chord(side, (*this)[apex], b), Chord(side, a, (*this)[apex])};
+    Mask kept = bit(apex);
+    for (Mask rest = outside & ~bit(apex); rest; rest &= rest - 1) {
+      const unsigned i = lowest(rest);
+      kept |= Mask{!chords[i < apex].distance((*this)[i]).certainly_inside()} << i;
+    }
+    return kept;
   }
 
   // Put entry i on the chain where it lies outside, and take off what it covers.

@@ -73,6 +73,28 @@ inline int orientation_filter(Point a, Point b, Point c) {
   return (det > bound) - (-det > bound);
 }
 
+// The filter for many points and one line, from a to b: how far outside of it they lie, as a multiple of any size.
+class Chord {
+ public:
+  struct Distance {
+    double value, bound;
+    bool certainly_inside() const { return -value > bound; }
+  };
+
+  Chord(Side side, Point a, Point b)
+      : b_(b), width_(turned(side, 1) * (a.x - b.x)), rise_(turned(side, 1) * (a.y - b.y)) {}
+
+  Distance distance(Point p) const {
+    const double left = (p.x - b_.x) * rise_;
+    const double right = (p.y - b_.y) * width_;
+    return {left - right, ORIENT_BOUND * (std::abs(left) + std::abs(right)) + UNDERFLOW_SLACK};
+  }
+
+ private:
+  Point b_;
+  double width_, rise_;
+};
+
 // +1 where a, b, c turn left, -1 where they turn right, 0 where they lie on one line.
 inline int orientation(Point a, Point b, Point c) {
   const int sign = orientation_filter(a, b, c);

@@ -19,7 +19,7 @@ class Cursor {
 
   void go_left() {  // the sought vertex is a, or left of it
     if (is_leaf(tree_)) {
-      last_ = middle_;
+      chain_ &= before_;
       halve();
     } else {
       highest_ = a;
@@ -29,7 +29,7 @@ class Cursor {
   }
   void go_right() {  // the sought vertex is b, or right of it
     if (is_leaf(tree_)) {
-      first_ = middle_ + 1;
+      chain_ &= ~before_;
       halve();
     } else {
       lowest_ = b;
@@ -54,28 +54,28 @@ class Cursor {
       }
     }
     const Leaf& leaf = nodes_.leaf(tree_);
+    leaf.fetch();
     Mask mask = leaf.chain[side_];
     if (lowest_ > leaf.first()) mask &= ~below(leaf.find(lowest_));
     if (highest_ < leaf[leaf.size - 1]) mask &= below(leaf.find(highest_) + 1);
-    first_ = last_ = 0;
-    for (; mask; mask &= mask - 1) slots_[last_++] = static_cast<std::uint8_t>(lowest(mask));
-    --last_;
+    chain_ = mask;
     halve();
   }
+  // Halve what is left of a leaf's chain by entries, not by vertices: that needs no list of them.
   void halve() {
     const Leaf& leaf = nodes_.leaf(tree_);
-    middle_ = (first_ + last_) / 2;
-    single = middle_ == last_;
-    a = leaf[slots_[middle_]];
-    b = single ? a : leaf[slots_[middle_ + 1]];
+    const unsigned first = lowest(chain_), last = highest(chain_);
+    single = first == last;
+    before_ = chain_ & below((first + last) / 2 + 1);
+    a = leaf[highest(before_)];
+    b = single ? a : leaf[lowest(chain_ & ~before_)];
   }
 
   const Nodes& nodes_;
   Side side_;
   Ref tree_;
   Point lowest_, highest_;
-  unsigned first_, last_, middle_;
-  std::uint8_t slots_[LEAF];
+  Mask chain_, before_;  // of a leaf: what is left of its chain, and the part up to a
 };
 
 // Where the tangent from p, right of the chain and outside of it, touches the chain; the farther of two.

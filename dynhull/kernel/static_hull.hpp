@@ -5,29 +5,15 @@
 // threads share each pass over the points, and then take a chain each.
 #pragma once
 
-#include <future>
 #include <memory>
 #include <optional>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "interior.hpp"
+#include "threads.hpp"
 
 namespace dynhull {
-
-// Run both, at the same time where asked to and possible.
-template <class First, class Second>
-void both(bool threads, First first, Second second) {
-  std::future<void> other;
-  if (threads) try {
-      other = std::async(std::launch::async, second);
-    } catch (const std::system_error&) {  // no thread to be had
-    }
-  first();
-  other.valid() ? other.get() : second();
-}
 
 // The hull of points in two parts. It stays in its bounds even where the points change meanwhile.
 class StaticHull {
@@ -180,7 +166,7 @@ inline std::optional<Interior> interior_of(const Point* points, std::size_t coun
 inline StaticHull static_hull(const Point* points, std::size_t count, Means means = {}) {
   constexpr std::size_t MANY = std::size_t{1} << 17, DISCARDED_FOR_ONE_PLACED = 16;  // in the same time
   const auto threads = [&](std::size_t placed) {
-    return means.threads.value_or(placed >= MANY && std::thread::hardware_concurrency() > 1);
+    return means.threads.value_or(placed >= MANY && several_processors());
   };
   const std::size_t half = count / 2;
   const StaticHull::Part first(points, half), second(points + half, count - half);

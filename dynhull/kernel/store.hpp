@@ -23,6 +23,10 @@ constexpr bool allocation_fails() { return false; }
 
 namespace memory {
 
+constexpr std::size_t PAGE = 4096;
+
+inline std::size_t whole_pages(std::size_t bytes) { return bytes > PAGE ? (bytes + PAGE - 1) / PAGE * PAGE : bytes; }
+
 #ifdef __linux__
 constexpr std::size_t HUGE_PAGE = std::size_t{1} << 21;
 
@@ -78,6 +82,24 @@ inline void release(void* data, [[maybe_unused]] std::size_t bytes) {
 
 }  // namespace memory
 
+// A fixed number of plain records, not initialised.
+template <class Record>
+class Buffer {
+ public:
+  explicit Buffer(std::size_t count)
+      : bytes_(memory::whole_pages(count * sizeof(Record))),
+        data_(static_cast<Record*>(bytes_ > 0 ? memory::resize(nullptr, 0, bytes_) : nullptr)) {}
+  Buffer(const Buffer&) = delete;
+  ~Buffer() { memory::release(data_, bytes_); }
+
+  Record* data() const { return data_; }
+  Record& operator[](std::size_t i) const { return data_[i]; }
+
+ private:
+  std::size_t bytes_;
+  Record* data_;
+};
+
 // Slots are handed out by number, freed ones first; `reserve` may throw, nothing else does.
 template <class Record>
 class Store {
@@ -107,10 +129,7 @@ class Store {
     if (needed <= capacity_ + freed_) return;
     std::size_t capacity = std::max<std::size_t>({needed - freed_, std::size_t{capacity_} + capacity_ / 8, 2});
     if (capacity >= NOWHERE / 2) throw std::bad_alloc();
-    if (capacity * sizeof(Record) > PAGE) {  // whole pages
-      const std::size_t pages = (capacity * sizeof(Record) + PAGE - 1) / PAGE;
-      capacity = (pages * PAGE) / sizeof(Record);
-    }
+    capacity = memory::whole_pages(capacity * sizeof(Record)) / sizeof(Record);
     data_ = static_cast<Record*>(memory::resize(data_, bytes(), whole_pages(capacity)));
     capacity_ = static_cast<std::uint32_t>(capacity);
   }
@@ -141,13 +160,9 @@ class Store {
   }
 
  private:
-  static constexpr std::size_t PAGE = 4096;
   static constexpr std::uint32_t NOWHERE = ~std::uint32_t{0};
 
-  static std::size_t whole_pages(std::size_t capacity) {
-    const std::size_t bytes = capacity * sizeof(Record);
-    return bytes > PAGE ? (bytes + PAGE - 1) / PAGE * PAGE : bytes;
-  }
+  static std::size_t whole_pages(std::size_t capacity) { return memory::whole_pages(capacity * sizeof(Record)); }
   std::size_t bytes() const { return whole_pages(capacity_); }
   std::uint32_t& link(std::uint32_t i) { return reinterpret_cast<std::uint32_t&>(data_[i]); }
 

@@ -1,6 +1,8 @@
 // HullTree: a multiset of points and its convex hull, as in dynhull/tree.py, which explains the algorithm.
 #pragma once
 
+#include <optional>
+
 #include "batch.hpp"
 #include "sequence.hpp"
 
@@ -19,18 +21,20 @@ class HullTree {
 
   HullTree() = default;
   HullTree(const Point* points, std::size_t count) {
-    std::vector<Bare> sorted(count), scratch(count);
-    for (std::size_t i = 0; i < count; ++i) sorted[i] = {points[i]};
-    sort_by_point(sorted.data(), scratch.data(), count);
-    std::size_t kept = 0;
-    for (std::size_t i = 0, next; i < count; i = next) {
-      for (next = i + 1; next < count && sorted[next].p == sorted[i].p; ++next) {
+    static_assert(sizeof(Bare) == sizeof(Point));
+    const Buffer<Bare> rows(count), scratch(count);
+    std::transform(points, points + count, rows.data(), [](Point p) { return Bare{p}; });
+    Bare* const sorted = sort(rows.data(), scratch.data(), count);
+    const auto same = [](Bare a, Bare b) { return a.p == b.p; };
+    const auto first_pair = std::adjacent_find(sorted, sorted + count, same) - sorted;
+    auto kept = static_cast<std::size_t>(first_pair);
+    for (std::size_t i = kept, next; i < count; i = next) {
+      for (next = i + 1; next < count && same(sorted[next], sorted[i]); ++next) {
       }
       if (next - i > 1) copies_.emplace(sorted[i].p, next - i);
       sorted[kept++] = sorted[i];
     }
-    static_assert(sizeof(Bare) == sizeof(Point));
-    nodes_ = built(reinterpret_cast<const Point*>(sorted.data()), kept);
+    nodes_ = built(reinterpret_cast<const Point*>(sorted), kept);
     size_ = count;
     distinct_ = kept;
     mark_repeated();
@@ -86,14 +90,16 @@ class HullTree {
   }
 
   // Insert the rows with +1 and delete those with -1, as a set. With a row that deletes what is not there nothing is
-  // applied, unless missing points are to be ignored.
-  Applied apply(const std::int8_t* ops, const Point* points, std::size_t count, bool ignore_missing) {
+  // applied, unless missing points are to be ignored. Together or one by one, the batch decides where not told.
+  Applied apply(const std::int8_t* ops, const Point* points, std::size_t count, bool ignore_missing,
+                std::optional<bool> together = {}) {
     Groups groups(ops, points, count);
     groups.descend(nodes_);
-    if (nodes_.root != NONE && groups.inserts < distinct_ && groups.size() < CROWDED * groups.touched_leaves())
-      apply_one_by_one(groups, ignore_missing);
-    else
+    const bool crowded = groups.inserts >= distinct_ || groups.size() >= CROWDED * groups.touched_leaves();
+    if (nodes_.root == NONE || together.value_or(crowded))
       apply_together(groups, ignore_missing);
+    else
+      apply_one_by_one(groups, ignore_missing);
     if (groups.first_missing >= 0 && !ignore_missing) return {0, groups.first_missing};
     return {groups.rows_applied, groups.first_missing};
   }
@@ -165,14 +171,25 @@ class HullTree {
     return true;
   }
 
+  static Bare* sort(Bare* rows, Bare* scratch, std::size_t count) {
+    if (two_threads(count)) return sort_in_two(rows, scratch, count);
+    sort_by_point(rows, scratch, count);
+    return rows;
+  }
+
   static Nodes built(const Point* points, std::size_t count) {
     Nodes nodes;
     if (count == 0) return nodes;
-    const std::size_t parts = leaves_for(count);
-    std::vector<Ref> leaves(parts);
-    nodes.reserve(parts);
-    nodes.root = build(nodes, points, count, leaves.data());
+    std::vector<Ref> refs(2 * leaves_for(count));
+    nodes.reserve(leaves_for(count));
+    nodes.root = Building(nodes, points, count, refs.data()).tree(two_threads(count));
     return nodes;
+  }
+
+  // Whether the work on so many points pays for a second thread.
+  static bool two_threads(std::size_t count) {
+    constexpr std::size_t MANY = std::size_t{1} << 17;
+    return count >= MANY && several_processors();
   }
 
   void mark_repeated() {

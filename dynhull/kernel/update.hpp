@@ -38,11 +38,11 @@ inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
 // chain turns before it gets there, and p lies inside the bridge's line.
 inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
   for (; v != NONE; v = nodes.node(v).parent) {
-    const Node& node = nodes.node(v);
     Edge& edge = nodes.bridge(v, side);
+    if ((neighbours.b < edge.a) | (neighbours.a > edge.b)) continue;
+    const Node& node = nodes.node(v);
     const bool on_left = p < node.separator;
     const bool beyond = on_left ? p < edge.a : p > edge.b;
-    if (on_left ? neighbours.b < edge.a : neighbours.a > edge.b) continue;
     const int turn = turned(side, orientation(edge.a, edge.b, p));
     if (turn > 0 || (turn == 0 && beyond)) {
       if (on_left) {
@@ -59,16 +59,24 @@ inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours
   return true;
 }
 
+// The bridge of v anew, after `gone`, one of its ends, left its child's chain. That chain has sunk below the old
+// bridge, so that at its other end the bridge stays or moves towards the separator.
+inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone) {
+  const Node& node = nodes.node(v);
+  const Edge& old = nodes.bridge(v, side);
+  const bool on_left = gone == old.a;
+  return find_bridge(Cursor(nodes, node.child[0], side, on_left ? LOWEST : old.a, HIGHEST),
+                     Cursor(nodes, node.child[1], side, LOWEST, on_left ? old.b : HIGHEST), side, node.separator);
+}
+
 // Repair the bridges from v up for p, gone from the chain below, as far as p was on it. True where to the root.
 inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side) {
   for (; v != NONE; v = nodes.node(v).parent) {
     Edge& edge = nodes.bridge(v, side);
-    if (p == edge.a || p == edge.b) {
-      const Node& node = nodes.node(v);
-      edge = bridge_of(nodes, node.child[0], node.child[1], side, node.separator);
-    } else if (p > edge.a && p < edge.b) {
+    if ((p == edge.a) | (p == edge.b))
+      edge = bridge_after(nodes, v, side, p);
+    else if ((p > edge.a) & (p < edge.b))
       return false;
-    }
   }
   return true;
 }

@@ -149,6 +149,24 @@ def test_a_window_that_moves(kind):
     both.agree()
 
 
+@pytest.mark.parametrize("kind", ["uniform", "grid", "columns"])
+def test_build_by_two_threads(kind):
+    rows = cloud(kind, 150_000, np.random.default_rng(3))
+    hull = _kernel.HullTree(rows)
+    hull.check()
+    np.testing.assert_array_equal(hull.points(), rows[np.lexsort(rows.T[::-1])])
+
+
+@pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])
+def test_locate_in_one_batch_or_many(kind):
+    random = np.random.default_rng(5)
+    hull = _kernel.HullTree(cloud(kind, 500, random))
+    around = hull.vertices().mean(axis=0) + 1.2 * (cloud(kind, 15_000, random) - hull.vertices().mean(axis=0))
+    queries = np.concatenate([around, hull.points(), hull.vertices()])
+    parts = [hull.copy().locate(part) for part in np.array_split(queries, len(queries) // 100)]
+    np.testing.assert_array_equal(hull.locate(queries), np.concatenate(parts))
+
+
 @given(a=point, b=point, c=point)
 def test_orientation(a, b, c):
     assert _kernel.orientation(a, b, c) == oracle.turn(a, b, c)

@@ -10,6 +10,7 @@
 from .async_client import AsyncHullClient
 from .async_ingest import AsyncIngest
 from .async_watch import AsyncWatch
+from .async_writer import AsyncWriter
 from .client import HullClient
 from .errors import (
     DeadlineError,
@@ -21,6 +22,7 @@ from .errors import (
     LimitExceededError,
     PermissionDeniedError,
     PointMissingError,
+    ProducerInUseError,
     RevisionForgottenError,
     SequenceGapError,
     UnauthenticatedError,
@@ -49,12 +51,14 @@ from .messages import (
     Verification,
 )
 from .watch import Watch
+from .writer import Writer
 
 __all__ = [
     "Applied",
     "AsyncHullClient",
     "AsyncIngest",
     "AsyncWatch",
+    "AsyncWriter",
     "ChanRound",
     "Change",
     "Counted",
@@ -78,6 +82,7 @@ __all__ = [
     "Measures",
     "PermissionDeniedError",
     "PointMissingError",
+    "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
     "SequenceGapError",
@@ -89,4 +94,5 @@ __all__ = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Writer",
 ]

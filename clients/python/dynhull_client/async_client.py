@@ -10,6 +10,7 @@ import grpc
 from . import calls
 from .async_ingest import AsyncIngest
 from .async_watch import AsyncWatch
+from .async_writer import AsyncWriter
 from .calls import Call
 from .connection import Connection
 from .errors import error_of
@@ -54,6 +55,7 @@ class AsyncHullClient(Connection):
     verify = _answering(calls.verify)
     ingest = opening(AsyncIngest, calls.ingest)
     watch = opening(AsyncWatch, calls.watch)
+    writer = opening(AsyncWriter, calls.writer)
 
     async def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> AsyncIterator[HullInfo]:
         """The hulls whose names begin with `prefix`, in the order of their names, fetched as they are wanted."""
@@ -66,6 +68,7 @@ class AsyncHullClient(Connection):
 
     async def close(self) -> None:
         """Close the connection; calls under way end."""
+        self._closed = True
         await self.channel.close()
 
     async def __aenter__(self) -> Self:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -9,33 +10,43 @@ import grpc
 
 from .calls import Watching
 from .connection import Connection
-from .errors import error_of
-from .messages import Event, decode_event
+from .errors import DynhullError, error_of
+from .messages import Event
+from .place import Place
 
 
 class AsyncWatch(AsyncIterator[Event]):
     """`Watch` for asyncio: an async iterator and an async context manager; `close` may be called by another task."""
 
     def __init__(self, connection: Connection, watching: Watching) -> None:
-        self._call = connection.begin(connection.stub.Watch, watching.request, watching.timeout)
-        self._closed = False
+        self._connection = connection
+        self._place = Place(watching)
+        self._closed = asyncio.Event()
+        self._begin()
+
+    @property
+    def lost(self) -> DynhullError | None:
+        """What the connection was lost with; None while there is one. For other tasks to look at."""
+        return self._place.lost
 
     async def __anext__(self) -> Event:
-        try:
-            message = await self._call.read()
-        except grpc.RpcError as error:
-            raise error_of(error) from None
-        except asyncio.CancelledError:
-            if self._closed:
-                raise StopAsyncIteration from None
-            raise
-        if message is grpc.aio.EOF:
-            raise StopAsyncIteration
-        return decode_event(message)
+        while not self._closed.is_set():
+            try:
+                return self._place.take(await anext(self._events))
+            except grpc.RpcError as failure:
+                pause = self._place.pause_after(error_of(failure))
+            except asyncio.CancelledError:
+                if self._closed.is_set():
+                    break
+                raise
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._closed.wait(), pause)
+            self._begin()
+        raise StopAsyncIteration
 
     async def close(self) -> None:
         """End the watch."""
-        self._closed = True
+        self._closed.set()
         self._call.cancel()
 
     async def __aenter__(self) -> Self:
@@ -45,3 +56,7 @@ class AsyncWatch(AsyncIterator[Event]):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         await self.close()
+
+    def _begin(self) -> None:
+        self._call = self._connection.begin(self._connection.stub.Watch, self._place.request, self._place.timeout())
+        self._events = aiter(self._call)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Generic, TypeVar
+from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
@@ -235,10 +236,63 @@ def ingest(name: str, *, missing: Missing = "raise", timeout: float | None = Non
 
 
 @dataclass(frozen=True, slots=True)
+class Writing:
+    """A writer to be opened."""
+
+    name: str
+    producer: str
+    batch_points: int
+    linger: float
+    in_flight: int
+    missing: Missing
+    stop_on_error: bool
+    patience: float
+
+
+def writer(
+    name: str,
+    *,
+    producer: str | None = None,
+    batch_points: int = 8192,
+    linger: float = 0.02,
+    in_flight: int = 32,
+    missing: Missing = "raise",
+    stop_on_error: bool = False,
+    patience: float = 60.0,
+) -> Writing:
+    """A writer that gathers points into batches, each applied exactly once, for use in a with statement.
+
+    >>> with client.writer("fleet") as writer:  # doctest: +SKIP
+    ...     for before, after in moves:
+    ...         writer.put(move=(before, after))
+
+    It needs at most about `in_flight + 1` batches of memory: `put` waits while that many are not acknowledged.
+
+    Args:
+        name: the hull.
+        producer: who numbers the batches. A writer of the same name goes on where an earlier one was acknowledged;
+            without, a new name. Two at a time must not have the same.
+        batch_points: a batch is sent when it has so many points, or more.
+        linger: or so many seconds after its first ones.
+        in_flight: at most so many batches are under way at a time.
+        missing: as of `apply`.
+        stop_on_error: whether a refused batch ends the writer; else the batches after it are applied all the same.
+        patience: seconds without a server until the writer gives up.
+    """
+    for argument, value in (("batch_points", batch_points), ("in_flight", in_flight)):
+        if value < 1:
+            raise ValueError(f"{argument} must be at least 1, got {value}")
+    producer = f"writer-{uuid4().hex}" if producer is None else producer
+    return Writing(name, producer, batch_points, linger, in_flight, missing, stop_on_error, patience)
+
+
+@dataclass(frozen=True, slots=True)
 class Watching:
     """A watch to be made."""
 
     request: pb.WatchRequest
+    copy: HullCopy | None
+    reconnect: bool
     timeout: float | None
 
 
@@ -249,11 +303,17 @@ def watch(
     max_rate: float = 0.0,
     progress_interval: float | None = None,
     measures: bool = False,
+    copy: HullCopy | None = None,
     resume: HullCopy | None = None,
     directions: npt.ArrayLike | None = None,
+    reconnect: bool = True,
     timeout: float | None = None,
 ) -> Watching:
     """Follow a hull: an iterator of events, with which a `HullCopy` keeps a copy of the hull.
+
+    >>> copy = HullCopy()
+    >>> for event in client.watch("fleet", copy=copy):  # doctest: +SKIP
+    ...     print(event.revision, len(copy.vertices))
 
     Args:
         name: the hull.
@@ -261,23 +321,30 @@ def watch(
         max_rate: at most so many events a second; 0 for no bound. Changes in between are taken together.
         progress_interval: a Progress after so many seconds without an event; None for none.
         measures: whether events carry measures.
-        resume: a copy to bring up to date: changes since then instead of a snapshot. RevisionForgottenError where
-            the server cannot.
+        copy: a copy that the watch brings up to date itself, before it returns an event. What it holds already is
+            gone on from.
+        resume: a copy that the caller brings up to date with the events: changes since then instead of a snapshot.
         directions: (k, 2) vectors; instead of vertices, `Sketch` events with the extreme vertices in these.
+        reconnect: whether the watch goes on by itself after a lost connection, for as long as it takes: with what has
+            changed since, or with a snapshot where the server has forgotten that. The first connection must come about.
+            Otherwise UnavailableError, and RevisionForgottenError where the server cannot go on from a copy.
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """
     request = pb.WatchRequest(
         name=name, min_revision=min_revision, max_events_per_second=max_rate, include_measures=measures
     )
-    if resume is not None:
-        request.resume.uid, request.resume.revision = resume.uid, resume.revision
+    if copy is not None and resume is not None:
+        raise ValueError("give a copy for the watch to keep, or one to resume from, not both")
+    held = copy if copy is not None and copy.uid else resume
+    if held is not None:
+        request.resume.uid, request.resume.revision = held.uid, held.revision
     if directions is not None:
         request.directions.CopyFrom(_encoded(directions, "directions"))
     if progress_interval is not None:
         duration = Duration()
         duration.FromTimedelta(timedelta(seconds=progress_interval))
         request.progress_interval.CopyFrom(duration)
-    return Watching(request, timeout)
+    return Watching(request, copy, reconnect, timeout)
 
 
 def _encoded(xy: npt.ArrayLike, name: str) -> Any:

@@ -15,6 +15,7 @@ from .ingest import Ingest
 from .messages import HullInfo
 from .methods import documented, opening
 from .watch import Watch
+from .writer import Writer
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -50,6 +51,7 @@ class HullClient(Connection):
     verify = _answering(calls.verify)
     ingest = opening(Ingest, calls.ingest)
     watch = opening(Watch, calls.watch)
+    writer = opening(Writer, calls.writer)
 
     def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[HullInfo]:
         """The hulls whose names begin with `prefix`, in the order of their names, fetched as they are wanted."""
@@ -61,6 +63,7 @@ class HullClient(Connection):
 
     def close(self) -> None:
         """Close the connection; calls under way end."""
+        self._closed = True
         self.channel.close()
 
     def __enter__(self) -> Self:

@@ -8,6 +8,7 @@ import grpc
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 from .calls import Call
+from .errors import DynhullError
 from .retry import Attempts
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
@@ -15,8 +16,14 @@ DEFAULT_TIMEOUT = 30.0
 DEFAULT_RETRIES = 3
 MAX_MESSAGE_BYTES = 2**31 - 1
 
-# The server's limit is the one that counts.
-OPTIONS = [("grpc.max_receive_message_length", MAX_MESSAGE_BYTES), ("grpc.max_send_message_length", MAX_MESSAGE_BYTES)]
+OPTIONS = [
+    # The server's limits are the ones that count.
+    ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
+    ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
+    # A server that was restarted is found within a second; by default gRPC may take two minutes.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+]
 
 
 class Connection:
@@ -54,6 +61,7 @@ class Connection:
         self._timeout = timeout
         self._retries = retries
         self._wait_for_ready = wait_for_ready
+        self._closed = False
         # Call credentials would do the same, but gRPC sends them over TLS only, and a local server needs none of that.
         self._metadata = () if token is None else (("authorization", f"Bearer {token}"),)
         if tls is None:
@@ -64,6 +72,8 @@ class Connection:
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call: a method of the stub with a message, or with an iterator of messages."""
+        if self._closed:
+            raise DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
         return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
 
     def attempts(self, call: Call[Any]) -> Attempts:

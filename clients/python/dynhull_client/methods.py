@@ -9,6 +9,7 @@ from .connection import Connection
 P = ParamSpec("P")
 Description = TypeVar("Description")
 Stream = TypeVar("Stream")
+Client = TypeVar("Client", bound=Connection)
 
 Function = Callable[..., Any]
 
@@ -31,11 +32,11 @@ def documented(method: Function, describe: Function, returns: object = None) -> 
 
 
 def opening(
-    kind: Callable[[Connection, Description], Stream], describe: Callable[P, Description]
-) -> Callable[Concatenate[Connection, P], Stream]:
+    kind: Callable[[Client, Description], Stream], describe: Callable[P, Description]
+) -> Callable[Concatenate[Client, P], Stream]:
     """The method that opens a stream of the given kind."""
 
-    def method(self: Connection, /, *arguments: P.args, **options: P.kwargs) -> Stream:
+    def method(self: Client, /, *arguments: P.args, **options: P.kwargs) -> Stream:
         return kind(self, describe(*arguments, **options))
 
     documented(method, describe, kind)
