@@ -42,6 +42,31 @@ def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
     return _finite(_as_double(array, name), name) + 0.0
 
 
+def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
+    """Return (k, dimension) directions, checked like `as_points`; none of them is zero."""
+    vectors = as_rows(directions, "directions")
+    if len(vectors) and vectors.shape[1] != dimension:
+        raise ValueError(f"directions must have shape (k, {dimension}), got {vectors.shape}")
+    zero = np.flatnonzero(~vectors.any(axis=1))
+    if zero.size:
+        raise ValueError(f"directions row {zero[0]} is {_text(vectors[zero[0]])}: no direction")
+    return np.ascontiguousarray(vectors.reshape(-1, dimension))
+
+
+def as_tuples(points: Points) -> list[tuple[float, float]]:
+    """The rows of an (n, 2) array, for code that looks at one point at a time."""
+    return [(x, y) for x, y in points.tolist()]
+
+
+def as_vector(value: npt.ArrayLike, name: str) -> Points:
+    """Return one point or vector of two or more finite coordinates."""
+    array = np.asarray(value)
+    if array.ndim != 1 or len(array) < 2:
+        raise ValueError(f"{name} must have shape (d,), d at least 2, got {array.shape}")
+    vector: Points = as_rows(array[None], name)[0]
+    return vector
+
+
 def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
     """Return `xy` as a float64 array of shape (..., 2), checked like `as_points`."""
     array = _as_array(xy, name)
@@ -73,6 +98,8 @@ def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
 
 
 def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:
+    if type(xy) is np.ndarray and xy.dtype == np.float64:
+        return xy
     if isinstance(xy, Iterable) and not hasattr(xy, "__len__") and not hasattr(xy, "__array__"):
         xy = list(xy)
     try:
@@ -98,8 +125,10 @@ def _first_not_a_number(xy: Any) -> int:
 
 def _as_double(array: npt.NDArray[Any], name: str) -> Points:
     """Convert an (n, 2) array to float64, refusing the first row that would not keep its value."""
+    if array.dtype == np.float64:
+        return array
     kind = array.dtype.kind
-    if kind == "b" or array.dtype in (np.float16, np.float32, np.float64):
+    if kind == "b" or array.dtype in (np.float16, np.float32):
         return np.asarray(array, dtype=np.float64)
     if kind in "iu":
         large = (array > LARGEST_EXACT_INTEGER) | (array < -LARGEST_EXACT_INTEGER)

@@ -1,15 +1,18 @@
 """DynamicHull: the public face of a hull tree. Checks arguments, speaks numpy."""
 
-from typing import Any, ClassVar, Literal, Self
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from . import measure
-from .arrays import Points, as_coordinate, as_operations, as_points
+from .arrays import Points, as_coordinate, as_directions, as_operations, as_points
 from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
+
+T = TypeVar("T")
 
 
 class MissingPointError(KeyError):
@@ -51,12 +54,14 @@ class DynamicHull:
     [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]
     """
 
-    __slots__ = ("_tree",)
+    __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
+    dimension: ClassVar[int] = 2
     _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
         self._tree = self._tree_type(None if points is None else as_points(points))
+        self._measured: tuple[int, dict[str, Any]] = (0, {})
 
     # Updates
 
@@ -176,10 +181,7 @@ class DynamicHull:
         Raises:
             ValueError: a direction is (0, 0), or there are no points.
         """
-        vectors = as_points(directions, "directions")
-        zero = np.flatnonzero(~vectors.any(axis=1))
-        if zero.size:
-            raise ValueError(f"directions row {zero[0]} is (0.0, 0.0): no direction")
+        vectors = as_directions(directions, self.dimension)
         if len(vectors) and not len(self):
             raise ValueError("an empty hull has no extreme points: insert some first")
         return self._tree.support(vectors)
@@ -218,45 +220,68 @@ class DynamicHull:
             raise ValueError(f"p and q row {same[0]} are the same point: no line")
         return measure.intersect_lines(self.vertices(), starts, ends)
 
-    # Measures
+    # Measures, each computed once until the hull changes
+
+    def _measure(self, measure_of: Callable[[Points], T]) -> T:
+        """A measure of the vertices. Changes are counted first: what another thread changes meanwhile outdates it."""
+        changes = self.changes
+        if self._measured[0] != changes:
+            self._measured = (changes, {})
+        known = self._measured[1]
+        name = measure_of.__name__
+        if name not in known:
+            known[name] = measure_of(self.vertices())
+        value: T = known[name]
+        return value
 
     @property
     def area(self) -> float:
         """Area, the exact value rounded once. O(h log n)."""
-        return measure.area(self.vertices())
+        return self._measure(measure.area)
 
     @property
     def perimeter(self) -> float:
-        """Length of the boundary; for two vertices, there and back. O(h log n)."""
-        return measure.perimeter(self.vertices())
+        """Length of the boundary, within one unit in the last place an edge; two vertices count twice. O(h log n)."""
+        return self._measure(measure.perimeter)
 
     @property
     def centroid(self) -> tuple[float, float]:
         """Centre of area, the exact value rounded once; of a segment the middle, NaN without points. O(h log n)."""
-        return measure.centroid(self.vertices())
+        return self._measure(measure.centroid)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Least x, least y, greatest x, greatest y; NaN without points. O(h log n)."""
-        return measure.bounds(self.vertices())
+        return self._measure(measure.bounds)
 
     def diameter(self) -> float:
-        """The greatest distance of two points, the exact value rounded; 0.0 for fewer than two. O(h log n)."""
-        return measure.diameter(self.vertices())
+        """The greatest distance of two points, within one unit in the last place; 0.0 below two. O(h log n)."""
+        return self._measure(measure.diameter)
 
     def width(self) -> float:
-        """The least distance of parallel lines with all points between, the exact value rounded. O(h log n).
+        """The least distance of parallel lines with all points between, within one unit in the last place. O(h log n).
 
         0.0 for points on one line, and for no points.
         """
-        return measure.width(self.vertices())
+        return self._measure(measure.width)
 
     def min_box(self) -> Points:
-        """(4, 2) corners of the smallest box in any direction around the points, counter-clockwise. O(h log n).
+        """(4, 2) corners of the box of least area in any direction around the points, counter-clockwise. O(h log n).
 
         Chosen exactly, each coordinate rounded once. Of points on one line the box is flat; NaN without points.
         """
-        return measure.min_box(self.vertices())
+        return self._measure(measure.min_box).copy()
+
+    def min_perimeter_box(self) -> Points:
+        """(4, 2) corners of the box of least perimeter, like `min_box`. O(h log n)."""
+        return self._measure(measure.min_perimeter_box).copy()
+
+    def min_circle(self) -> tuple[tuple[float, float], float]:
+        """Centre and radius of the smallest circle around the points. O(h log n), and O(h) a round, some ten rounds.
+
+        The exact centre rounded once, the radius within one unit in the last place. (NaN, NaN) and 0.0 without points.
+        """
+        return self._measure(measure.min_circle)
 
     # As a value
 
@@ -278,6 +303,7 @@ class DynamicHull:
         points, changes = state
         self._tree = self._tree_type(points)
         self._tree.changes = changes
+        self._measured = (changes, {})
 
     def __eq__(self, other: object) -> bool:
         """Whether the other hull holds the same points, as often. O(n)."""

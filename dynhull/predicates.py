@@ -5,7 +5,7 @@ Each predicate first evaluates its determinant in floating point together with a
 an integer times a power of two, and scaling every x by one power of two and every y by another changes no sign.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,8 @@ from .arrays import Points, finite_pairs
 from .implementation import kernel
 
 Point = tuple[float, float]
+Floats = npt.NDArray[np.float64]
+Signs = npt.NDArray[np.int8]
 
 EPSILON = 2.0**-53
 ORIENT_BOUND = (3.0 + 16.0 * EPSILON) * EPSILON
@@ -156,20 +158,45 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
     p, q, r = np.broadcast_arrays(*pairs)
     if kernel is not None:
         rows = (np.ascontiguousarray(pair).reshape(-1, 2) for pair in (p, q, r))
-        signs: npt.NDArray[np.int8] = kernel.orientations(*rows)
+        signs: Signs = kernel.orientations(*rows)
         return signs.reshape(p.shape[:-1])
     return _orientations(p, q, r)
 
 
-def _orientations(p: Points, q: Points, r: Points) -> npt.NDArray[np.int8]:
+def _orientations(p: Points, q: Points, r: Points) -> Signs:
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        left = (p[..., 0] - r[..., 0]) * (q[..., 1] - r[..., 1])
-        right = (p[..., 1] - r[..., 1]) * (q[..., 0] - r[..., 0])
+        left, right = (
+            (p[..., 0] - r[..., 0]) * (q[..., 1] - r[..., 1]),
+            (p[..., 1] - r[..., 1]) * (q[..., 0] - r[..., 0]),
+        )
+    return _decided(left, right, orientation, p, q, r)
+
+
+def cross_signs(a: Points, b: Points, c: Points, d: Points) -> Signs:
+    """`cross_sign` of (k, 2) arrays that broadcast."""
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        u, v = b - a, d - c
+        left, right = u[..., 0] * v[..., 1], u[..., 1] * v[..., 0]
+    return _decided(left, right, cross_sign, a, b, c, d)
+
+
+def dot_signs(a: Points, b: Points, c: Points, d: Points) -> Signs:
+    """`dot_sign` of (k, 2) arrays that broadcast."""
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        u, v = b - a, d - c
+        along, down = u[..., 0] * v[..., 0], -u[..., 1] * v[..., 1]
+    return _decided(along, down, dot_sign, a, b, c, d)
+
+
+def _decided(left: Floats, right: Floats, exact_sign: Callable[..., int], *points: Points) -> Signs:
+    """The signs of left - right: in floats where the bound on their error tells, else by the exact predicate."""
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         det = left - right
         bound = ORIENT_BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
-        signs: npt.NDArray[np.int8] = (det > bound).astype(np.int8) - (-det > bound).astype(np.int8)
-    for index in zip(*np.nonzero(signs == 0), strict=True):
-        signs[index] = orientation(tuple(p[index].tolist()), tuple(q[index].tolist()), tuple(r[index].tolist()))
+        signs: Signs = (det > bound).astype(np.int8) - (-det > bound).astype(np.int8)
+    doubtful = np.nonzero(signs == 0)
+    rows = [np.broadcast_to(p, (*signs.shape, 2))[doubtful].tolist() for p in points]
+    signs[doubtful] = [exact_sign(*row) for row in zip(*rows, strict=True)]
     return signs
 
 

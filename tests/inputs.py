@@ -30,6 +30,18 @@ def points(max_size: int) -> st.SearchStrategy[list[tuple[float, float]]]:
     return st.one_of(*(st.lists(kind, max_size=max_size) for kind in kinds))
 
 
+grid_points = st.lists(st.tuples(*[st.integers(-6, 6).map(float)] * 2), min_size=1, max_size=12)
+any_points = st.one_of(grid_points, points(12).filter(len), st.lists(st.sampled_from(CIRCLE), min_size=1, max_size=9))
+
+
+@st.composite
+def stars(draw):
+    """Simple polygons around the origin, their corners on rays of the integer grid in order of angle."""
+    rays = [(8, 1), (5, 4), (1, 6), (-3, 7), (-6, 2), (-7, -5), (-1, -8), (4, -7), (6, -1)]
+    lengths = draw(st.lists(st.integers(1, 9), min_size=len(rays), max_size=len(rays)))
+    return [(x * length, y * length) for (x, y), length in zip(rays, lengths, strict=True)]
+
+
 def cloud(kind, count, random):
     """Many points of one kind: (count, 2), from a numpy generator."""
     if kind == "uniform":

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 from fractions import Fraction
+from itertools import product
+from math import inf, isqrt, nextafter
 
 Point = tuple[float, float]
 
@@ -62,3 +64,45 @@ def locate(corners: list[Point], p: Point) -> int:
 
 def dot(d: Point, p: Point) -> Fraction:
     return Fraction(d[0]) * Fraction(p[0]) + Fraction(d[1]) * Fraction(p[1])
+
+
+def exact(p):
+    return Fraction(p[0]), Fraction(p[1])
+
+
+def root(value):
+    """The root of a rational number, to 100 bits more than a double has."""
+    scale = Fraction(2) ** (2 * (2200 + 160))
+    scaled = isqrt(int(value * scale))
+    return Fraction(scaled) / Fraction(2) ** (2200 + 160)
+
+
+def assert_rounded(measured, value):
+    """The double next to a rational value, or one beside that; inf where it is too large."""
+    try:
+        nearest = float(value)
+    except OverflowError:
+        nearest = inf
+    assert measured in (nearest, nextafter(nearest, inf), nextafter(nearest, 0))
+
+
+def segment_distance(p: Point, a: Point, b: Point) -> Fraction:
+    """Squared, from a point to a segment."""
+    (px, py), (ax, ay), (bx, by) = exact(p), exact(a), exact(b)
+    ux, uy = bx - ax, by - ay
+    share = ((px - ax) * ux + (py - ay) * uy) / (ux * ux + uy * uy) if (ux, uy) != (0, 0) else 0
+    share = max(min(share, Fraction(1)), Fraction(0))
+    return (px - ax - share * ux) ** 2 + (py - ay - share * uy) ** 2
+
+
+def polygons(p: Iterable[Point], q: Iterable[Point]) -> Fraction:
+    """The squared distance of two hulls: 0 where a vertex of one is in the other or two edges cross."""
+    a, b = hull(p), hull(q)
+    if any(locate(b, v) >= 0 for v in a) or any(locate(a, v) >= 0 for v in b):
+        return Fraction(0)
+    edges, others = ([(c[i - 1], c[i]) for i in range(len(c))] for c in (a, b))
+    for (s, t), (u, v) in product(edges, others):
+        if turn(s, t, u) * turn(s, t, v) < 0 and turn(u, v, s) * turn(u, v, t) < 0:
+            return Fraction(0)
+    pairs = [(v, edge) for v in a for edge in others] + [(v, edge) for v in b for edge in edges]
+    return min(segment_distance(v, *edge) for v, edge in pairs)

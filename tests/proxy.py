@@ -7,11 +7,10 @@ from contextlib import contextmanager, suppress
 
 
 class Proxy:
-    """Forwards connections on `address` to a server; `cut` severs all of them at once."""
+    """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once."""
 
     def __init__(self, server: str) -> None:
-        host, port = server.rsplit(":", 1)
-        self._server = host, int(port)
+        self.server = server
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._open: set[socket.socket] = set()
         self._threads: list[threading.Thread] = []
@@ -42,7 +41,8 @@ class Proxy:
                 self._start(self._connect, client)
 
     def _connect(self, client: socket.socket) -> None:
-        with client, socket.create_connection(self._server) as server:
+        host, port = self.server.rsplit(":", 1)
+        with client, suppress(ConnectionRefusedError), socket.create_connection((host, int(port))) as server:
             self._open |= {client, server}
             back = self._start(forward, server, client)
             forward(client, server)

@@ -37,10 +37,12 @@ struct Output {
   }
 };
 
-nb::object array_of(const std::vector<Point>& points) {
-  Output<double> output(2 * points.size());
-  std::copy(points.begin(), points.end(), reinterpret_cast<Point*>(output.data));
-  return output.array({points.size(), 2});
+// The points as an array, which takes over their memory.
+nb::object array_of(std::vector<Point> points) {
+  auto* const kept = new std::vector<Point>(std::move(points));
+  const nb::capsule owner(kept, [](void* memory) noexcept { delete static_cast<std::vector<Point>*>(memory); });
+  auto* const data = reinterpret_cast<double*>(kept->data());
+  return nb::cast(nb::ndarray<nb::numpy, double>(data, {kept->size(), 2}, owner));
 }
 
 // One coordinate, checked: what is not plainly a double goes the way of dynhull.arrays, which converts or refuses.
@@ -94,7 +96,7 @@ class Hull {
   nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing, std::optional<bool> together) {
     if (ops.shape(0) != rows.shape(0)) throw nb::value_error("ops and xy differ in length");
     const Applied applied = [&] {
-      const Writing turn(turns_);
+      const Writing turn(turns_, rows.shape(0));
       return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing, together);
     }();
     return nb::make_tuple(applied.rows, applied.first_missing);
@@ -105,9 +107,11 @@ class Hull {
     {
       const Reading turn(turns_);
       all.reserve(tree_.size());
-      tree_.for_each([&](Point p, std::uint64_t copies) { all.insert(all.end(), copies, p); });
+      tree_.for_each([&](Point p, std::uint64_t copies) {
+        for (; copies > 0; --copies) all.push_back(p);
+      });
     }
-    return array_of(all);
+    return array_of(std::move(all));
   }
 
   nb::object chain(int side) {
@@ -117,7 +121,7 @@ class Hull {
       const Reading turn(turns_);
       chain = tree_.chain(static_cast<Side>(side));
     }
-    return array_of(chain);
+    return array_of(std::move(chain));
   }
 
   nb::object vertices() {
@@ -128,7 +132,7 @@ class Hull {
       const std::vector<Point> upper = tree_.chain(UPPER);
       if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
     }
-    return array_of(vertices);
+    return array_of(std::move(vertices));
   }
 
   nb::object locate(const Rows& rows) {
@@ -136,7 +140,7 @@ class Hull {
     const Output<std::int8_t> output(count);
     flatten_for(count);
     {
-      const Reading turn(turns_);
+      const Reading turn(turns_, count);
       if (chains_.fresh(tree_)) {
         chains_.locate(tree_, points_of(rows), count, output.data);
       } else {
@@ -151,7 +155,7 @@ class Hull {
     const std::size_t count = directions.shape(0);
     const Output<double> output(2 * count);
     {
-      const Reading turn(turns_);
+      const Reading turn(turns_, count);
       auto* rows = reinterpret_cast<Point*>(output.data);
       if (tree_.distinct() > 0)
         for (std::size_t i = 0; i < count; ++i) rows[i] = dynhull::support(tree_.nodes(), points_of(directions)[i]);
@@ -165,7 +169,7 @@ class Hull {
     const std::size_t count = points.shape(0);
     const Output<double> output(4 * count);
     {
-      const Reading turn(turns_);
+      const Reading turn(turns_, count);
       constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
       auto* rows = reinterpret_cast<Edge*>(output.data);
       for (std::size_t i = 0; i < count; ++i)

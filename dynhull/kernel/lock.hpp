@@ -1,16 +1,20 @@
 // Many readers or one writer of a hull, among Python threads.
 //
 // Everything here happens under the GIL, which is what guards the counters: single updates run under it from end to
-// end and only look, and a batch notes what it does before it lets go of it. Waiting threads let go of it too.
+// end and only look, and a batch notes what it does before it lets go of it. Waiting threads let go of it too. A batch
+// of few rows keeps it: to get it back from a busy thread would take longer than the work.
 #pragma once
 
 #include <nanobind/nanobind.h>
 
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <optional>
 
 namespace dynhull {
+
+constexpr std::size_t FEW_ROWS = 64, ALL_ROWS = std::numeric_limits<std::size_t>::max();
 
 class Turns {
  public:
@@ -93,11 +97,11 @@ class Turns {
 // A batch that reads, with the GIL let go of.
 class Reading {
  public:
-  explicit Reading(Turns& turns) : turns_(turns) {
+  explicit Reading(Turns& turns, std::size_t rows = ALL_ROWS) : turns_(turns) {
     Turns::wait([&] { return Turns::forking_ == 0 && !turns.writing_ && !turns.writer_waits(); });
     ++turns.readers_;
     ++Turns::running_;
-    release_.emplace();
+    if (rows > FEW_ROWS) release_.emplace();
   }
   ~Reading() {
     release_.reset();
@@ -115,11 +119,11 @@ class Reading {
 // A batch that writes, with the GIL let go of.
 class Writing {
  public:
-  explicit Writing(Turns& turns) : turns_(turns) {
+  explicit Writing(Turns& turns, std::size_t rows = ALL_ROWS) : turns_(turns) {
     turns.await_as_writer([&] { return Turns::forking_ == 0 && !turns.writing_ && turns.readers_ == 0; });
     turns.writing_ = true;
     ++Turns::running_;
-    release_.emplace();
+    if (rows > FEW_ROWS) release_.emplace();
   }
   ~Writing() {
     release_.reset();

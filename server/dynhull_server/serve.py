@@ -1,6 +1,7 @@
 """`dynhull serve`: run the server until SIGTERM or SIGINT."""
 
 import asyncio
+import gc
 import signal
 import sys
 
@@ -37,10 +38,16 @@ async def _serve(settings: Settings) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: None if loop.is_closed() else loop.call_soon_threadsafe(stop.set))
     server = Server(settings)
-    with progress_bar("hulls read") as progress:
-        await server.start(progress)
-    print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
-    if server.metrics_address:
-        print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
-    await stop.wait()
-    await server.drain()
+    try:
+        with progress_bar("hulls read") as progress:
+            await server.start(progress)
+        gc.freeze()  # modules and what was read: to look through all that again and again would make calls wait 50 ms
+        print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
+        if server.metrics_address:
+            print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
+        await stop.wait()
+    finally:
+        await server.drain()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)  # Python gives back its own handlers before the process ends
+    gc.unfreeze()

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import grpc
 import numpy as np
 import pytest
+from proxy import proxy
 from server_process import server_process
 
 from dynhull import DynamicHull
@@ -30,8 +31,8 @@ CORNERS = [[0, 0], [4, 0], [5, 2], [4, 4], [0, 4]]
 
 
 @pytest.fixture
-def client(address: str) -> Iterator[HullClient]:
-    with HullClient(address) as client:
+def client(address: str, connect: type[HullClient]) -> Iterator[HullClient]:
+    with connect(address) as client:
         yield client
 
 
@@ -183,16 +184,16 @@ def test_errors_are_typed_and_say_what_is_at_fault(client: HullClient, hull: str
     assert all(isinstance(each.value, DynhullError) for each in errors)
 
 
-def test_limits_and_a_server_that_goes_away() -> None:
+def test_limits_and_a_server_that_goes_away(connect: type[HullClient]) -> None:
     limits = ("--max-hulls", "1", "--max-message-bytes", "4096")
-    with server_process(*limits) as server, HullClient(server.address) as client:
+    with server_process(*limits) as server, connect(server.address) as client:
         client.create_hull("one")
         with pytest.raises(LimitExceededError) as hulls:
             client.create_hull("two")
         assert (hulls.value.reason, hulls.value.value) == ("LIMIT_EXCEEDED", "1")
         with pytest.raises(LimitExceededError, match="4096"):
             client.apply("one", insert=np.zeros((4096, 2)))
-        watch = client.watch("one")
+        watch = client.watch("one", reconnect=False)
         assert isinstance(next(watch), Snapshot)
         server.process.terminate()
         with pytest.raises(UnavailableError, match="shutting down"):
@@ -200,7 +201,7 @@ def test_limits_and_a_server_that_goes_away() -> None:
         server.process.wait()
         with pytest.raises(UnavailableError):
             client.get_hull("one")
-        with pytest.raises(DeadlineError), HullClient(server.address, wait_for_ready=True, timeout=0.1) as patient:
+        with pytest.raises(DeadlineError), connect(server.address, wait_for_ready=True, timeout=0.1) as patient:
             patient.get_hull("one")
 
 
@@ -248,3 +249,23 @@ def test_threads_share_a_client(client: HullClient, hull: str) -> None:
     live = client.get_hull(hull)
     assert (live.revision, live.info.points) == (200, 200)
     assert live.vertices.tolist() == [[0, 0], [3, 0], [3, 49], [0, 49]]
+
+
+def test_reads_and_numbered_writes_are_tried_again(address: str, connect: type[HullClient], name: str) -> None:
+    with proxy(address) as way, connect(way.address, retries=5) as client:
+        client.create_hull(name)
+        way.server = "127.0.0.1:1"
+        for call in (
+            lambda: client.get_hull(name).revision,
+            lambda: client.apply(name, insert=[[1, 2]], producer="p", sequence=1).revision,
+        ):
+            way.server = "127.0.0.1:1"
+            way.cut()
+            threading.Timer(0.2, setattr, (way, "server", address)).start()
+            assert call() in (0, 1)
+        way.server = "127.0.0.1:1"
+        way.cut()
+        with pytest.raises(UnavailableError):
+            client.apply(name, insert=[[3, 4]])
+    with connect(address) as client:
+        assert client.get_hull(name).revision == 1

@@ -2,44 +2,21 @@
 
 from fractions import Fraction
 from itertools import combinations
-from math import inf, isqrt, nextafter
+from math import inf
 
 import numpy as np
 import oracle
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
-from inputs import CIRCLE, points
+from inputs import any_points, grid_points
+from oracle import assert_rounded, exact, root, segment_distance
 
 from dynhull import DynamicHull
-
-grid_points = st.lists(st.tuples(*[st.integers(-6, 6).map(float)] * 2), min_size=1, max_size=12)
-any_points = st.one_of(grid_points, points(12).filter(len), st.lists(st.sampled_from(CIRCLE), min_size=1, max_size=9))
-
-
-def exact(p):
-    return Fraction(p[0]), Fraction(p[1])
 
 
 def squared(p, q):
     (px, py), (qx, qy) = exact(p), exact(q)
     return (px - qx) ** 2 + (py - qy) ** 2
-
-
-def root(value):
-    """The root of a rational number, to 100 bits more than a double has."""
-    scale = Fraction(2) ** (2 * (2200 + 160))
-    scaled = isqrt(int(value * scale))
-    return Fraction(scaled) / Fraction(2) ** (2200 + 160)
-
-
-def assert_rounded(measured, value):
-    """The double next to a rational value, or one beside that; inf where it is too large."""
-    try:
-        nearest = float(value)
-    except OverflowError:
-        nearest = inf
-    assert measured in (nearest, nextafter(nearest, inf), nextafter(nearest, 0))
 
 
 def cross(o, a, b):
@@ -81,14 +58,6 @@ def test_min_box(rows):
     for p in rows:
         for q, r in ((a, b), (b, c), (c, d), (d, a)):
             assert cross(q, r, p) >= -1e-9
-
-
-def segment_distance(p, a, b):
-    (px, py), (ax, ay), (bx, by) = exact(p), exact(a), exact(b)
-    ux, uy = bx - ax, by - ay
-    share = ((px - ax) * ux + (py - ay) * uy) / (ux * ux + uy * uy) if (ux, uy) != (0, 0) else 0
-    share = max(min(share, Fraction(1)), Fraction(0))
-    return (px - ax - share * ux) ** 2 + (py - ay - share * uy) ** 2
 
 
 @given(any_points, any_points)

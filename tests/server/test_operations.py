@@ -88,7 +88,7 @@ def test_drain() -> None:
 
 
 def test_a_batch_under_way_is_finished_at_the_end() -> None:
-    points = np.random.default_rng(0).normal(size=(20_000, 2))
+    points = np.random.default_rng(0).normal(size=(200_000, 2))
     batch = {"inserts": {"packed": points.astype("<f8").tobytes()}}
     with server_process() as server, grpc.insecure_channel(server.address) as channel:
         stub = HullServiceStub(channel)

@@ -79,7 +79,7 @@ def follow(address: str, name: str, manner: Manner, writer: Writer) -> int:
             resume = copy if copy.uid else None
             with (
                 HullClient(way.address, wait_for_ready=True) as client,
-                client.watch(name, max_rate=manner.max_rate, resume=resume) as watch,
+                client.watch(name, max_rate=manner.max_rate, resume=resume, reconnect=False) as watch,
             ):
                 try:
                     for taken in range(manner.events_to_a_connection):
@@ -170,7 +170,7 @@ def test_history_is_bounded() -> None:
             client.apply("a", insert=[[i, i * i]])
             client.get_hull("a")
         with pytest.raises(RevisionForgottenError) as caught:
-            next(client.watch("a", resume=copy))
+            next(client.watch("a", resume=copy, reconnect=False))
         oldest = caught.value.oldest
         assert 10 < oldest <= 20
         copy.revision, copy.vertices = oldest, np.array([[i, i * i] for i in range(oldest)])

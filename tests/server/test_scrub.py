@@ -1,11 +1,18 @@
 """The background scrub finds a hull that is wrong, and leaves alone what it has seen."""
 
 import asyncio
+import sys
+import time
 from itertools import count
+from pathlib import Path
 
+import grpc
 import numpy as np
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from server_process import PATIENCE, server_process
 
 from dynhull import DynamicHull
+from dynhull_client import HullClient
 from dynhull_server.engine.batch import Batch
 from dynhull_server.engine.hulls import Engine
 from dynhull_server.engine.limits import Limits
@@ -75,3 +82,28 @@ def test_a_hull_that_is_as_it_was_is_left_out() -> None:
         engine.close()
 
     asyncio.run(run())
+
+
+def test_health_tells_of_a_wrong_hull_until_the_server_ends() -> None:
+    forgetful = [sys.executable, str(Path(__file__).with_name("forgetful.py"))]
+    complaint = "differs from Chan's algorithm"
+    with (
+        server_process("--scrub-pause", "0.1", wrap=forgetful, complaints=complaint) as server,
+        grpc.insecure_channel(server.address) as channel,
+        HullClient(server.address) as client,
+    ):
+        check = health_pb2_grpc.HealthStub(channel).Check
+
+        def status(service: str) -> int:
+            return check(health_pb2.HealthCheckRequest(service=service)).status
+
+        assert status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.SERVING
+        client.create_hull("a")
+        client.apply("a", insert=[[0, 0], [4, 0], [2, 3]])
+        end = time.monotonic() + PATIENCE
+        while status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.SERVING and time.monotonic() < end:
+            time.sleep(0.05)
+        assert status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.NOT_SERVING
+        # One wrong hull is no reason to take all the others from everybody.
+        assert status("dynhull.v1.HullService") == health_pb2.HealthCheckResponse.SERVING
+        assert not client.verify("a").equal

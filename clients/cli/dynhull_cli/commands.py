@@ -26,7 +26,9 @@ class InstalledCommands(TyperGroup):
 def _command(entry: EntryPoint) -> Any:
     command = typer.Typer(add_completion=False, rich_markup_mode="markdown")
     try:
-        command.command(entry.name)(_explaining(entry, entry.load()))
+        function = entry.load()
+        settings = getattr(function, "context_settings", None)
+        command.command(entry.name, context_settings=settings)(_explaining(entry, function))
     except ModuleNotFoundError as error:
         anything = {"allow_extra_args": True, "ignore_unknown_options": True}
         command.command(entry.name, context_settings=anything)(_not_installed(entry, error))
@@ -62,9 +64,18 @@ def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[]
     return explain
 
 
-app = typer.Typer(cls=InstalledCommands, no_args_is_help=True, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=InstalledCommands, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode="markdown"
+)
 
 
 @app.callback()
 def options() -> None:
-    """Exact convex hulls of points that come and go."""
+    """Exact convex hulls of points that come and go.
+
+    Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, a token from --token or
+    DYNHULL_TOKEN.
+
+    Exit codes: 0 all is well, 1 something is not (a hull differs, a request was refused), 2 the command or its input
+    cannot be used, 3 the server does not answer, 4 it wants another token, 130 interrupted.
+    """

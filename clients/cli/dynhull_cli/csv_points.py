@@ -36,7 +36,7 @@ def read_points(
         columns = reader.fieldnames or []
         if not columns:
             raise ValueError(f"{path} is empty: it needs a header line with the names of its columns")
-        x, y = _coordinate_columns(path, columns, x, y)
+        x, y = coordinate_columns(path, columns, x, y)
         for option, name in (("--id", identity), ("--time", time)):
             _require(path, columns, option, name)
         rows, bad = _read(reader, x, y, identity, time)
@@ -51,7 +51,8 @@ def read_points(
     return rows, notes
 
 
-def _coordinate_columns(path: Path, columns: Sequence[str], x: str | None, y: str | None) -> tuple[str, str]:
+def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, y: str | None) -> tuple[str, str]:
+    """The columns of x and y among those there are; ValueError tells what to do where they are not."""
     if x is None and y is None:
         lowered = {column.lower(): column for column in columns}
         for pair in PAIRS:
@@ -66,7 +67,7 @@ def _coordinate_columns(path: Path, columns: Sequence[str], x: str | None, y: st
     return x, y
 
 
-def _require(path: Path, columns: Sequence[str], option: str, name: str | None) -> None:
+def _require(path: Path | str, columns: Sequence[str], option: str, name: str | None) -> None:
     if name is not None and name not in columns:
         raise ValueError(f"{path} has no column {name!r} ({option}); it has {', '.join(columns)}")
 
@@ -79,7 +80,7 @@ def _read(
     for record in reader:
         line = reader.line_num
         try:
-            position = _coordinate(record, x), _coordinate(record, y)
+            position = coordinate(record[x], x), coordinate(record[y], y)
             for column in (identity, time):
                 if column is not None and not record[column]:
                     raise ValueError(f"{column} is missing")
@@ -91,8 +92,8 @@ def _read(
     return rows, bad
 
 
-def _coordinate(record: dict[str, str], column: str) -> float:
-    text = record[column]
+def coordinate(text: str | None, column: str) -> float:
+    """A finite number; ValueError tells why there is none."""
     if not text:
         raise ValueError(f"{column} is missing")
     try:

@@ -7,6 +7,10 @@
 ...     print(client.get_hull("fleet").vertices)
 """
 
+from .async_client import AsyncHullClient
+from .async_ingest import AsyncIngest
+from .async_watch import AsyncWatch
+from .async_writer import AsyncWriter
 from .client import HullClient
 from .errors import (
     DeadlineError,
@@ -18,11 +22,13 @@ from .errors import (
     LimitExceededError,
     PermissionDeniedError,
     PointMissingError,
+    ProducerInUseError,
     RevisionForgottenError,
     SequenceGapError,
     UnauthenticatedError,
     UnavailableError,
 )
+from .hull_copy import HullCopy
 from .ingest import Ingest
 from .messages import (
     Applied,
@@ -44,10 +50,15 @@ from .messages import (
     Tangents,
     Verification,
 )
-from .watch import HullCopy, Watch
+from .watch import Watch
+from .writer import Writer
 
 __all__ = [
     "Applied",
+    "AsyncHullClient",
+    "AsyncIngest",
+    "AsyncWatch",
+    "AsyncWriter",
     "ChanRound",
     "Change",
     "Counted",
@@ -71,6 +82,7 @@ __all__ = [
     "Measures",
     "PermissionDeniedError",
     "PointMissingError",
+    "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
     "SequenceGapError",
@@ -82,4 +94,5 @@ __all__ = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Writer",
 ]

@@ -1,15 +1,17 @@
 """Arrays as a batch to send."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy.typing as npt
 
 from dynhull.arrays import as_points
-from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import batch_pb2, points_pb2
 
 from .messages import encode_points
 
 Missing = Literal["raise", "count"]
+BYTES_PER_POINT = 16
 
 
 def encode_batch(
@@ -35,3 +37,22 @@ def encode_batch(
         batch.moves.origins.CopyFrom(encode_points(origins))
         batch.moves.destinations.CopyFrom(encode_points(destinations))
     return batch
+
+
+def batch_rows(batch: batch_pb2.Batch) -> int:
+    """How many rows its arrays have."""
+    return sum(len(points.packed) for points in _parts(batch)) // BYTES_PER_POINT
+
+
+def join_batches(batches: Sequence[batch_pb2.Batch]) -> batch_pb2.Batch:
+    """One batch that does what these do; all have the same policy for missing points."""
+    joined = batch_pb2.Batch(missing_points=batches[0].missing_points)
+    for whole, *pieces in zip(_parts(joined), *map(_parts, batches), strict=True):
+        packed = b"".join(piece.packed for piece in pieces)
+        if packed:
+            whole.packed = packed
+    return joined
+
+
+def _parts(batch: batch_pb2.Batch) -> tuple[points_pb2.Points, ...]:
+    return batch.inserts, batch.deletes, batch.moves.origins, batch.moves.destinations

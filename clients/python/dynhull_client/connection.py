@@ -1,50 +1,82 @@
-"""Channels to a server."""
+"""A channel to a server, and how calls begin on it."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import grpc
 
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+from .calls import Call
+from .errors import DynhullError
+from .retry import Attempts
+
+DEFAULT_ADDRESS = "127.0.0.1:50051"
+DEFAULT_TIMEOUT = 30.0
+DEFAULT_RETRIES = 3
 MAX_MESSAGE_BYTES = 2**31 - 1
 
-
-def open_channel(address: str, token: str | None, tls: grpc.ChannelCredentials | None) -> grpc.Channel:
-    """A channel that shows the token, if any, with each call."""
-    # The server's limit is the one that counts.
-    options = [
-        ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
-        ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
-    ]
-    channel = grpc.insecure_channel(address, options) if tls is None else grpc.secure_channel(address, tls, options)
-    return channel if token is None else grpc.intercept_channel(channel, _ShowToken(token))
+OPTIONS = [
+    # The server's limits are the ones that count.
+    ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
+    ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
+    # A server that was restarted is found within a second; by default gRPC may take two minutes.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+]
 
 
-class _Details(grpc.ClientCallDetails):
-    def __init__(self, details: Any, metadata: Sequence[tuple[str, str]]) -> None:
-        self.method = details.method
-        self.timeout = details.timeout
-        self.metadata = tuple(metadata)
-        self.credentials = details.credentials
-        self.wait_for_ready = details.wait_for_ready
-        self.compression = details.compression
+class Connection:
+    """What `HullClient` and `AsyncHullClient` have in common.
 
+    Every method raises a `DynhullError`: `UnavailableError` where there is no server, `DeadlineError` after the
+    timeout, `HullNotFoundError` where there is no such hull, `InvalidRequestError` where the server refuses a value.
+    Arrays that are no finite points raise ValueError or TypeError, as in `dynhull`, and nothing is sent.
 
-class _ShowToken(
-    grpc.UnaryUnaryClientInterceptor,
-    grpc.UnaryStreamClientInterceptor,
-    grpc.StreamUnaryClientInterceptor,
-    grpc.StreamStreamClientInterceptor,
-):
-    """Call credentials would do the same, but gRPC sends them over TLS only, and a local server needs none of that."""
+    Args:
+        address: host:port.
+        timeout: seconds a call may take unless the call says otherwise; None for no limit. Ingests, writers and watches
+            have none of themselves.
+        wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.
+        token: the bearer token to show. Over an encrypted connection only, or on this machine.
+        tls: TLS with the server; None for none. `grpc.ssl_channel_credentials()` trusts what the machine trusts; it
+            also takes a root certificate, and a client's key and certificate.
+        retries: how often a call is made again that found no server, after a growing pause. Only calls that may be
+            repeated: reads, and batches with a producer and a sequence.
+    """
 
-    def __init__(self, token: str) -> None:
-        self._entry = ("authorization", f"Bearer {token}")
+    _grpc: ClassVar[Any] = grpc
 
-    def _intercept(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
-        details = _Details(client_call_details, [*(client_call_details.metadata or ()), self._entry])
-        return continuation(details, request)
+    def __init__(
+        self,
+        address: str = DEFAULT_ADDRESS,
+        *,
+        timeout: float | None = DEFAULT_TIMEOUT,
+        wait_for_ready: bool = False,
+        token: str | None = None,
+        tls: grpc.ChannelCredentials | None = None,
+        retries: int = DEFAULT_RETRIES,
+    ) -> None:
+        self.address = address
+        self._timeout = timeout
+        self._retries = retries
+        self._wait_for_ready = wait_for_ready
+        self._closed = False
+        # Call credentials would do the same, but gRPC sends them over TLS only, and a local server needs none of that.
+        self._metadata = () if token is None else (("authorization", f"Bearer {token}"),)
+        if tls is None:
+            self.channel = self._grpc.insecure_channel(address, OPTIONS)
+        else:
+            self.channel = self._grpc.secure_channel(address, tls, OPTIONS)
+        self.stub: Any = HullServiceStub(self.channel)
 
-    intercept_unary_unary: Any = _intercept
-    intercept_unary_stream: Any = _intercept
-    intercept_stream_unary: Any = _intercept
-    intercept_stream_stream: Any = _intercept
+    def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
+        """Begin a call: a method of the stub with a message, or with an iterator of messages."""
+        if self._closed:
+            raise DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
+        return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
+
+    def attempts(self, call: Call[Any]) -> Attempts:
+        """The attempts that a call may have."""
+        timeout = self._timeout if call.timeout is None else call.timeout
+        return Attempts(timeout, self._retries if call.repeatable else 0)

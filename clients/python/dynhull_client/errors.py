@@ -57,6 +57,10 @@ class SequenceGapError(DynhullError):
     """A numbered batch came before the ones that precede it; `expected` is the number of the next one."""
 
 
+class ProducerInUseError(DynhullError):
+    """A writer's batch had been applied before it was sent: another writer uses the same producer name."""
+
+
 class HullEmptyError(DynhullError, ValueError):
     """A question that a hull without points has no answer to."""
 

@@ -2,23 +2,22 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import grpc
 import numpy.typing as npt
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from .batch import Missing, encode_batch
+from .calls import Ingesting
+from .connection import Connection
 from .errors import error_of
 from .messages import Ingested, decode_ingested
 
 # Batches handed over and not yet sent. A longer queue is no faster, and a stalled server must not fill the memory.
 LONGEST_QUEUE = 16
-
-Start = Callable[[Iterator[pb.IngestRequest]], "grpc._CallFuture[pb.IngestResponse]"]
 
 
 class Ingest:
@@ -33,20 +32,21 @@ class Ingest:
         summary: what was done, once the context has been left without an error.
     """
 
-    def __init__(self, name: str, missing: Missing, start: Start) -> None:
+    def __init__(self, connection: Connection, ingesting: Ingesting) -> None:
         self.summary: Ingested | None = None
-        self._missing = missing
-        # The first message names the hull, so that a wrong name is an error before there is a batch.
-        self._queue = deque([pb.IngestRequest(name=name)])
+        self._connection = connection
+        self._ingesting = ingesting
+        self._queue = deque([ingesting.first()])
         self._turn = threading.Condition()
         self._closed = False
-        self._start = start
-        self._call: grpc._CallFuture[pb.IngestResponse] | None = None
+        self._call: Any = None
 
     def __enter__(self) -> Self:
         if self._call is not None:
             raise RuntimeError("an Ingest is used once")
-        self._call = self._start(self._requests())
+        self._call = self._connection.begin(
+            self._connection.stub.Ingest.future, self._requests(), self._ingesting.timeout
+        )
         self._call.add_done_callback(lambda _: self._close())
         return self
 
@@ -74,7 +74,7 @@ class Ingest:
             DynhullError: the server has refused an earlier batch.
             RuntimeError: the context has not been entered, or has been left.
         """
-        request = pb.IngestRequest(batch=encode_batch(insert, delete, move, self._missing))
+        request = self._ingesting.batch(insert, delete, move)
         if self._call is None:
             raise RuntimeError("use an Ingest as a context manager")
         with self._turn:
@@ -103,7 +103,7 @@ class Ingest:
             self._turn.notify_all()
 
 
-def _result(call: "grpc._CallFuture[pb.IngestResponse]") -> pb.IngestResponse:
+def _result(call: Any) -> Any:
     try:
         return call.result()
     except grpc.RpcError:

@@ -91,9 +91,11 @@ def _apply_one(hull: DynamicHull, batch: Batch) -> int:
 
 def _apply_many(hull: DynamicHull, batch: Batch) -> int:
     inserts, deletes = batch.all_inserts, batch.all_deletes
-    ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
     missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
     try:
+        if not len(inserts):
+            return hull.delete_many(deletes, missing)
+        ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
         applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
     except MissingPointError as error:
         if error.row is None:

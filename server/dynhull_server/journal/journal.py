@@ -17,8 +17,8 @@ from .writer import Durability, Statement, Writer
 NEWEST = 2**62
 
 CHECKPOINT_BYTES = 16 * 2**20  # of log, before it is copied into the database
-LONGEST_LOG_BYTES = 256 * 2**20  # then writers wait for the copy
-CHECKPOINT_SECONDS = 1.0
+CHECKPOINT_SECONDS = 0.25
+PATIENCE_MS = 10  # for writers and readers, before the log is begun anew; meanwhile no commit begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,13 +168,16 @@ class Journal:
         return _Reading(self._folder)
 
     def _checkpoint(self) -> None:
-        """Copy the log into the database from a thread of its own: commits go on meanwhile."""
+        """Copy the log into the database from a thread of its own: commits go on meanwhile.
+
+        Then begin the log anew. One that grows makes every commit wait where the file system writes its own journal.
+        """
         with self._reading() as connection:
+            connection.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
             while not self._closing.wait(CHECKPOINT_SECONDS):
-                size = self._folder.log_bytes()
-                if size > CHECKPOINT_BYTES:
-                    mode = "PASSIVE" if size < LONGEST_LOG_BYTES else "TRUNCATE"
-                    connection.execute(f"PRAGMA wal_checkpoint({mode})").fetchall()
+                if self._folder.log_bytes() > CHECKPOINT_BYTES:
+                    for mode in ("PASSIVE", "RESTART"):  # for the second, little is left to copy
+                        connection.execute(f"PRAGMA wal_checkpoint({mode})").fetchall()
 
 
 def _creation(row: HullRow) -> Statement:

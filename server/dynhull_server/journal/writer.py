@@ -11,6 +11,7 @@ from typing import Any
 from .errors import JournalError, JournalFullError
 from .folder import Folder
 
+LONGEST_LOG_BYTES = 64 * 2**20  # kept when the log is begun anew
 SYNC_INTERVAL = 0.1  # seconds, for Durability.INTERVAL
 
 Statement = tuple[str, tuple[Any, ...]]
@@ -39,6 +40,7 @@ class Writer:
         level = "FULL" if durability is Durability.SYNC else "NORMAL" if durability is Durability.INTERVAL else "OFF"
         self._connection.execute(f"PRAGMA synchronous = {level}")
         self._connection.execute("PRAGMA wal_autocheckpoint = 0")  # the journal has a thread for it
+        self._connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG_BYTES}")
         self._turn = threading.Condition()
         self._waiting: list[tuple[list[Statement], Future[None]]] = []
         self._closing = False

@@ -71,11 +71,17 @@ class Metrics:
             registry=self.registry,
         )
         self._watchers: dict[object, float | None] = {}
+        self._ended: dict[tuple[str, str], tuple[Counter, Histogram]] = {}
 
     def call(self, method: str, code: str, seconds: float) -> None:
         """A call has ended."""
-        self._calls.labels(method, code).inc()
-        self._durations.labels(method).observe(seconds)
+        ended = self._ended.get((method, code))
+        if ended is None:  # finding the labels takes longer than counting
+            ended = self._calls.labels(method, code), self._durations.labels(method)
+            self._ended[method, code] = ended
+        calls, durations = ended
+        calls.inc()
+        durations.observe(seconds)
 
     def applied(self, applied: Applied, seconds: float) -> None:
         """A batch has been applied, `seconds` after it came."""

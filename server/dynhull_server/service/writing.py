@@ -4,7 +4,6 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import AsyncGenerator
-from contextlib import nullcontext
 from typing import Any
 
 from ..engine.batch import Applied
@@ -14,7 +13,7 @@ from . import decode
 from .calls import Call
 from .metrics import Metrics
 
-# While so many points or batches are under way no more are read, and the client has to wait.
+# While so many points are under way, or so many batches not told of, no more are read, and the client has to wait.
 MOST_ROWS = 65_536
 MOST_BATCHES = 1_024
 
@@ -31,7 +30,7 @@ def decode_write(request: Any, producer: str) -> Write:
 
 
 class BatchStream:
-    """The batches of a call to one hull.
+    """The batches of a call to one hull: one task reads and applies them, its caller tells what they did.
 
     Args:
         call: the call.
@@ -46,10 +45,9 @@ class BatchStream:
         self._producer = decode.decode_producer(first.producer)
         self._metrics = metrics
         self._news = asyncio.Event()
+        self._room = asyncio.Event()
         self._writer = hull.writer(self._news.set)
-        self._under_way: deque[tuple[int, float]] = deque()
-        self._reading: asyncio.Future[Any] | None = None
-        self._ended = False
+        self._untold: deque[tuple[int, float]] = deque()
         self._failure: Exception | None = None
         self._take(first)
 
@@ -59,51 +57,44 @@ class BatchStream:
         What refuses a batch is raised after the ones before it, DrainingError after those that are under way.
         """
         writer = self._writer
+        reading = asyncio.create_task(self._read())
+        reading.add_done_callback(lambda _: self._news.set())
         try:
             while True:
                 while writer.applied:
                     applied = writer.applied.popleft()
-                    sequence, came = self._under_way.popleft()
+                    sequence, came = self._untold.popleft()
+                    self._room.set()
                     self._metrics.applied(applied, time.perf_counter() - came)
                     yield sequence, applied
                 if writer.refusal is not None:
                     self._metrics.refused()
                     raise writer.refusal
-                if self._ended and not writer.batches:
+                if reading.done() and not writer.batches:
                     if self._failure is not None:
                         raise self._failure
                     return
-                try:
-                    await self._step()
-                except Exception as failure:
-                    self._failure, self._ended = failure, True
-        finally:
-            if self._reading is not None:
-                self._reading.cancel()
-
-    async def _step(self) -> None:
-        """Wait for the next message or for a batch under way, whichever comes first."""
-        writer = self._writer
-        if not writer.batches and self._reading is None:  # a batch at a time: no need for a second task
-            with self._call.cutoff():
-                message = await self._call.read()
-            self._take(message)
-            return
-        if self._reading is None and not self._ended and writer.rows < MOST_ROWS and writer.batches < MOST_BATCHES:
-            self._reading = asyncio.ensure_future(self._call.read())
-            self._reading.add_done_callback(lambda _: self._news.set())
-        if self._reading is None or not self._reading.done():  # it may have come while the caller was busy
-            self._news.clear()
-            with nullcontext() if self._ended else self._call.cutoff():
+                self._news.clear()
                 await self._news.wait()
-        if self._reading is not None and self._reading.done():
-            reading, self._reading = self._reading, None
-            self._take(reading.result())
+        finally:
+            reading.cancel()
+
+    async def _read(self) -> None:
+        """Take messages until the last, or until something is wrong with one."""
+        try:
+            with self._call.cutoff():
+                while True:
+                    while self._writer.rows >= MOST_ROWS or len(self._untold) >= MOST_BATCHES:
+                        self._room.clear()
+                        await self._room.wait()
+                    message = await self._call.read()
+                    if message is None:
+                        return
+                    self._take(message)
+        except Exception as failure:  # told after the batches before it
+            self._failure = failure
 
     def _take(self, message: Any) -> None:
-        if message is None:
-            self._ended = True
-            return
         if message.name not in ("", self._hull.name):
             raise decode.InvalidFieldError("name", message.name, f"this call writes to {self._hull.name!r}")
         if message.producer not in ("", self._producer):
@@ -113,5 +104,5 @@ class BatchStream:
                 raise decode.InvalidFieldError("sequence", message.sequence, "there is no batch to number")
             return
         write = decode_write(message, self._producer)
-        self._under_way.append((write.sequence, time.perf_counter()))
+        self._untold.append((write.sequence, time.perf_counter()))
         self._writer.write(write)

@@ -9,11 +9,14 @@ and send again. After every fault a model, the multiset of all batches, checks e
 * no reader ever sees a revision below one it has seen
 * a watcher's copy is the exact hull at the revision named
 * the hull is the one that a static algorithm finds, here and in the server
+* a server that is given the data with one byte changed does not start, and says why, or keeps all this too, but for
+  the last batches, and says that it lost them
 """
 
 import argparse
 import os
 import random
+import shutil
 import signal
 import socket
 import subprocess
@@ -106,18 +109,28 @@ class Server:
     """`dynhull serve` on a folder; it keeps its port over its lives."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._port = 0
-        self.log = (folder / "server.log").open("ab")
+        self.data = folder / "data"
+        self.port = 0
+        self._log = folder / "server.log"
 
     def start(self) -> int:
-        command = [COMMAND, "serve", "--port", str(self._port), "--data", str(self._folder / "data")]
+        require(self.starts(), f"the server did not start: {self.said()}")
+        return self.port
+
+    def starts(self) -> bool:
+        command = [COMMAND, "serve", "--port", str(self.port), "--data", str(self.data)]
         command += ["--snapshot-points", "2000", "--log-level", "warning", "--scrub-cpu", "0"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True)
+        with self._log.open("ab") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
         line = self.process.stdout.readline()
-        require("serving on" in line, f"the server did not start, see {self.log.name}")
-        self._port = int(line.rsplit(":", 1)[1])
-        return self._port
+        if "serving on" not in line:
+            self.process.wait()
+            return False
+        self.port = int(line.rsplit(":", 1)[1])
+        return True
+
+    def said(self) -> str:
+        return self._log.read_text()
 
     def kill(self) -> None:
         self.process.kill()
@@ -292,6 +305,7 @@ class Torture:
         self.readers = [Reader(self.shared, "reader")]
         self.watchers = [Watcher(self.shared, f"watcher-{i}") for i in range(2)]
         self.faults: Counter[str] = Counter()
+        self.damage: Counter[str] = Counter()
         for actor in (*self.writers, *self.readers, *self.watchers):
             actor.start()
         self.shared.gate.set()
@@ -334,6 +348,50 @@ class Torture:
         else:
             ballast.unlink()
 
+    def _damage(self) -> None:
+        """A kill, and a second server on a copy of the data in which a byte is another one."""
+        self.shared.gate.clear()
+        self.server.kill()
+        with tempfile.TemporaryDirectory() as folder:
+            damaged = Server(Path(folder))
+            shutil.copytree(self.server.data, damaged.data)
+            self._proxy.sever()
+            self._proxy.server_port = self.server.start()
+            acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
+            where = self._change_byte(damaged.data)
+            if damaged.starts():
+                with grpc.insecure_channel(f"127.0.0.1:{damaged.port}") as channel:
+                    self._check_damaged(HullServiceStub(channel), acknowledged, damaged, where)
+                damaged.kill()
+                self.damage["served"] += 1
+            else:
+                require("cannot serve: " in damaged.said(), f"{where}: {damaged.said()}")
+                require("Traceback" not in damaged.said(), f"{where}: {damaged.said()}")
+                self.damage["refused"] += 1
+
+    def _change_byte(self, data: Path) -> str:
+        files = [file for file in sorted(data.iterdir()) if file.stat().st_size and file.suffix != ".db-shm"]
+        file = self._random.choices(files, [file.stat().st_size for file in files])[0]
+        content = bytearray(file.read_bytes())
+        place = self._random.randrange(len(content))
+        content[place] ^= self._random.randrange(1, 256)
+        file.write_bytes(content)
+        return f"byte {place} of {file.name} changed"
+
+    def _check_damaged(self, stub: HullServiceStub, acknowledged: dict[str, int], server: Server, where: str) -> None:
+        last = {}
+        for name in acknowledged:
+            last[name] = stub.GetProducer(pb.GetProducerRequest(name=HULL, producer=name), timeout=10).last_sequence
+        points = self._model(last)
+        hull = stub.GetHull(pb.GetHullRequest(name=HULL), timeout=10).hull
+        require(hull.revision == sum(last.values()), f"{where}: revision {hull.revision} of batches {last}")
+        require(hull.point_count == points.total(), f"{where}: {hull.point_count} points of {points.total()}")
+        require(stub.Verify(pb.VerifyRequest(name=HULL), timeout=10).equal, f"{where}: the hull is wrong")
+        self._check_counts(stub, points)
+        lost = {name: count for name, count in acknowledged.items() if last[name] < count}
+        said = server.said()
+        require(not lost or "lost" in said, f"{where}: of batches {acknowledged} there are {last}, and nothing is said")
+
     def _settle(self) -> None:
         """Everything sent is acknowledged, and nobody writes."""
         self.shared.gate.clear()
@@ -345,8 +403,8 @@ class Torture:
 
     def _check(self) -> None:
         self._raise_failures()
-        points = self._model()
-        revision = sum(len(writer.batches) for writer in self.writers)
+        last = {writer.name: len(writer.batches) for writer in self.writers}
+        points, revision = self._model(last), sum(last.values())
         answer = self._call(self._stub.GetHull, pb.GetHullRequest(name=HULL, min_revision=revision))
         require(answer.hull.revision == revision, f"revision {answer.hull.revision} after {revision} batches")
         require(answer.hull.point_count == points.total(), f"{answer.hull.point_count} points of {points.total()}")
@@ -356,17 +414,21 @@ class Torture:
         for watcher in self.watchers:
             copy = watcher.vertices_at(revision)
             require(np.array_equal(copy, expected), f"{watcher.name}'s copy is not the hull at {revision}")
+        self._check_counts(self._stub, points)
+        self._raise_failures()
+
+    def _check_counts(self, stub: HullServiceStub, points: Counter[tuple[float, float]]) -> None:
         sample = self._random.sample(sorted(points), min(50, len(points)))
         query = pb.CountRequest(name=HULL)
         query.points.packed = np.array(sample, dtype=float).tobytes()
-        counts = list(self._call(self._stub.Count, query).counts)
+        counts = list(self._call(stub.Count, query).counts)
         require(counts == [points[p] for p in sample], "points are there more or less often than they were inserted")
-        self._raise_failures()
 
-    def _model(self) -> Counter[tuple[float, float]]:
+    def _model(self, last: dict[str, int]) -> Counter[tuple[float, float]]:
+        """The points after so many batches of each writer."""
         points: Counter[tuple[float, float]] = Counter()
         for writer in self.writers:
-            for inserts, deletes in writer.batches:
+            for inserts, deletes in writer.batches[: last[writer.name]]:
                 points.update(map(tuple, inserts.tolist()))
                 points.subtract(map(tuple, deletes.tolist()))
         return +points
@@ -396,7 +458,7 @@ class Torture:
 def torture(folder: Path, faults: int, seed: int, writers: int = 3) -> str:
     """Run so many rounds. Returns the counts; raises BrokenPromiseError with what was broken."""
     run = Torture(folder, seed, writers)
-    kinds = ["kill"] * 5 + ["pause", "sever", "sever", "full_disk"]
+    kinds = ["kill"] * 5 + ["pause", "sever", "damage", "sever", "full_disk"]
     try:
         for i in range(faults):
             run.round(kinds[i % len(kinds)])
@@ -408,7 +470,8 @@ def torture(folder: Path, faults: int, seed: int, writers: int = 3) -> str:
     return (
         f"faults: {kinds_seen}; batches acknowledged: {acknowledged}, lost: 0, doubled: 0; "
         f"reads: {sum(reader.reads for reader in run.readers)}, revisions back: 0; "
-        f"watch events after a resume: {sum(watcher.resumed for watcher in run.watchers)}"
+        f"watch events after a resume: {sum(watcher.resumed for watcher in run.watchers)}; "
+        f"with a byte changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
     )
 
 

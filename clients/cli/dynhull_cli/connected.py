@@ -1,0 +1,133 @@
+"""What the commands that talk to a server share: how to reach it, and how they end."""
+
+import inspect
+import sys
+from collections.abc import Callable
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import grpc
+import typer
+
+from dynhull_client import (
+    DeadlineError,
+    DynhullError,
+    HullClient,
+    PermissionDeniedError,
+    UnauthenticatedError,
+    UnavailableError,
+)
+
+
+class Exit(IntEnum):
+    """How a command ends, for scripts; 0 is success, 130 an interruption."""
+
+    FAILED = 1
+    UNUSABLE = 2
+    UNAVAILABLE = 3
+    FORBIDDEN = 4
+
+
+PANEL = "Server"
+Address = Annotated[str, typer.Option(envvar="DYNHULL_ADDRESS", help="HOST:PORT.", rich_help_panel=PANEL)]
+Token = Annotated[str | None, typer.Option(envvar="DYNHULL_TOKEN", help="Bearer token to show.", rich_help_panel=PANEL)]
+Tls = Annotated[
+    bool,
+    typer.Option(
+        "--tls", envvar="DYNHULL_TLS", help="Encrypt, and trust what this machine trusts.", rich_help_panel=PANEL
+    ),
+]
+TlsCa = Annotated[
+    Path | None,
+    typer.Option(
+        envvar="DYNHULL_TLS_CA",
+        help="Encrypt, and trust the certificates in this PEM file.",
+        exists=True,
+        dir_okay=False,
+        rich_help_panel=PANEL,
+    ),
+]
+ClientCert = Annotated[
+    Path | None,
+    typer.Option(
+        envvar="DYNHULL_CLIENT_CERT",
+        help="PEM file: certificate to show.",
+        exists=True,
+        dir_okay=False,
+        rich_help_panel=PANEL,
+    ),
+]
+ClientKey = Annotated[
+    Path | None,
+    typer.Option(
+        envvar="DYNHULL_CLIENT_KEY",
+        help="PEM file: its private key.",
+        exists=True,
+        dir_okay=False,
+        rich_help_panel=PANEL,
+    ),
+]
+
+
+def connected(command: Callable[..., None]) -> Callable[..., None]:
+    """A typer command with the options of a connection; `command` gets the client as its first argument.
+
+    What goes wrong ends it with a message that says what to do, and with the exit code for that.
+    """
+
+    def run(
+        *,
+        address: Address = "127.0.0.1:50051",
+        token: Token = None,
+        tls: Tls = False,
+        tls_ca: TlsCa = None,
+        client_cert: ClientCert = None,
+        client_key: ClientKey = None,
+        **given: Any,
+    ) -> None:
+        try:
+            credentials = _credentials(tls, tls_ca, client_cert, client_key)
+            with HullClient(address, token=token, tls=credentials) as client:
+                command(client, **given)
+        except (UnavailableError, DeadlineError) as error:
+            advice = "Is it running (dynhull serve), is the address right (--address), does it want TLS (--tls)?"
+            fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
+        except UnauthenticatedError as error:
+            fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
+        except PermissionDeniedError as error:
+            fail(Exit.FORBIDDEN, str(error))
+        except DynhullError as error:
+            fail(Exit.FAILED, str(error))
+        except BrokenPipeError:  # whoever reads has enough: the command line ends in silence
+            raise
+        except OSError as error:
+            fail(Exit.UNUSABLE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        except (ValueError, TypeError) as error:
+            fail(Exit.UNUSABLE, str(error))
+
+    own = list(inspect.signature(command).parameters.values())[1:]
+    shared = [each for each in inspect.signature(run).parameters.values() if each.kind is each.KEYWORD_ONLY]
+    parameters = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in own] + shared
+    run.__doc__, run.__name__ = command.__doc__, command.__name__
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return run
+
+
+def fail(code: Exit, message: str) -> None:
+    """End the command."""
+    typer.echo(f"error: {message}", err=True)
+    sys.exit(code)
+
+
+def _credentials(
+    tls: bool, ca: Path | None, certificate: Path | None, key: Path | None
+) -> grpc.ChannelCredentials | None:
+    if (certificate is None) != (key is None):
+        raise ValueError("--client-cert and --client-key go together")
+    if not (tls or ca or certificate):
+        return None
+    return grpc.ssl_channel_credentials(
+        *(None if path is None else path.read_bytes() for path in (ca, key, certificate))
+    )

@@ -1,0 +1,24 @@
+"""Lines of JSON, for pipes."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+
+def json_line(**members: Any) -> str:
+    """An object on one line. What JSON has no number for, NaN and the infinities, is null."""
+    return json.dumps(_plain(members), allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value

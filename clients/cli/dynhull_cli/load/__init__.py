@@ -1,0 +1,1 @@
+"""`dynhull load`: the points of files and pipes into a hull."""

@@ -1,0 +1,51 @@
+"""Rows that are no points: counted, the first ones shown, all of them written to a file where wanted."""
+
+import csv
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TextIO
+
+from .chunks import BadRow, Chunk, Points
+
+SHOWN = 5
+
+
+class BadRows:
+    """The bad rows of a load; ValueError as soon as there are more than `most`."""
+
+    def __init__(self, file: TextIO | None, most: int | None) -> None:
+        self.count = 0
+        self._first: list[BadRow] = []
+        self._most = most
+        self._writer = None if file is None else csv.writer(file)
+        if self._writer is not None:
+            self._writer.writerow(["place", "reason", "row"])
+
+    def left_out(self, chunks: Iterable[Chunk]) -> Iterator[Points]:
+        """The points of the chunks."""
+        for chunk in chunks:
+            self._add(chunk.bad)
+            yield chunk.points
+
+    def report(self) -> list[str]:
+        """Lines about them."""
+        if not self.count:
+            return []
+        lines = [f"{self.count:,} bad rows left out:", *(f"  {each.place}: {each.reason}" for each in self._first)]
+        if self.count > len(self._first):
+            lines.append(f"  ... and {self.count - len(self._first):,} more")
+        return lines
+
+    def _add(self, rows: list[BadRow]) -> None:
+        self.count += len(rows)
+        self._first += rows[: SHOWN - len(self._first)]
+        if self._writer is not None:
+            self._writer.writerows((each.place, each.reason, each.text) for each in rows)
+        if self._most is not None and self.count > self._most:
+            raise ValueError("\n".join([f"more than {self._most:,} bad rows (--max-bad)", *self.report()]))
+
+
+def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:
+    """The file to write them to."""
+    return nullcontext() if path is None else path.open("w", encoding="utf-8", newline="")

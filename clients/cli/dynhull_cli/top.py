@@ -1,0 +1,90 @@
+"""`dynhull top`: all hulls, the busiest first."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from dynhull_client import HullClient, HullInfo
+
+from .connected import connected
+from .json_lines import json_line
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A hull, and how much it took in a second: batches, and points more or fewer."""
+
+    info: HullInfo
+    batches: float
+    growth: float
+
+
+@connected
+def top(
+    client: HullClient,
+    prefix: Annotated[str, typer.Argument(help="Only hulls whose names begin so.")] = "",
+    interval: Annotated[float, typer.Option(min=0.01, help="Seconds between two looks.")] = 1.0,
+    looks: Annotated[
+        int | None, typer.Option(min=1, help="End after so many. Default: 1, in a terminal without end.")
+    ] = None,
+    rows: Annotated[int, typer.Option(min=1, help="How many hulls to show.")] = 25,
+    as_json: Annotated[bool, typer.Option("--json", help="A line of JSON for each hull and look.")] = False,
+) -> None:
+    """Show hulls with their sizes and rates, the busiest first.
+
+    dynhull top fleet/ --interval 5
+    """
+    console = Console(highlight=False)
+    live = console.is_terminal and not as_json
+    tables = islice(_looks(client, prefix, interval), looks if looks or live else 1)
+    if live:
+        with Live(console=console, auto_refresh=False) as screen:
+            for table in tables:
+                screen.update(_shown(table[:rows]), refresh=True)
+        return
+    for table in tables:
+        for row in table[:rows]:
+            info = row.info
+            if as_json:
+                members = {"revision": info.revision, "points": info.points, "distinct": info.distinct}
+                typer.echo(json_line(name=info.name, **members, batches=row.batches, growth=row.growth))
+            else:
+                typer.echo("\t".join(_cells(row)))
+
+
+def _looks(client: HullClient, prefix: str, interval: float) -> Iterator[list[Row]]:
+    """All hulls after each interval, the busiest first, then the largest."""
+    before, then = {info.uid: info for info in client.list_hulls(prefix)}, time.monotonic()
+    while True:
+        time.sleep(interval)
+        infos, now = list(client.list_hulls(prefix)), time.monotonic()
+        rows = []
+        for info in infos:
+            last = before.get(info.uid, info)
+            passed = now - then
+            rows.append(Row(info, (info.revision - last.revision) / passed, (info.points - last.points) / passed))
+        yield sorted(rows, key=lambda row: (-row.batches, -row.info.points, row.info.name))
+        before, then = {info.uid: info for info in infos}, now
+
+
+def _shown(rows: list[Row]) -> Table:
+    table = Table()
+    table.add_column("hull")
+    for heading in ("revision", "points", "distinct", "batches/s", "points/s"):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        table.add_row(*_cells(row))
+    return table
+
+
+def _cells(row: Row) -> list[str]:
+    info = row.info
+    counts = [f"{each:,}" for each in (info.revision, info.points, info.distinct)]
+    return [info.name, *counts, f"{row.batches:,.1f}", f"{row.growth:+,.0f}"]

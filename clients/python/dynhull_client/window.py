@@ -1,0 +1,208 @@
+"""A writer's batches: gathered, numbered, sent, acknowledged. No I/O, no clock: `Writer` and `AsyncWriter` do that."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import grpc
+
+from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+
+from .batch import batch_rows, join_batches
+from .calls import Writing
+from .errors import (
+    DynhullError,
+    HullNotFoundError,
+    PermissionDeniedError,
+    ProducerInUseError,
+    SequenceGapError,
+    UnauthenticatedError,
+    UnavailableError,
+)
+from .messages import Applied, decode_applied
+from .retry import pauses
+
+if TYPE_CHECKING:
+    from asyncio import Future as TaskFuture
+    from concurrent.futures import Future as ThreadFuture
+
+# What refuses the writer, not one of its batches.
+FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
+
+
+Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
+Settled = list[tuple[Any, Applied | DynhullError]]
+
+
+@dataclass(slots=True)
+class Batch(Generic[Future]):
+    """Points to be sent as one batch, numbered when it is sent for the first time.
+
+    `rows` are the points, `due` is when it is sent at the latest, `sent` how often it was.
+    """
+
+    outcome: Future
+    due: float
+    parts: list[batch_pb2.Batch]
+    rows: int = 0
+    sent: int = 0
+    request: pb.StreamRequest | None = None
+
+
+class Window(Generic[Future]):
+    """The batches of a writer that are not acknowledged yet.
+
+    Attributes:
+        sequence: the number of the last batch acknowledged.
+        failure: what ended the writer; None as long as nothing has.
+        begun: how many batches there have been.
+        settled: how many of them have been applied or refused.
+    """
+
+    def __init__(self, writing: Writing, sequence: int, new_outcome: Callable[[], Future]) -> None:
+        self.sequence = sequence
+        self.failure: DynhullError | None = None
+        self.begun = 0
+        self.settled = 0
+        self._writing = writing
+        self._new_outcome: Callable[[], Future] = new_outcome
+        self._gathering: Batch[Future] | None = None
+        self._under_way: deque[Batch[Future]] = deque()
+        self._on_this_connection = 0
+        self._one_at_a_time = False
+        self._refusal: DynhullError | None = None
+        self._pauses = pauses()
+        self._lost_since: float | None = None
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for more points."""
+        return self._gathering is not None and self._gathering.rows >= self._writing.batch_points
+
+    @property
+    def empty(self) -> bool:
+        """Whether everything is acknowledged."""
+        return self._gathering is None and not self._under_way
+
+    def put(self, batch: batch_pb2.Batch, now: float) -> Future:
+        """Add points; the outcome is that of the batch they become part of."""
+        if self.failure is not None:
+            raise self.failure
+        if self._gathering is None:
+            self._gathering = Batch(self._new_outcome(), now + self._writing.linger, [])
+            self.begun += 1
+        self._gathering.parts.append(batch)
+        self._gathering.rows += batch_rows(batch)
+        return self._gathering.outcome
+
+    def hurry(self, now: float) -> None:
+        """Let nothing linger."""
+        if self._gathering is not None:
+            self._gathering.due = now
+
+    def first(self) -> pb.StreamRequest:
+        """The first message of a connection."""
+        return pb.StreamRequest(name=self._writing.name, producer=self._writing.producer)
+
+    def take(self, now: float) -> pb.StreamRequest | None:
+        """The next message to send on this connection; None where there is none as yet."""
+        most = 1 if self._one_at_a_time else self._writing.in_flight
+        if self._on_this_connection >= most:
+            return None
+        if self._on_this_connection == len(self._under_way):
+            gathered = self._gathering
+            if gathered is None or (gathered.due > now and not self.full):
+                return None
+            self._gathering = None
+            gathered.request = pb.StreamRequest(
+                batch=join_batches(gathered.parts), sequence=self.sequence + len(self._under_way) + 1
+            )
+            gathered.parts.clear()
+            self._under_way.append(gathered)
+        batch = self._under_way[self._on_this_connection]
+        self._on_this_connection += 1
+        batch.sent += 1
+        return batch.request
+
+    def due_in(self, now: float) -> float | None:
+        """Seconds until the points gathered are to be sent; None where none wait for that."""
+        waits = self._gathering is not None and self._on_this_connection == len(self._under_way)
+        return max(0.0, self._gathering.due - now) if self._gathering is not None and waits else None
+
+    def acknowledge(self, response: pb.StreamResponse) -> Settled:
+        """The first batch under way has been applied."""
+        applied = decode_applied(response.result)
+        if applied.duplicate and self._under_way[0].sent == 1:
+            batch = f"batch {response.sequence} of producer {self._writing.producer!r}"
+            message = f"{batch} had been applied before it was sent: another writer has the same name"
+            return self._end(ProducerInUseError(message, grpc.StatusCode.FAILED_PRECONDITION, "PRODUCER_IN_USE", {}))
+        self._lost_since, self._pauses = None, pauses()
+        self._one_at_a_time = False
+        self._on_this_connection -= 1
+        self.sequence += 1
+        self.settled += 1
+        return [(self._under_way.popleft().outcome, applied)]
+
+    def lost(self, error: DynhullError, now: float) -> tuple[Settled, float | None]:
+        """The connection has ended: what that settles, and seconds until the next one; None where there is none."""
+        alone = self._on_this_connection == 1
+        self._on_this_connection = 0
+        if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
+            return self._end(error), None
+        unclear = isinstance(error, UnavailableError) or not error.reason
+        if error.code == grpc.StatusCode.RESOURCE_EXHAUSTED and not error.reason:
+            # gRPC's own limit on messages. It does not say which, and earlier ones may have been applied.
+            unclear, self._one_at_a_time = not alone, True
+        if unclear:
+            if self.empty or self._lost_since is None:
+                self._lost_since = now
+            if now - self._lost_since > self._writing.patience:
+                return self._end(error), None
+            return [], next(self._pauses)
+        return self._refuse(error)
+
+    def abandon(self) -> list[Future]:
+        """Forget everything; returns the outcomes that nobody will know."""
+        left = [each.outcome for each in self._under_way]
+        if self._gathering is not None:
+            left.append(self._gathering.outcome)
+        self._gathering = None
+        self._under_way.clear()
+        return left
+
+    def raise_refusal(self) -> None:
+        """Raise what has ended the writer, or what refused a batch, the first since the last call."""
+        refusal, self._refusal = self.failure or self._refusal, None
+        if refusal is not None:
+            raise refusal
+
+    def _refuse(self, error: DynhullError) -> tuple[Settled, float | None]:
+        """The first batch is at fault, for all before it have been acknowledged; the others move up by a number."""
+        if self._writing.stop_on_error:
+            return self._end(error), None
+        self._refusal = self._refusal or error
+        refused = self._under_way.popleft()
+        self.settled += 1
+        for batch in self._under_way:
+            assert batch.request is not None  # what is under way has been sent
+            batch.request.sequence -= 1
+            batch.sent = 0
+        return [(refused.outcome, error)], 0.0
+
+    def _end(self, error: DynhullError) -> Settled:
+        self.failure = error
+        return [(outcome, error) for outcome in self.abandon()]
+
+
+def settle(settled: Settled) -> None:
+    """Tell what became of batches."""
+    for outcome, result in settled:
+        if outcome.done():  # cancelled by whoever waited for it
+            continue
+        if isinstance(result, Applied):
+            outcome.set_result(result)
+        else:
+            outcome.set_exception(result)
+            outcome.exception()  # flush and close raise it too: asyncio need not complain that nobody has looked

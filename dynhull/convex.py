@@ -1,0 +1,300 @@
+"""Convex sets known by their support function: the farthest point in any direction.
+
+A shape is any object that has the two members of `Convex`; a `DynamicHull` is one. Moving, turning, scaling and adding
+shapes makes new ones that ask the old ones, so a live hull inside stays live.
+
+>>> square = box([0, 0], [2, 2])
+>>> capsule([0, 0], [5, 0], radius=1).support([[1, 0], [0, 1]]).tolist()
+[[6.0, 0.0], [0.0, 1.0]]
+>>> moved(minkowski_sum(square, ball([0, 0], 1)), [10, 0]).support([[1, 0]]).tolist()
+[[13.0, 0.0]]
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cmp_to_key
+from itertools import product
+from math import cos, isfinite, sin
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Points, as_directions, as_points, as_rows, as_tuples, as_vector
+from .exact import as_integers
+from .predicates import EPSILON, Point, cross_sign
+from .static import convex_hull
+
+Way = tuple[Point, Point, int]
+
+
+@runtime_checkable
+class Convex(Protocol):
+    """A convex set in two or three dimensions (most functions take any number of them)."""
+
+    @property
+    def dimension(self) -> int:
+        """Of the space: 2 or 3."""
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, d) points of the set, each farthest in one of (k, d) directions, which need no unit length.
+
+        Raises:
+            ValueError: a direction is zero or not finite, or the set is empty.
+        """
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cloud:
+    """The convex hull of (n, d) points. Support is exact, O(n); of equally far points the lexicographically smallest.
+
+    Raises:
+        ValueError, TypeError: no points, or bad ones: the message names the first bad row.
+    """
+
+    points: Points
+    _reach: Points = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        points = np.unique(as_rows(self.points), axis=0)
+        if not len(points):
+            raise ValueError("points are none: an empty set has no support function")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "_reach", np.abs(points).max(axis=0))
+
+    @property
+    def dimension(self) -> int:
+        """Of the space."""
+        return int(self.points.shape[1])
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, d) points, each farthest in one of (k, d) directions."""
+        vectors = as_directions(directions, self.dimension)
+        if len(self.points) == 1:
+            return np.repeat(self.points, len(vectors), axis=0)
+        return np.asarray(self.points[[self._farthest(vector) for vector in vectors]])
+
+    def _farthest(self, vector: Points) -> int:
+        """The number of the first of the farthest points."""
+        largest = np.frexp(np.abs(vector).max())[1] + np.frexp(self._reach.max())[1]
+        with np.errstate(all="ignore"):
+            far = self.points @ vector
+            error = 4 * len(vector) * EPSILON * (self._reach @ np.abs(vector))
+            # What overflows or underflows is not told apart here.
+            safe = -900 < largest < 1000
+            near = np.flatnonzero(far >= far.max() - 2 * error) if safe else np.arange(len(far))
+        if len(near) == 1:
+            return near.item()
+        points, _ = as_integers(self.points[near])
+        scaled, _ = as_integers(vector)
+        exactly = (points @ scaled).tolist()
+        return int(near[exactly.index(max(exactly))])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ball:
+    """All points within a radius of a centre. Support within two units in the last place of the largest coordinate.
+
+    Raises:
+        ValueError: the radius is negative or not finite, or the centre is no point.
+    """
+
+    centre: Points
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", as_vector(self.centre, "centre"))
+        if not (isfinite(self.radius) and self.radius >= 0):
+            raise ValueError(f"radius is {self.radius!r}: must be finite and not negative")
+
+    @property
+    def dimension(self) -> int:
+        """Of the space."""
+        return len(self.centre)
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, d) points, each farthest in one of (k, d) directions."""
+        vectors = as_directions(directions, self.dimension)
+        vectors = vectors / np.abs(vectors).max(axis=1, keepdims=True)
+        farthest: Points = self.centre + self.radius * vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        return farthest
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sum:
+    """The Minkowski sum of shapes: all sums of one point of each. Support rounds once an addition."""
+
+    parts: Sequence[Convex]
+
+    def __post_init__(self) -> None:
+        dimensions = {part.dimension for part in self.parts}
+        if len(dimensions) != 1:
+            raise ValueError(f"the shapes of a sum must be some, of one dimension; got {sorted(dimensions)}")
+
+    @property
+    def dimension(self) -> int:
+        """Of the space."""
+        return self.parts[0].dimension
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, d) points, each farthest in one of (k, d) directions."""
+        first, *others = (part.support(directions) for part in self.parts)
+        return sum(others, first)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mapped:
+    """The image of a shape under x -> matrix @ x + offset, by turning the direction back.
+
+    Support is that of the shape in the direction rounded once, then rounded once more.
+
+    Attributes:
+        stretch: by how much every length grows, where that is the same in all directions, else None.
+
+    Raises:
+        ValueError: the matrix or the offset does not fit the shape, or is not finite.
+    """
+
+    shape: Convex
+    matrix: Points
+    offset: Points
+    stretch: float | None = None
+
+    def __post_init__(self) -> None:
+        d = self.shape.dimension
+        matrix, offset = as_rows(self.matrix, "matrix"), as_vector(self.offset, "offset")
+        if matrix.shape != (d, d) or offset.shape != (d,):
+            raise ValueError(
+                f"matrix and offset must have shapes ({d}, {d}) and ({d},), got {matrix.shape} and {offset.shape}"
+            )
+        object.__setattr__(self, "matrix", matrix)
+        object.__setattr__(self, "offset", offset)
+
+    @property
+    def dimension(self) -> int:
+        """Of the space."""
+        return self.shape.dimension
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, d) points, each farthest in one of (k, d) directions."""
+        vectors = as_directions(directions, self.dimension)
+        turned = vectors @ self.matrix
+        # A direction along which the map flattens everything: every point is farthest.
+        turned[~turned.any(axis=1)] = np.eye(self.dimension)[0]
+        image: Points = self.shape.support(turned) @ self.matrix.T + self.offset
+        return image
+
+
+def point(p: npt.ArrayLike) -> Cloud:
+    """One point, in any dimension."""
+    return Cloud(as_vector(p, "p")[None])
+
+
+def segment(p: npt.ArrayLike, q: npt.ArrayLike) -> Cloud:
+    """All points between two."""
+    ends = [as_vector(p, "p"), as_vector(q, "q")]
+    if len(ends[0]) != len(ends[1]):
+        raise ValueError(f"p and q must have the same dimension, got {len(ends[0])} and {len(ends[1])}")
+    return Cloud(np.stack(ends))
+
+
+def polygon(points: npt.ArrayLike) -> Cloud:
+    """The convex hull of points in the plane; support O(h)."""
+    return Cloud(convex_hull(as_points(points)))
+
+
+def ball(centre: npt.ArrayLike, radius: float) -> Ball:
+    """A disk in the plane, a ball in space."""
+    return Ball(as_vector(centre, "centre"), radius)
+
+
+def box(low: npt.ArrayLike, high: npt.ArrayLike) -> Cloud:
+    """The box between two opposite corners, sides along the axes."""
+    sides = segment(low, high).points.T
+    return Cloud(np.array(list(product(*sides))))
+
+
+def capsule(p: npt.ArrayLike, q: npt.ArrayLike, radius: float) -> Sum:
+    """All points within a radius of a segment."""
+    ends = segment(p, q)
+    return Sum((ends, Ball(np.zeros(ends.dimension), radius)))
+
+
+def moved(shape: Convex, offset: npt.ArrayLike) -> Mapped:
+    """The shape, moved by an offset."""
+    return Mapped(shape, np.eye(shape.dimension), as_vector(offset, "offset"), 1.0)
+
+
+def rotated(shape: Convex, rotation: float | npt.ArrayLike) -> Mapped:
+    """The shape turned around the origin: by an angle in radians, counter-clockwise (2D), or by a rotation matrix.
+
+    Raises:
+        ValueError: the matrix is not orthogonal up to 1e-12, or an angle is given in three dimensions.
+    """
+    if np.ndim(rotation) == 0:
+        if shape.dimension != 2:
+            raise ValueError("one angle turns the plane; give a rotation matrix")
+        angle = float(np.asarray(rotation))
+        if not isfinite(angle):
+            raise ValueError(f"rotation is {angle!r}: must be finite")
+        rotation = [[cos(angle), -sin(angle)], [sin(angle), cos(angle)]]
+    matrix = as_rows(rotation, "rotation")
+    if matrix.shape[0] != matrix.shape[1] or not np.allclose(
+        matrix @ matrix.T, np.eye(len(matrix)), rtol=0, atol=1e-12
+    ):
+        raise ValueError("rotation is no orthogonal matrix")
+    return Mapped(shape, matrix, np.zeros(shape.dimension), 1.0)
+
+
+def scaled(shape: Convex, factor: float | npt.ArrayLike) -> Mapped:
+    """The shape scaled about the origin, by one factor or by one for each axis (an ellipse is a scaled ball)."""
+    matrix = np.diag(np.broadcast_to(np.asarray(factor, dtype=np.float64), (shape.dimension,)))
+    stretch = abs(float(np.asarray(factor))) if np.ndim(factor) == 0 else None
+    return Mapped(shape, matrix, np.zeros(shape.dimension), stretch)
+
+
+def minkowski_sum(a: Convex, b: Convex) -> Sum:
+    """All points p + q, p of a and q of b."""
+    return Sum((a, b))
+
+
+def minkowski_difference(a: Convex, b: Convex) -> Sum:
+    """All points p - q, p of a and q of b: it holds the origin exactly where a and b intersect."""
+    return Sum((a, scaled(b, -1.0)))
+
+
+def convex_combination(a: Convex, b: Convex, share: float) -> Sum:
+    """(1 - share) a + share b, as a becomes b while the share goes from 0 to 1.
+
+    Raises:
+        ValueError: the share is not within 0 and 1.
+    """
+    if not 0 <= share <= 1:
+        raise ValueError(f"share is {share!r}: must be from 0 to 1")
+    return Sum((scaled(a, 1 - share), scaled(b, share)))
+
+
+def sum_of_polygons(p: npt.ArrayLike, q: npt.ArrayLike) -> Points:
+    """(h, 2) vertices of the Minkowski sum of the hulls of two sets of points, counter-clockwise. O(n log n).
+
+    Edges are merged by direction, exactly; each coordinate is a sum of two, rounded once. No points: (0, 2).
+    """
+    a, b = convex_hull(p), convex_hull(q)
+    if not len(a) or not len(b):
+        return np.empty((0, 2))
+    # Both hulls begin at their least vertex, and so does the sum: its edges are those of both, in order of direction.
+    ways = [(u, v, one) for one, corners in ((1, a), (0, b)) for u, v in _ways(corners)]
+    ones = np.array([one for *_, one in sorted(ways, key=cmp_to_key(_compare_directions))], dtype=np.int64)
+    steps = np.concatenate([[0], np.cumsum(ones)]) % len(a), np.concatenate([[0], np.cumsum(1 - ones)]) % len(b)
+    return convex_hull(a[steps[0]] + b[steps[1]])
+
+
+def _ways(corners: Points) -> list[tuple[Point, Point]]:
+    rows = as_tuples(corners)
+    return list(zip(rows, rows[1:] + rows[:1], strict=True)) if len(rows) > 1 else []
+
+
+def _compare_directions(s: Way, t: Way) -> int:
+    """Counter-clockwise from straight down: edges of the lower chain before those of the upper one."""
+    upper_s, upper_t = s[1] < s[0], t[1] < t[0]
+    return upper_s - upper_t or cross_sign(t[0], t[1], s[0], s[1])

@@ -1,0 +1,160 @@
+"""A binary phase diagram that lives: entries of composition and energy come and go."""
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from fractions import Fraction
+from math import nan
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Points, as_points, as_tuples
+from ..exact import rounded
+from ..hull import DynamicHull
+from ..predicates import Point
+
+
+@dataclass(frozen=True, eq=False)
+class Decomposition:
+    """What entries of given compositions fall into: a mixture of two stable neighbours each.
+
+    Attributes:
+        phases: (k, 2, 2) the two stable entries, left and right; at a stable composition that one, twice.
+        shares: (k, 2) of each of them: not negative, in sum 1. NaN, as the phases, beyond the outermost entries.
+    """
+
+    phases: Points
+    shares: Points
+
+
+class PhaseDiagram:
+    """Which entries of a binary system are stable: those on the lower hull of (composition, energy).
+
+    Args:
+        entries: (n, 2) array-like: composition, the share of the second element from 0 to 1, and energy per atom. Raw
+            or formation energies: a linear term changes no answer. For the usual meaning, with entries at 0 and at 1.
+
+    Which entries are stable is exact. Methods that take entries raise ValueError or TypeError for bad ones, naming the
+    first bad row, and change nothing. O(log² n) an update; the lower hull is read once after a change, O(h log n).
+
+    >>> diagram = PhaseDiagram([[0, 0], [1, 0], [0.5, -1]])
+    >>> diagram.add(0.25, -0.75).tolist()  # nothing became unstable
+    []
+    >>> diagram.add(0.75, -2).tolist()
+    [[0.5, -1.0]]
+    >>> diagram.energy_above_hull([[0.5, -1]]).tolist()
+    [0.375]
+    >>> diagram.remove(0.75, -2).tolist()  # stable again
+    [[0.5, -1.0]]
+    """
+
+    __slots__ = ("_hull", "_stable")
+
+    def __init__(self, entries: npt.ArrayLike | None = None) -> None:
+        self._hull = DynamicHull(None if entries is None else _as_entries(entries))
+        self._stable: tuple[int, list[Point]] = (-1, [])
+
+    def __len__(self) -> int:
+        """How many entries, with multiplicity."""
+        return len(self._hull)
+
+    def add(self, composition: float, energy: float) -> Points:
+        """Add an entry. Returns the (k, 2) entries that it made unstable."""
+        return self.add_many([[composition, energy]])
+
+    def add_many(self, entries: npt.ArrayLike) -> Points:
+        """Add (k, 2) entries. Returns those that were stable and are not any more, left to right."""
+        added = _as_entries(entries)
+        before = self._chain()
+        self._hull.insert_many(added)
+        return self._lost(before, self._chain())
+
+    def remove(self, composition: float, energy: float) -> Points:
+        """Remove an entry once. Returns the (k, 2) entries that became stable.
+
+        Raises:
+            KeyError: it is not there.
+        """
+        before = self._chain()
+        self._hull.delete(composition, energy)
+        return self._lost(self._chain(), before)
+
+    def entries(self) -> Points:
+        """(n, 2) entries by composition, then energy."""
+        return self._hull.points()
+
+    def stable(self) -> Points:
+        """(h, 2) stable entries, left to right; those on a line between two others are left out."""
+        return np.array(self._chain(), dtype=np.float64).reshape(-1, 2)
+
+    def energy_above_hull(self, entries: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(k,) energies of (k, 2) entries, in the diagram or not, above the lower hull at their compositions.
+
+        The exact value rounded once: 0.0 for stable entries and only for those on the hull, negative for what would
+        change it, NaN beyond the outermost entries. O(log h) each.
+        """
+        rows, chain = _as_entries(entries), self._chain()
+        return np.array([_above(chain, x, energy) for x, energy in rows.tolist()], dtype=np.float64)
+
+    def decompose(self, compositions: npt.ArrayLike) -> Decomposition:
+        """What each of (k,) compositions falls into. The shares are exact values rounded once. O(log h) each.
+
+        >>> found = PhaseDiagram([[0, 0], [0.5, -1], [1, 0]]).decompose([0.125])
+        >>> found.phases.tolist(), found.shares.tolist()
+        ([[[0.0, 0.0], [0.5, -1.0]]], [[0.75, 0.25]])
+        """
+        xs = np.asarray(compositions, dtype=np.float64)
+        if xs.ndim != 1:
+            raise ValueError(f"compositions must have shape (k,), got {xs.shape}")
+        rows = _as_entries(np.column_stack([xs, np.zeros(len(xs))]), "compositions")
+        chain = self._chain()
+        phases, shares = np.full((len(xs), 2, 2), nan), np.full((len(xs), 2), nan)
+        for row, x in enumerate(rows[:, 0].tolist()):
+            if chain and chain[0][0] <= x <= chain[-1][0]:
+                left, right = _neighbours(chain, x)
+                share = _share(left, right, x)
+                phases[row], shares[row] = (left, right), (rounded(1 - share), rounded(share))
+        return Decomposition(phases, shares)
+
+    def _chain(self) -> list[Point]:
+        """The lower hull, read again where it changed."""
+        changes = self._hull.changes
+        if self._stable[0] != changes:
+            chain = as_tuples(self._hull.lower())
+            if len(chain) > 1 and chain[-2][0] == chain[-1][0]:  # its right end goes straight up
+                chain.pop()
+            self._stable = (changes, chain)
+        return self._stable[1]
+
+    def _lost(self, before: list[Point], after: list[Point]) -> Points:
+        still = set(after)
+        return np.array([p for p in before if p not in still], dtype=np.float64).reshape(-1, 2)
+
+
+def _as_entries(entries: npt.ArrayLike, name: str = "entries") -> Points:
+    rows = as_points(entries, name)
+    outside = np.flatnonzero((rows[:, 0] < 0) | (rows[:, 0] > 1))
+    if outside.size:
+        raise ValueError(f"{name} row {outside[0]} has composition {rows[outside[0], 0]}: must be from 0 to 1")
+    return rows
+
+
+def _neighbours(chain: list[Point], x: float) -> tuple[Point, Point]:
+    """The stable entries on both sides of a composition within the chain."""
+    i = bisect_left(chain, x, key=lambda entry: entry[0])
+    return (chain[i], chain[i]) if chain[i][0] == x else (chain[i - 1], chain[i])
+
+
+def _share(left: Point, right: Point, x: float) -> Fraction:
+    """Of the right neighbour."""
+    if left == right:
+        return Fraction(0)
+    return (Fraction(x) - Fraction(left[0])) / (Fraction(right[0]) - Fraction(left[0]))
+
+
+def _above(chain: list[Point], x: float, energy: float) -> float:
+    if not chain or not chain[0][0] <= x <= chain[-1][0]:
+        return nan
+    left, right = _neighbours(chain, x)
+    floor = Fraction(left[1]) + _share(left, right, x) * (Fraction(right[1]) - Fraction(left[1]))
+    return rounded(Fraction(energy) - floor)

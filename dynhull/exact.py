@@ -1,0 +1,105 @@
+"""Rational arithmetic on doubles: values that are exact until they are rounded, once."""
+
+from fractions import Fraction
+from math import inf, isqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Points
+from .predicates import Point
+
+Exact = tuple[Fraction, Fraction]
+Integers = npt.NDArray[Any]
+
+MANTISSA = 53
+HALF = 27  # bits: the sum of 2**26 halves is still exact in a double
+# Beyond these the low part of a product of three doubles may underflow.
+SMALLEST_FACTOR, LARGEST_FACTOR = 2.0**-280, 2.0**280
+SPLITTER = 2.0**27 + 1.0
+
+
+def exact(p: Point) -> Exact:
+    """The same point in rational numbers."""
+    return Fraction(p[0]), Fraction(p[1])
+
+
+def squared_length(a: Point, b: Point) -> Fraction:
+    """Of the way from a to b."""
+    (ax, ay), (bx, by) = exact(a), exact(b)
+    return (bx - ax) ** 2 + (by - ay) ** 2
+
+
+def doubled_triangle(a: Point, b: Point, c: Point) -> Fraction:
+    """Twice the area of the triangle, negative where it turns right."""
+    (ax, ay), (bx, by), (cx, cy) = exact(a), exact(b), exact(c)
+    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+
+
+def rounded(value: Fraction) -> float:
+    """The nearest double; inf with the right sign where it is beyond every double."""
+    try:
+        return float(value)
+    except OverflowError:
+        return inf if value > 0 else -inf
+
+
+def root(value: Fraction) -> float:
+    """The square root of a rational number, within one unit in the last place; inf where no double is so large."""
+    if value == 0:
+        return 0.0
+    # A quotient of at least 2 * 64 bits whose power of two is even: its root has 64 bits or more.
+    shift = 130 - value.numerator.bit_length() + value.denominator.bit_length()
+    shift += shift % 2
+    scaled = (value.numerator << shift if shift > 0 else value.numerator) // (
+        value.denominator if shift > 0 else value.denominator << -shift
+    )
+    half = Fraction(2) ** (-shift // 2)
+    return rounded(isqrt(scaled) * half)
+
+
+def as_integers(values: npt.NDArray[np.float64]) -> tuple[Integers, Fraction]:
+    """Python integers in an array of the same shape, and the power of two that turns them back into the values."""
+    mantissas, exponents = np.frexp(values)
+    used = exponents[mantissas != 0]
+    least = int(used.min()) if used.size else 0
+    shifts = np.where(mantissas != 0, exponents - least, 0)
+    integers = np.ldexp(mantissas, MANTISSA).astype(np.int64).astype(object) << shifts.astype(object)
+    return integers, Fraction(2) ** (least - MANTISSA)
+
+
+def exact_sum(terms: npt.NDArray[np.float64]) -> Fraction:
+    """The sum of finite doubles without any rounding. O(k), for up to 2**26 of them."""
+    mantissas, exponents = np.frexp(terms.ravel())
+    if not mantissas.size:
+        return Fraction(0)
+    least = int(exponents.min())
+    scaled = np.ldexp(mantissas, MANTISSA - HALF)
+    high = np.floor(scaled)
+    low = np.ldexp(scaled - high, HALF)
+    places = exponents - least
+    total = 0
+    for part, shift in ((high, HALF), (low, 0)):
+        sums = np.bincount(places, weights=part)
+        total += sum(int(value) << (place + shift) for place, value in enumerate(sums.tolist()) if value)
+    return total * Fraction(2) ** (least - MANTISSA)
+
+
+def products(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Two rows whose sum is a * b exactly, for factors that `safe_factors` (Dekker 1971, with Veltkamp's splitting)."""
+    high = a * b
+    (a_high, a_low), (b_high, b_low) = _split(a), _split(b)
+    return np.stack([high, ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low])
+
+
+def _split(a: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    scaled = SPLITTER * a
+    high = scaled - (scaled - a)
+    return high, a - high
+
+
+def safe_factors(values: Points) -> bool:
+    """Whether products of any three of the values are free of overflow and of underflow, low parts included."""
+    sizes = np.abs(values)
+    return bool(np.all((sizes == 0) | ((sizes > SMALLEST_FACTOR) & (sizes < LARGEST_FACTOR))))

@@ -1,0 +1,21 @@
+"""Rounded shapes as a core and a radius: on the cores GJK ends after a few steps, on curves it only converges."""
+
+from ..convex import Ball, Cloud, Convex, Mapped, Sum
+
+
+def core(shape: Convex) -> tuple[Convex, float]:
+    """A shape and a radius: the shape given is all points within the radius of it."""
+    if isinstance(shape, Ball):
+        return Cloud(shape.centre[None]), shape.radius
+    if isinstance(shape, Sum):
+        cores = [core(part) for part in shape.parts]
+        radius = sum(radius for _, radius in cores)
+        return (Sum([part for part, _ in cores]), radius) if radius else (shape, 0.0)
+    if isinstance(shape, Mapped) and shape.stretch is not None:
+        inner, radius = core(shape.shape)
+        return (
+            (Mapped(inner, shape.matrix, shape.offset, shape.stretch), radius * shape.stretch)
+            if radius
+            else (shape, 0.0)
+        )
+    return shape, 0.0

@@ -1,0 +1,154 @@
+"""EPA: the expanding polytope algorithm, for the depth of an overlap.
+
+From the simplex that holds the origin, always push out the side that is nearest to it, until a side cannot be pushed:
+that side belongs to the difference, and its distance is the depth.
+"""
+
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+from math import inf
+
+from .difference import Corner, Difference
+from .simplex import nearest
+from .vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale, subtract, unit
+
+MOST_ITERATIONS = 512
+# Relative to the size of the difference: a push of less is rounding.
+GAIN = 1e-13
+AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """How deep, in which direction the second set leaves the first, and the deepest points of each in the other."""
+
+    depth: float
+    normal: Vector
+    points: tuple[Vector, Vector]
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """An edge in the plane, a triangle in space, seen counter-clockwise from outside."""
+
+    corners: tuple[Corner, ...]
+    normal: Vector
+    distance: float
+
+
+def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
+    """Push out the simplex, which holds the origin up to rounding."""
+    corners, flat = _full(difference, list(simplex))
+    iterations = len(corners) - len(simplex)
+    if flat is not None:  # moving out of their common line or plane parts them at once
+        kept, weights = nearest([corner.w for corner in simplex])
+        return Overlap(0.0, flat, _points(weights, [simplex[i] for i in kept]), iterations)
+    size = max(length(corner.w) for corner in corners)
+    sides = _outward_sides(corners)
+    heap = [(side.distance, i) for i, side in enumerate(sides)]
+    heapify(heap)
+    gone: set[int] = set()
+    while True:
+        _, i = heappop(heap)
+        if i in gone:
+            continue
+        side = sides[i]
+        far = difference.farthest(side.normal)
+        iterations += 1
+        if dot(far.w, side.normal) - side.distance <= GAIN * size or iterations >= MOST_ITERATIONS:
+            break
+        seen = _visible(sides, gone, i, far, GAIN * size) if difference.dimension == 3 else [i]
+        new = _cone([sides[k] for k in seen], far)
+        gone.update(seen)
+        for s in new:
+            heappush(heap, (s.distance, len(sides)))
+            sides.append(s)
+    foot = scale(side.distance, side.normal)
+    kept, weights = nearest([subtract(corner.w, foot) for corner in side.corners])
+    points = _points(weights, [side.corners[k] for k in kept])
+    return Overlap(max(side.distance, 0.0), side.normal, points, iterations)
+
+
+def _points(weights: tuple[float, ...], corners: list[Corner]) -> tuple[Vector, Vector]:
+    return combine(weights, [c.p for c in corners]), combine(weights, [c.q for c in corners])
+
+
+def _full(difference: Difference, corners: list[Corner]) -> tuple[list[Corner], Vector | None]:
+    """Corners of a simplex of full size, or of a smaller one and a direction in which the difference has no extent."""
+    while len(corners) <= difference.dimension:
+        for direction in _across(corners, difference.dimension):
+            found = [difference.farthest(scale(sign, direction)) for sign in (1.0, -1.0)]
+            reach = [abs(dot(subtract(far.w, corners[0].w), direction)) for far in found]
+            if max(reach) > GAIN * max(length(corner.w) for corner in (*corners, *found)):
+                corners = [*corners, found[reach[1] > reach[0]]]
+                break
+        else:
+            return corners, direction
+    return corners, None
+
+
+def _across(corners: list[Corner], dimension: int) -> list[Vector]:
+    """Unit vectors at right angles to a point, a segment or a triangle; the first ones that will do."""
+    ways = [subtract(corner.w, corners[0].w) for corner in corners[1:]]
+    if not ways:
+        return list(AXES[:dimension])
+    if dimension == 2:
+        return [unit((-ways[0][1], ways[0][0], 0.0))]
+    if len(ways) == 2:
+        return [unit(cross(*ways))]
+    least = min(AXES, key=lambda axis: abs(dot(axis, ways[0])))
+    one = unit(cross(ways[0], least))
+    return [one, unit(cross(ways[0], one))]
+
+
+def _side(corners: tuple[Corner, ...]) -> Side:
+    if len(corners) == 2:
+        way = subtract(corners[1].w, corners[0].w)
+        outwards = unit((way[1], -way[0], 0.0))
+    else:
+        a, b, c = corners
+        outwards = unit(normal(a.w, b.w, c.w))
+    if outwards == ORIGIN:  # without area: never the nearest, never seen
+        return Side(corners, outwards, inf)
+    # Of the corners' distances, equal but for rounding, the one nearest to the origin is the most accurate.
+    return Side(corners, outwards, dot(outwards, min((c.w for c in corners), key=lambda w: dot(w, w))))
+
+
+def _outward_sides(corners: list[Corner]) -> list[Side]:
+    a, b, c = (corner.w for corner in corners[:3])
+    if len(corners) == 3:
+        if normal(a, b, c)[2] < 0:
+            corners.reverse()
+        return [_side((corners[i - 1], corners[i])) for i in range(3)]
+    if dot(normal(a, b, c), subtract(corners[3].w, a)) > 0:
+        corners = [corners[0], corners[2], corners[1], corners[3]]
+    i, j, k, top = corners
+    return [_side(face) for face in ((i, j, k), (i, top, j), (j, top, k), (k, top, i))]
+
+
+def _visible(sides: list[Side], gone: set[int], first: int, far: Corner, rounding: float) -> list[int]:
+    """The numbers of the faces that the new corner sees, connected to the one it was found from."""
+    seen, edges = {first}, {}
+    for i, side in enumerate(sides):
+        if i not in gone:
+            for k in range(3):
+                edges[side.corners[k - 1], side.corners[k]] = i
+    waiting = [first]
+    while waiting:
+        corners = sides[waiting.pop()].corners
+        for k in range(3):
+            i = edges[corners[k], corners[k - 1]]
+            # A face in one plane with the new corner is seen: beside it a new face might have no area.
+            if i not in seen and dot(sides[i].normal, far.w) >= sides[i].distance - rounding:
+                seen.add(i)
+                waiting.append(i)
+    return list(seen)
+
+
+def _cone(seen: list[Side], far: Corner) -> list[Side]:
+    """New sides from the rim of those that are seen to the new corner."""
+    if len(far_side := seen[0].corners) == 2:
+        return [_side((far_side[0], far)), _side((far, far_side[1]))]
+    edges = {(side.corners[k - 1], side.corners[k]) for side in seen for k in range(3)}
+    return [_side((a, b, far)) for a, b in edges if (b, a) not in edges]

@@ -1,0 +1,25 @@
+"""Measures of a convex polygon given by its (h, 2) vertices, in the order of `DynamicHull.vertices`. O(h) but for logs.
+
+Choices between vertices and edges are exact. Most are made in floating point with a bound on its error; exact integers
+choose among what that leaves.
+"""
+
+from .area import area, centroid, perimeter
+from .box import min_box, min_perimeter_box
+from .circle import min_circle
+from .extent import bounds, diameter, width
+from .lines import distance, intersect_lines
+
+__all__ = [
+    "area",
+    "bounds",
+    "centroid",
+    "diameter",
+    "distance",
+    "intersect_lines",
+    "min_box",
+    "min_circle",
+    "min_perimeter_box",
+    "perimeter",
+    "width",
+]

@@ -1,0 +1,164 @@
+"""The commands that ask: query, watch, verify, top, bench. What they print, for people and pipes, and how they end."""
+
+import hashlib
+import json
+import subprocess
+
+import pytest
+from command_line import dynhull
+from server_process import COMMAND, PATIENCE, server_process
+
+from dynhull_client import HullClient
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [1, 1], [1, 1]]
+
+
+@pytest.fixture
+def hull(served, name):
+    with HullClient(served) as client:
+        client.create_hull(name)
+        client.apply(name, insert=SQUARE)
+    return name
+
+
+@pytest.mark.parametrize(
+    ("question", "points", "answers"),
+    [
+        ("locate", ["1,1", "4,2", "-1,2"], ["inside", "boundary", "outside"]),
+        ("count", ["1,1", "4,2"], ["2", "0"]),
+        ("distance", ["1,1", "7,8"], ["0.0", "5.0"]),
+        ("support", ["1,0", "-1,1"], ["4.0\t0.0", "0.0\t4.0"]),
+        ("tangents", ["8,2", "1,1"], ["4.0\t0.0\t4.0\t4.0", "nan\tnan\tnan\tnan"]),
+        ("lines", ["-1,2,9,2"], ["0.0\t2.0\t4.0\t2.0"]),
+    ],
+)
+def test_query(hull, question, points, answers):
+    done = dynhull("query", hull, question, *points)
+    assert done.exit_code == 0, done.stderr
+    lines = done.stdout.splitlines()
+    columns = points[0].count(",") + 1
+    assert [line.split("\t", columns)[columns] for line in lines] == answers
+    assert [line.split("\t")[0] for line in lines] == [str(float(each.split(",")[0])) for each in points]
+    assert dynhull("query", hull, question, input="\n".join(points).replace(",", " ")).stdout == done.stdout
+
+
+def test_query_for_pipes(hull):
+    done = dynhull("query", hull, "tangents", "--json", "8,2", "1,1")
+    assert [json.loads(line) for line in done.stdout.splitlines()] == [
+        {"asked": [8, 2], "answer": [[4, 0], [4, 4]]},
+        {"asked": [1, 1], "answer": [[None, None], [None, None]]},
+    ]
+    done = dynhull("query", hull)
+    assert done.stdout == "0.0\t0.0\n4.0\t0.0\n4.0\t4.0\n0.0\t4.0\n"
+
+
+@pytest.mark.parametrize("text", ["abc", "1", "1,2,3", "1,nan", "--jsn"])
+def test_what_is_no_point(hull, text):
+    done = dynhull("query", hull, "locate", "1,1", text)
+    assert done.exit_code == 2
+    assert text in done.stderr
+
+
+def test_watch(hull):
+    done = dynhull("watch", hull, "--events", 1)
+    assert (done.exit_code, done.stdout) == (0, "1  6  4  +4 -0  16  16\n")
+    done = dynhull("watch", hull, "--events", 1, "--json")
+    event = json.loads(done.stdout)
+    assert (event["revision"], event["points"], event["snapshot"]) == (1, 6, True)
+    assert (event["added"], event["removed"]) == ([[0, 0], [4, 0], [4, 4], [0, 4]], [])
+    assert (event["area"], event["bounds"]) == (16, [0, 0, 4, 4])
+
+
+def test_watch_tells_each_change_at_once(hull, served):
+    command = [COMMAND, "watch", hull, "--json", "--max-rate", "0", "--events", "3"]
+    with HullClient(served) as client, subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watching:
+        assert json.loads(watching.stdout.readline())["snapshot"]
+        client.apply(hull, insert=[[9, 9]])
+        event = json.loads(watching.stdout.readline())
+        assert (event["revision"], event["added"], event["removed"]) == (2, [[9, 9]], [[4, 4]])
+        client.apply(hull, delete=[[9, 9]])
+        event = json.loads(watching.stdout.readline())
+        assert (event["revision"], event["added"], event["removed"]) == (3, [[4, 4]], [[9, 9]])
+        assert watching.wait(PATIENCE) == 0
+
+
+def test_verify(hull, name):
+    done = dynhull("verify", hull)
+    assert done.exit_code == 0
+    assert done.stdout.startswith(f"{hull}: verified at revision 1: 6 points, 4 vertices (Chan's guesses: ")
+    done = dynhull("verify", hull, f"{name}-not-there")
+    assert done.exit_code == 1
+    assert done.stderr == f"error: there is no hull '{name}-not-there'\n"
+
+
+def test_top(hull, served):
+    with HullClient(served) as client:
+        client.create_hull(f"{hull}/other")
+        client.apply(f"{hull}/other", insert=SQUARE * 2)
+    done = dynhull("top", hull, "--interval", 0.05, "--json", "--looks", 2)
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [(row["name"], row["points"], row["distinct"]) for row in rows] == 2 * [
+        (f"{hull}/other", 12, 5),
+        (hull, 6, 5),
+    ]
+    done = dynhull("top", hull, "--interval", 0.05)
+    assert done.stdout.splitlines()[1] == f"{hull}\t1\t6\t5\t0.0\t+0"
+
+
+def test_bench(served):
+    done = dynhull("bench", "--seconds", 0.2, "--points", 1000, "--json")
+    assert done.exit_code == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert figures["updates_per_second"] > 0
+    assert 0 < figures["locate_ms_median"] <= figures["locate_ms_p99"]
+    with HullClient(served) as client:
+        assert list(client.list_hulls("bench-")) == []
+
+
+COMMANDS = [("load", "a", "-"), ("query", "a"), ("watch", "a"), ("verify", "a"), ("top",), ("bench",)]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
+def test_a_wrong_address(command):
+    done = dynhull(*command, "--address", "127.0.0.1:1", input="x,y\n1,2\n")
+    assert done.exit_code == 3
+    assert done.stderr.startswith("error: no answer from 127.0.0.1:1: ")
+    assert "Is it running (dynhull serve)" in done.stderr
+    assert done.stdout == ""
+
+
+def test_tokens(tmp_path, monkeypatch):
+    tokens = tmp_path / "tokens.toml"
+    entry = {"name": '"t"', "sha256": f'"{hashlib.sha256(b"right").hexdigest()}"', "read": '["a"]', "write": '["a"]'}
+    tokens.write_text("[[token]]\n" + "".join(f"{key} = {value}\n" for key, value in entry.items()))
+    with server_process("--tokens", str(tokens), complaints="UNAUTHENTICATED") as server:
+        monkeypatch.setenv("DYNHULL_ADDRESS", server.address)
+        for token in ([], ["--token", "wrong"]):
+            done = dynhull("load", "a", *token, input="x,y\n1,2\n")
+            assert done.exit_code == 4
+            assert "Give a token with --token or in DYNHULL_TOKEN." in done.stderr
+        monkeypatch.setenv("DYNHULL_TOKEN", "right")
+        assert dynhull("load", "a", input="x,y\n1,2\n").exit_code == 0
+        done = dynhull("load", "b", input="x,y\n1,2\n")
+        assert done.exit_code == 4
+        assert done.stderr.startswith("error: ")
+
+
+def test_a_reader_that_has_enough(hull, served):
+    with HullClient(served) as client:
+        client.apply(hull, insert=[[x, x * x] for x in range(-4000, 4000)])
+    command = f"{COMMAND} query {hull} --address {served} | head -1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert (done.stdout.count("\n"), done.stderr) == (1, "")
+
+
+def test_completion_knows_the_commands(tmp_path):
+    environment = {
+        "_DYNHULL_COMPLETE": "complete_bash",
+        "COMP_WORDS": "dynhull ve",
+        "COMP_CWORD": "1",
+        "HOME": str(tmp_path),
+    }
+    done = subprocess.run([COMMAND], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["verify"]
+    assert "--show-completion" in dynhull("--help").stdout

@@ -1,0 +1,260 @@
+"""`dynhull load`: what is in the file is in the hull, once, whatever was in the way."""
+
+import json
+import signal
+import subprocess
+import time
+from contextlib import suppress
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from command_line import dynhull
+from server_process import COMMAND, server_process
+
+from dynhull import convex_hull
+from dynhull_client import HullClient
+
+POINTS = np.concatenate((np.random.default_rng(8).normal(size=(20_000, 2)), [[1e308, -5e-324], [0.1, 0.2], [0.1, 0.2]]))
+
+
+def write(path, points):
+    x, y = points.T
+    match path.suffix:
+        case ".csv":
+            path.write_text("name,lon,lat\n" + "".join(f'"a, b",{p!r},{q!r}\n' for p, q in points.tolist()))
+        case ".parquet":
+            pq.write_table(pa.table({"lat": y, "name": ["a"] * len(x), "lon": x}), path)
+        case ".ndjson":
+            rows = [json.dumps({"lon": p, "lat": q}) for p, q in points[:100].tolist()]
+            rows += [json.dumps(each) for each in points[100:].tolist()]
+            path.write_text("\n".join(rows))
+        case ".geojson":
+            shapes = [{"type": "Point", "coordinates": each} for each in points.tolist()]
+            features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+            path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+
+
+def holds(address, name, points):
+    with HullClient(address) as client:
+        hull = client.get_hull(name)
+        assert hull.info.points == len(points)
+        assert hull.vertices.tolist() == convex_hull(points).tolist()
+        assert client.count(name, points).counts.all()
+        assert client.verify(name, timeout=60).equal
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".ndjson", ".geojson"])
+def test_every_format(tmp_path, served, name, suffix):
+    file = tmp_path / f"points{suffix}"
+    write(file, POINTS)
+    done = dynhull("load", name, file)
+    assert (done.exit_code, done.stdout) == (0, f"{name}: 20,003 points loaded, 20,003 in the hull\n"), done.stderr
+    assert done.stderr == ""
+    holds(served, name, POINTS)
+
+
+@pytest.mark.parametrize(("kind", "suffix"), [("csv", ".csv"), ("ndjson", ".ndjson"), ("geojson", ".geojson")])
+def test_standard_input(tmp_path, served, name, kind, suffix):
+    file = tmp_path / f"points{suffix}"
+    write(file, POINTS[:200])
+    done = dynhull("load", name, "-", "--format", kind, input=file.read_bytes())
+    assert done.exit_code == 0, done.stderr
+    holds(served, name, POINTS[:200])
+
+
+def test_columns_by_name(tmp_path, served, name):
+    file = tmp_path / "points.csv"
+    file.write_text("x,y,east,north\n0,0,1,2\n")
+    assert dynhull("load", name, file, "--x", "east", "--y", "north").exit_code == 0
+    with HullClient(served) as client:
+        assert client.get_hull(name).vertices.tolist() == [[1, 2]]
+
+
+BAD_CSV = """x,y
+1,2
+nan,1
+"3
+and more",5
+
+4,five
+5,
+6,inf
+7
+8,9
+"""
+BAD_CSV_REASONS = [
+    ("line 3", "x is 'nan', not finite"),
+    ("line 4", "x is '3\\nand more', not a number"),
+    ("line 7", "y is 'five', not a number"),
+    ("line 8", "y is missing"),
+    ("line 9", "y is 'inf', not finite"),
+    ("line 10", "y is missing"),
+]
+BAD_LINES = """{"x": 1, "y": 2}
+{"x": "1", "y": 2}
+{"x": 1
+7
+{"y": 2}
+{"type": "Feature", "geometry": {"type": "Polygon"}}
+[8, NaN]
+[8, 9]
+"""
+BAD_LINES_REASONS = [
+    ("line 2", 'x is "1", not a number'),
+    ("line 3", "Expecting ',' delimiter: line 2 column 1 (char 8)"),
+    ("line 4", "neither an object nor an array"),
+    ("line 5", "x is missing"),
+    ("line 6", "its geometry is Polygon, not a Point"),
+    ("line 7", "y is nan, not finite"),
+]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text", "reasons"), [("csv", BAD_CSV, BAD_CSV_REASONS), ("ndjson", BAD_LINES, BAD_LINES_REASONS)]
+)
+def test_bad_rows_are_counted_shown_and_kept(tmp_path, served, name, suffix, text, reasons):
+    file, kept = tmp_path / f"points.{suffix}", tmp_path / "bad.csv"
+    file.write_text(text)
+    done = dynhull("load", name, file, "--bad-rows", kept)
+    assert done.exit_code == 0
+    assert done.stdout == f"{name}: 2 points loaded, 2 in the hull\n"
+    shown = "\n".join(f"  {place}: {reason}" for place, reason in reasons[:5])
+    assert done.stderr == f"6 bad rows left out:\n{shown}\n  ... and 1 more\n"
+    rows = kept.read_text()
+    assert all(f"{place}," in rows for place, _ in reasons)
+    done = dynhull("load", name, file, "--max-bad", 5, "--again")
+    assert done.exit_code == 2
+    assert "more than 5 bad rows (--max-bad)" in done.stderr
+    with HullClient(served) as client:
+        assert client.get_hull(name).vertices.tolist() == [[1, 2], [8, 9]]
+        assert client.get_hull(name).info.points == 2
+
+
+@pytest.mark.usefixtures("served")
+def test_bad_rows_of_parquet(tmp_path, name):
+    file = tmp_path / "points.parquet"
+    pq.write_table(pa.table({"x": [1.0, None, 3.0], "y": [1.0, 2.0, float("nan")]}), file)
+    done = dynhull("load", name, file)
+    assert done.stderr == "2 bad rows left out:\n  row 2: x is missing\n  row 3: y is 'nan', not finite\n"
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "options", "message"),
+    [
+        ("a.csv", "", [], "a.csv is empty: it needs a header line"),
+        ("a.csv", "x,y\n", [], "a.csv has no points"),
+        ("a.csv", "x,y\na,b\n", [], "line 2: x is 'a', not a number"),
+        ("a.csv", "a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
+        ("a.csv", "a,b\n1,2\n", ["--x", "a", "--y", "c"], "has no column 'c' (--y); it has a, b"),
+        ("a.geojson", '{"type": "FeatureCollection", "features": []}', [], "has no points"),
+        ("a.geojson", '{"features": [', [], "a.geojson is no GeoJSON"),
+        ("a.parquet", "x,y\n1,2\n", [], "a.parquet is no Parquet file"),
+        ("a.xls", "", [], "the name must end in .csv, .parquet, .geojson, .ndjson, .jsonl"),
+        ("a.csv", "x,y\n1,2\n", ["--resume", "--again"], "give one"),
+    ],
+)
+def test_unusable_files_say_what_to_do(tmp_path, monkeypatch, served, name, file, content, options, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / file).write_text(content)
+    done = dynhull("load", name, file, *options)
+    assert done.exit_code == 2
+    assert message in done.stderr
+    with HullClient(served) as client:
+        assert list(client.list_hulls(name)) == []
+
+
+@pytest.mark.usefixtures("served")
+def test_other_unusable_input(tmp_path, name):
+    done = dynhull("load", name, tmp_path / "none.csv")
+    assert (done.exit_code, done.stderr) == (2, f"error: {tmp_path / 'none.csv'}: No such file or directory\n")
+    text = tmp_path / "text.parquet"
+    pq.write_table(pa.table({"x": ["1"], "y": [2.0]}), text)
+    done = dynhull("load", name, text)
+    assert (done.exit_code, done.stderr) == (2, f"error: {text}: column x holds string, not numbers\n")
+    done = dynhull("load", name, "--resume", input="x,y\n1,2\n")
+    assert done.exit_code == 2
+    assert "give --producer NAME" in done.stderr
+
+
+def test_a_file_is_loaded_once_unless_told_otherwise(tmp_path, served, name):
+    file = tmp_path / "points.csv"
+    write(file, POINTS[:10])
+    for options, code, points in ([], 0, 10), ([], 2, 10), (["--resume"], 0, 10), (["--again"], 0, 20):
+        done = dynhull("load", name, file, *options)
+        assert done.exit_code == code
+        with HullClient(served) as client:
+            assert client.get_hull(name).info.points == points
+    assert "adding to it" in done.stderr
+
+
+def test_resume_after_the_command_was_killed(tmp_path, served, name):
+    points = np.random.default_rng(9).normal(size=(160_000, 2))
+    file = tmp_path / "points.csv"
+    write(file, points)
+    with (
+        HullClient(served) as client,
+        subprocess.Popen([COMMAND, "load", name, file], stderr=subprocess.DEVNULL) as loading,
+    ):
+        while not any(info.revision >= 2 for info in client.list_hulls(name)):
+            time.sleep(0.001)
+        loading.kill()
+        loading.wait()
+        while (revision := client.get_hull(name).revision) != client.get_hull(name).revision:
+            time.sleep(0.001)
+        assert revision < 20
+    refused = dynhull("load", name, file)
+    assert refused.exit_code == 2
+    assert "--resume loads what is missing" in refused.stderr
+    done = dynhull("load", name, file, "--resume")
+    assert done.exit_code == 0, done.stderr
+    missing = len(points) - 8192 * revision
+    assert done.stdout == f"{name}: {missing:,} points loaded, 160,000 in the hull\n"
+    holds(served, name, points)
+
+
+def test_a_server_that_goes_and_comes_back(tmp_path):
+    """First it stays away for too long, then it is back in time."""
+    data = ("--data", str(tmp_path / "data"))
+    rows = "".join(f"{x!r},{y!r}\n" for x, y in np.random.default_rng(1).normal(size=(16_384, 2)).tolist())
+    load = [COMMAND, "load", "a", "-", "--producer", "p"]
+    with server_process(*data, killed=True) as server, HullClient(server.address) as client:
+        command = [*load, "--address", server.address, "--patience", "0.5"]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading:
+            loading.stdin.write("x,y\n" + rows)
+            loading.stdin.flush()
+            while not any(info.revision >= 1 for info in client.list_hulls()):
+                time.sleep(0.001)
+            server.process.kill()
+            server.process.wait()
+            with suppress(BrokenPipeError):  # it may have given up before it has read everything
+                loading.stdin.write(rows)
+                loading.stdin.close()
+            said = loading.stderr.read()
+            assert loading.wait() == 3
+    assert "The same command with --resume loads the rest." in said
+    assert f"no answer from {server.address}" in said
+    with server_process(*data) as server:
+        command = [*load, "--address", server.address, "--resume"]
+        done = subprocess.run(command, input="x,y\n" + rows * 2, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        with HullClient(server.address) as client:
+            assert client.get_hull("a").info.points == 32_768
+
+
+def test_an_interruption(served, name):
+    command = [COMMAND, "load", name, "-", "--producer", "p"]
+    with (
+        HullClient(served) as client,
+        subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading,
+    ):
+        loading.stdin.write("x,y\n" + "1,2\n" * 30_000)
+        loading.stdin.flush()
+        while not any(info.revision >= 1 for info in client.list_hulls(name)):
+            time.sleep(0.001)
+        loading.send_signal(signal.SIGINT)
+        said = loading.stderr.read()
+        assert loading.wait() == 130
+    assert "--resume loads the rest" in said
+    assert "Traceback" not in said

@@ -1,0 +1,131 @@
+"""A watch that goes on by itself: the copy it keeps is exact whatever happened to the connection and the server."""
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from proxy import proxy
+from server_process import server_process
+
+from dynhull_client import HullClient, HullCopy, HullNotFoundError, Sketch, Snapshot, UnavailableError
+
+BATCHES = np.random.default_rng(6).normal(size=(200, 3, 2)) * np.linspace(1, 2, 200)[:, None, None]
+
+
+class Follower:
+    """A thread that follows a hull until it has a revision."""
+
+    def __init__(self, watch, copy, revision):
+        self.events = []
+        self.watch = watch
+        self._copy = copy
+        self._revision = revision
+        self._thread = threading.Thread(target=self._follow)
+        self._thread.start()
+        while not self.events:
+            time.sleep(0.001)
+
+    def _follow(self):
+        for event in self.watch:
+            self.events.append(event)
+            if self._copy.revision >= self._revision:
+                return
+
+    def join(self):
+        self._thread.join()
+        self.watch.close()
+
+    def snapshots(self):
+        return sum(isinstance(event, Snapshot) for event in self.events)
+
+
+def test_it_goes_on_after_lost_connections(address: str, connect: type[HullClient], name: str) -> None:
+    copy = HullCopy()
+    with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
+        client.create_hull(name)
+        follower = Follower(watching.watch(name, copy=copy), copy, len(BATCHES))
+        for i, batch in enumerate(BATCHES, start=1):
+            client.apply(name, insert=batch)
+            if i % 40 == 0:
+                way.cut()
+        follower.join()
+        assert copy.vertices.tolist() == client.get_hull(name).vertices.tolist()
+        assert copy.points == 600
+        assert follower.snapshots() == 1
+
+
+def test_it_outlives_its_server(tmp_path: Path, connect: type[HullClient]) -> None:
+    copy, data = HullCopy(), ("--data", str(tmp_path))
+    with server_process(*data, killed=True) as first, proxy(first.address) as way, connect(way.address) as client:
+        client.create_hull("a")
+        follower = Follower(client.watch("a", copy=copy), copy, 2)
+        client.apply("a", insert=[[1, 2]])
+        while copy.revision < 1:
+            time.sleep(0.001)
+        assert follower.watch.lost is None
+        first.process.kill()
+        while follower.watch.lost is None:
+            time.sleep(0.001)
+        assert isinstance(follower.watch.lost, UnavailableError)
+        with server_process(*data) as second:
+            way.server = second.address
+            with HullClient(second.address) as writing:
+                writing.apply("a", insert=[[3, 4]])
+            follower.join()
+    assert follower.watch.lost is None
+    assert copy.vertices.tolist() == [[1, 2], [3, 4]]
+
+
+def test_it_begins_anew_where_the_server_has_forgotten(connect: type[HullClient]) -> None:
+    with server_process("--history-bytes", "0") as server, connect(server.address) as client:
+        client.create_hull("a")
+        copy = HullCopy()
+        for x, kind in ((1, Snapshot), (2, Snapshot)):
+            client.apply("a", insert=[[x, x * x], [x, -x]])
+            client.get_hull("a")
+            with client.watch("a", copy=copy) as watch:
+                assert isinstance(next(watch), kind)
+        client.delete_hull("a")
+        client.create_hull("a")
+        with client.watch("a", copy=copy) as watch:
+            assert isinstance(next(watch), Snapshot)
+        assert (copy.revision, copy.points, len(copy.vertices)) == (0, 0, 0)
+
+
+def test_a_sketch_goes_on_too(address: str, connect: type[HullClient], name: str) -> None:
+    with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
+        client.create_hull(name)
+        with watching.watch(name, directions=[[1, 0]]) as watch:
+            assert isinstance(next(watch), Sketch)
+            way.cut()
+            client.apply(name, insert=[[5, 5]])
+            while (event := next(watch)).revision < 1:
+                pass
+            assert event.vertices.tolist() == [[5, 5]]
+
+
+def test_what_it_does_not_wait_for(connect: type[HullClient], address: str, name: str) -> None:
+    with connect("127.0.0.1:1") as nowhere, pytest.raises(UnavailableError):
+        next(nowhere.watch("a"))
+    with connect(address) as client:
+        client.create_hull(name)
+        watch = client.watch(name)
+        assert isinstance(next(watch), Snapshot)
+        client.delete_hull(name)
+        with pytest.raises(HullNotFoundError):
+            next(watch)
+        with pytest.raises(ValueError, match="not both"):
+            client.watch(name, copy=HullCopy(), resume=HullCopy())
+
+
+def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:
+    with server_process(killed=True) as server, connect(server.address) as client:
+        client.create_hull("a")
+        watch = client.watch("a")
+        next(watch)
+        server.process.kill()
+        closing = threading.Timer(0.2, watch.close)
+        closing.start()
+        assert list(watch) == []

@@ -1,0 +1,234 @@
+"""The writer: every batch exactly once, whatever happens to the connection and the server."""
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from proxy import proxy
+from server_process import server_process
+
+from dynhull import DynamicHull
+from dynhull_client import (
+    HullClient,
+    HullNotFoundError,
+    LimitExceededError,
+    PointMissingError,
+    ProducerInUseError,
+    UnavailableError,
+)
+
+POINTS = np.random.default_rng(3).normal(size=(400, 10, 2))
+
+
+@pytest.fixture
+def client(address: str, connect: type[HullClient], name: str) -> Iterator[HullClient]:
+    with connect(address) as client:
+        client.create_hull(name)
+        yield client
+
+
+def test_points_are_gathered_into_batches(client: HullClient, name: str) -> None:
+    with client.writer(name, producer="p", batch_points=25, linger=60) as writer:
+        outcomes = [writer.put(insert=each) for each in POINTS[:5]]
+        writer.flush()
+        results = [outcome.result() for outcome in outcomes]
+        assert [each.revision for each in results] == [1, 1, 1, 2, 2]
+        assert [each.points for each in results] == [30, 30, 30, 50, 50]
+        moved = writer.put(move=(POINTS[0], POINTS[1]), delete=POINTS[2])
+    assert (moved.result().inserted, moved.result().deleted) == (10, 20)
+    assert writer.sequence == client.last_sequence(name, "p") == 3
+    expected = DynamicHull(np.concatenate((POINTS[1], POINTS[1], POINTS[3], POINTS[4])))
+    assert client.get_hull(name).vertices.tolist() == expected.vertices().tolist()
+
+
+def test_what_waits_is_sent_after_the_linger_time(client: HullClient, name: str) -> None:
+    with client.writer(name, linger=0.05) as writer:
+        began = time.monotonic()
+        first = writer.put(insert=[[1, 1]])
+        second = writer.put(insert=[[2, 2]])
+        assert client.get_hull(name, min_revision=1).info.points == 2
+        assert time.monotonic() - began >= 0.05
+        writer.flush()
+        assert first.result() == second.result()
+
+
+def test_a_refused_batch_is_the_only_one_that_fails(client: HullClient, name: str) -> None:
+    with client.writer(name, batch_points=1) as writer:
+        outcomes = [writer.put(insert=[[i, i]]) if i % 10 else writer.put(delete=[[-1, i]]) for i in range(50)]
+        with pytest.raises(PointMissingError):
+            writer.flush()
+        failed = [i for i, outcome in enumerate(outcomes) if outcome.exception() is not None]
+        assert failed == [0, 10, 20, 30, 40]
+        assert outcomes[20].exception().value == "(-1.0, 20.0)"
+        writer.flush()  # told once
+    assert (client.get_hull(name).revision, writer.sequence) == (45, 45)
+
+
+def test_or_ends_the_writer(client: HullClient, name: str) -> None:
+    def write() -> None:
+        with client.writer(name, batch_points=1, stop_on_error=True) as writer:
+            writer.put(insert=[[1, 1]])
+            bad = writer.put(delete=[[2, 2]])
+            wait_for(bad)
+            with pytest.raises(PointMissingError):
+                writer.put(insert=[[3, 3]])
+            assert writer.sequence == 1
+
+    with pytest.raises(PointMissingError):
+        write()
+    assert client.get_hull(name).info.points == 1
+
+
+def wait_for(outcome) -> None:
+    while not outcome.done():
+        time.sleep(0.001)
+
+
+def test_put_waits_while_too_much_is_under_way(connect: type[HullClient]) -> None:
+    with server_process() as server, connect(server.address) as client:
+        client.create_hull("a")
+        with client.writer("a", batch_points=10, in_flight=4) as writer:
+            server.process.send_signal(signal.SIGSTOP)
+            putting = threading.Thread(target=lambda: [writer.put(insert=each) for each in POINTS[:9]])
+            putting.start()
+            putting.join(0.3)
+            assert putting.is_alive()
+            server.process.send_signal(signal.SIGCONT)
+            putting.join()
+        assert client.get_hull("a").info.points == 90
+
+
+MANY = np.random.default_rng(4).normal(size=(3000, 5, 2))
+
+
+@contextmanager
+def putting(writer, batches) -> Iterator[None]:
+    """Put each batch, in a thread, until the context is left."""
+
+    def put() -> None:
+        for batch in batches:
+            writer.put(insert=batch)
+
+    thread = threading.Thread(target=put)
+    thread.start()
+    yield
+    thread.join()
+    writer.flush()
+
+
+def acknowledged(writer, sequence: int) -> None:
+    while writer.sequence < sequence:
+        time.sleep(0.001)
+
+
+def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:
+    """Three servers one after another on the same data, the first two killed while batches are under way."""
+    data = ("--data", str(tmp_path))
+    with (
+        server_process(*data, killed=True) as first,
+        proxy(first.address) as way,
+        connect(way.address) as client,
+    ):
+        client.create_hull("a")
+        with client.writer("a", producer="p", batch_points=5) as writer, ExitStack() as stack:
+            with putting(writer, MANY):
+                acknowledged(writer, 500)
+                first.process.kill()
+                assert writer.sequence < 3000
+                second = stack.enter_context(server_process(*data, killed=True))
+                way.server = second.address
+                acknowledged(writer, 1500)
+                second.process.kill()
+                assert writer.sequence < 3000
+                way.server = stack.enter_context(server_process(*data)).address
+            hull = client.get_hull("a")
+            assert (hull.revision, writer.sequence, hull.info.points) == (3000, 3000, 15_000)
+            assert hull.vertices.tolist() == DynamicHull(MANY.reshape(-1, 2)).vertices().tolist()
+
+
+def test_every_batch_once_though_the_connection_breaks(address: str, connect: type[HullClient], name: str) -> None:
+    with proxy(address) as way, connect(way.address) as client:
+        client.create_hull(name)
+        with client.writer(name, batch_points=5) as writer:
+            with putting(writer, MANY):
+                for part in range(1, 10):
+                    acknowledged(writer, 250 * part)
+                    way.cut()
+            assert writer.sequence == 3000
+        assert client.get_hull(name).revision == 3000
+
+
+def test_another_writer_goes_on_where_one_was_acknowledged(client: HullClient, name: str) -> None:
+    for last in (1, 2):
+        with client.writer(name, producer="p") as writer:
+            assert writer.sequence == last - 1
+            assert not writer.put(insert=POINTS[last]).done()
+        assert writer.sequence == last
+    assert client.get_hull(name).revision == 2
+
+
+def test_two_writers_of_one_name_are_told(client: HullClient, name: str) -> None:
+    first, second = (client.writer(name, producer="p") for _ in range(2))
+    with first, pytest.raises(ProducerInUseError, match="'p'"), second:  # noqa: PT012  # leaving may raise it too
+        first.put(insert=POINTS[0])
+        first.flush()
+        second.put(insert=POINTS[1])
+    assert client.get_hull(name).revision == 1
+
+
+def test_a_message_too_large_is_the_only_one_that_fails(connect: type[HullClient]) -> None:
+    with server_process("--max-message-bytes", "4096") as server, connect(server.address) as client:
+        client.create_hull("a")
+        with client.writer("a", batch_points=10) as writer:
+            outcomes = [writer.put(insert=np.zeros((1000 if i == 20 else 10, 2))) for i in range(40)]
+            with pytest.raises(LimitExceededError, match="4096"):
+                writer.flush()
+            assert [i for i, outcome in enumerate(outcomes) if outcome.exception()] == [20]
+        assert (client.get_hull("a").revision, writer.sequence) == (39, 39)
+
+
+def test_a_writer_gives_up_a_server_that_stays_away(connect: type[HullClient]) -> None:
+    with server_process(killed=True) as server, connect(server.address) as client:
+        client.create_hull("a")
+        with pytest.raises(UnavailableError), client.writer("a", patience=0.3) as writer:  # noqa: PT012
+            server.process.kill()
+            writer.put(insert=POINTS[0])
+            writer.flush()
+
+
+def test_what_a_writer_cannot_do(client: HullClient, name: str) -> None:
+    with pytest.raises(HullNotFoundError), client.writer("nobody"):
+        pass
+    with pytest.raises(ValueError, match="batch_points must be at least 1, got 0"):
+        client.writer(name, batch_points=0)
+    writer = client.writer(name)
+    with pytest.raises(RuntimeError, match="context"):
+        writer.put(insert=[[1, 2]])
+    with writer:
+        with pytest.raises(ValueError, match="insert row 0"):
+            writer.put(insert=[[np.nan, 2]])
+        writer.put(insert=[[1, 2]])
+    with pytest.raises(RuntimeError, match="left"):
+        writer.put(insert=[[1, 2]])
+    with pytest.raises(RuntimeError, match="once"), writer:
+        pass
+
+
+def test_an_error_of_ones_own_waits_for_nothing(client: HullClient, name: str) -> None:
+    writer = client.writer(name, linger=60)
+    outcomes = []
+
+    def fail_half_way() -> None:
+        with writer:
+            outcomes.append(writer.put(insert=POINTS[0]))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail_half_way()
+    assert outcomes[0].cancelled()
+    assert client.get_hull(name).revision == 0

@@ -1,0 +1,60 @@
+"""Both clients with one face, so that one test runs on both."""
+
+import asyncio
+import inspect
+import threading
+from functools import cache
+
+from dynhull_client import AsyncHullClient, HullClient
+
+
+@cache
+def loop() -> asyncio.AbstractEventLoop:
+    """An event loop that runs in a thread as long as the tests do."""
+    running = asyncio.new_event_loop()
+    threading.Thread(target=running.run_forever, daemon=True).start()
+    return running
+
+
+def wait(function, *arguments, **options):
+    """What a function returns when it is called on the loop; awaited where it is a coroutine."""
+
+    async def call():
+        result = function(*arguments, **options)
+        return await result if inspect.isawaitable(result) else result
+
+    return Waiting.of(asyncio.run_coroutine_threadsafe(call(), loop()).result())
+
+
+class Waiting:
+    """An object of the asyncio client: its methods wait, its iterators and contexts are plain ones."""
+
+    def __init__(self, inner):
+        self._inner = inner
+
+    @classmethod
+    def of(cls, value):
+        return cls(value) if type(value).__name__.startswith(("Async", "async")) else value
+
+    def __getattr__(self, name):
+        value = getattr(self._inner, name)
+        return (lambda *arguments, **options: wait(value, *arguments, **options)) if callable(value) else value
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        try:
+            return wait(self._inner.__anext__)
+        except StopAsyncIteration:
+            raise StopIteration from None
+
+    def __enter__(self):
+        wait(self._inner.__aenter__)
+        return self
+
+    def __exit__(self, *error):
+        return wait(self._inner.__aexit__, *error)
+
+
+CLIENTS = {"sync": HullClient, "asyncio": lambda *arguments, **options: wait(AsyncHullClient, *arguments, **options)}
