@@ -17,6 +17,8 @@ NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
 NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
 DEFAULT_PAGE = 100
 LARGEST_PAGE = 1000
+DEFAULT_SAMPLE = 1000
+LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
 ONE_POINT = struct.Struct("<dd")
@@ -166,6 +168,13 @@ def decode_view(view: hull_service_pb2.HullView) -> bool:
     if view not in hull_service_pb2.HullView.values():
         raise InvalidFieldError("view", view, "not a view this server knows")
     return view != hull_service_pb2.HULL_VIEW_BASIC
+
+
+def decode_sample_size(size: int) -> int:
+    """How many points at most."""
+    if size < 0:
+        raise InvalidFieldError("sample_size", size, "must not be negative")
+    return min(size or DEFAULT_SAMPLE, LARGEST_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)
