@@ -90,7 +90,7 @@ def walk(difference: Difference, enough: float) -> Walk:
             simplex, weights, v = corners, closer, ORIGIN
             break
         u = foot([corners[i].w for i in kept])
-        if dot(u, u) >= dot(v, v):  # rounding: there is no nearer
+        if not dot(u, u) < dot(v, v):  # rounding, or a square out of range: there is no nearer
             break
         simplex, weights, v = [corners[i] for i in kept], closer, u
     on_a = combine(weights, [corner.p for corner in simplex])
