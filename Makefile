@@ -23,7 +23,7 @@ fuzz:  ## random lives of the kernel under sanitizers, SECONDS for each size of 
 		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
 	done
 
-check: docs  ## format, lint, types, import rules, proto rules, documentation
+check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp
@@ -33,6 +33,8 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation
 	$(BIN)/buf format --diff --exit-code
 	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/python proto/generate.py --check
+	$(BIN)/hadolint deploy/Dockerfile
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.compose-spec deploy/compose.yaml
 
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict --quiet

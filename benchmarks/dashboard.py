@@ -1,20 +1,20 @@
 """What twenty viewers of the dashboard cost those who write: `python benchmarks/dashboard.py`.
 
-A writer streams as fast as the server takes it, in turns without a dashboard and with viewers on its page: a session
-of Bokeh's and a socket of hulls each. Server, writer, dashboard and viewers share this machine.
+A writer streams as fast as the server takes it, in turns with the dashboard and its viewers paused and running. A
+viewer is a session of Bokeh's and a socket of hulls. Server, writer, dashboard and viewers share this machine.
 """
 
 import argparse
 import asyncio
-import json
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from statistics import median
+from statistics import median, quantiles
 
 import numpy as np
 from bokeh.util.token import generate_jwt_token, generate_session_id
@@ -26,7 +26,7 @@ SERVER = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "
 DASHBOARD = ["-m", "dynhull_cli", "dashboard", "--port", "0", "--address"]
 POINTS, BATCH, VERTICES, CYCLE = 100_000, 2_048, 48, 64
 VERTICES_OF = "vertices of a"
-SETTLE = 1.0  # seconds before a measurement
+SETTLE = 0.3  # seconds from a turn's beginning to its measurement
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -44,10 +44,21 @@ def aside(function, *arguments):
     process = multiprocessing.Process(target=function, args=arguments, daemon=True)
     process.start()
     try:
-        yield
+        yield process.pid
     finally:
         process.terminate()
         process.join()
+
+
+@contextmanager
+def paused(*pids):
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
 
 
 def write(address):
@@ -90,38 +101,41 @@ def processor_seconds(pid):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--viewers", type=int, default=20)
-    parser.add_argument("--turns", type=int, default=4)
-    parser.add_argument("--seconds", type=float, default=4.0)
+    parser.add_argument("--turns", type=int, default=15)
+    parser.add_argument("--seconds", type=float, default=1.0)
     arguments = parser.parse_args()
-    rates = {"nobody": [], "viewers": []}
-    hulls, shares = [], []
+    told = multiprocessing.Array("l", arguments.viewers)
+    alone, watched = [], []
+    hulls, processor = 0, 0.0
     with running(*SERVER) as (address, _), HullClient(address) as client:
         client.create_hull("a")
 
-        def measure():
+        def rate():
+            time.sleep(SETTLE)
             revision, begun = client.get_hull("a").revision, time.perf_counter()
             time.sleep(arguments.seconds)
             revision, took = client.get_hull("a").revision - revision, time.perf_counter() - begun
             return revision * 2 * BATCH / took
 
-        with aside(write, address):
-            time.sleep(SETTLE)
+        with (
+            aside(write, address),
+            running(*DASHBOARD, address) as (page, pid),
+            aside(view, page, arguments.viewers, told) as viewers,
+        ):
+            while min(told) == 0:
+                time.sleep(0.1)
             for _ in range(arguments.turns):
-                rates["nobody"].append(measure())
-                told = multiprocessing.Array("l", arguments.viewers)
-                with running(*DASHBOARD, address) as (page, pid), aside(view, page, arguments.viewers, told):
-                    while min(told) == 0:
-                        time.sleep(0.1)
-                    before, processor = list(told), processor_seconds(pid)
-                    rates["viewers"].append(measure())
-                    shares.append((processor_seconds(pid) - processor) / arguments.seconds)
-                    hulls += [(n - m) / arguments.seconds for n, m in zip(told, before, strict=True)]
-    alone, watched = median(rates["nobody"]), median(rates["viewers"])
-    print(f"nobody looks: {alone:,.0f} updates a second ({json.dumps([round(each) for each in rates['nobody']])})")
-    print(f"{arguments.viewers} viewers: {watched:,.0f} ({json.dumps([round(each) for each in rates['viewers']])})")
-    print(f"ingest with viewers over ingest without: {watched / alone:.3f}")
-    print(f"hulls a second to a viewer: {min(hulls):.1f} to {max(hulls):.1f}")
-    print(f"processor of the dashboard: {median(shares):.2f} of one")
+                with paused(pid, viewers):
+                    alone.append(rate())
+                before, spent, begun = sum(told), processor_seconds(pid), time.perf_counter()
+                watched.append(rate())
+                took = time.perf_counter() - begun
+                hulls += (sum(told) - before) / took / arguments.viewers / arguments.turns
+                processor += (processor_seconds(pid) - spent) / took / arguments.turns
+    lower, middle, upper = quantiles([with_ / without for with_, without in zip(watched, alone, strict=True)], n=4)
+    print(f"{median(alone):,.0f} updates a second while nobody looks, {median(watched):,.0f} with viewers")
+    print(f"with over without, turn by turn: {middle:.3f}, quartiles {lower:.3f} and {upper:.3f}")
+    print(f"hulls a second to a viewer: {hulls:.1f}; processor of the dashboard: {processor:.2f} of one")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Makes the screenshots of the dashboard: `python docs/screenshots.py`. Two days of the demo, a minute in 50 ms.
+"""Makes the screenshots of the dashboard: `python docs/screenshots.py`. Two days of the demo's flights.
 
 Needs a Chromium on the path.
 """

@@ -187,17 +187,6 @@ def test_a_dashboard_that_goes_and_comes_back(browser: Browser, server: tuple[Se
         context.__exit__(None, None, None)
 
 
-def test_a_wrong_token(browser: Browser, tmp_path: Path) -> None:
-    tokens = tmp_path / "tokens.toml"
-    tokens.write_text("")
-    with (
-        server_process("--tokens", str(tokens), complaints="a valid token is required") as server,
-        dashboard_process(server.address, "--token", "wrong") as url,
-        opened(browser, url) as page,
-    ):
-        expect(banner(page)).to_contain_text("token")
-
-
 def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, hull: str) -> None:
     with opened(browser, url, hull, **PHONE) as page:
         wait_for_vertices(page, hull, SQUARE)

@@ -4,13 +4,15 @@ import inspect
 import sys
 from collections.abc import Callable
 from enum import IntEnum
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol, TypeVar
 
 import grpc
 import typer
 
 from dynhull_client import (
+    AsyncHullClient,
     DeadlineError,
     DynhullError,
     HullClient,
@@ -18,6 +20,16 @@ from dynhull_client import (
     UnauthenticatedError,
     UnavailableError,
 )
+
+Client = TypeVar("Client", HullClient, AsyncHullClient)
+
+
+class Connect(Protocol):
+    """Makes a client of a kind; `more` as for `Connection`."""
+
+    def __call__(self, kind: type[Client], /, **more: Any) -> Client:
+        """The client."""
+        ...
 
 
 class Exit(IntEnum):
@@ -51,6 +63,17 @@ def connected(command: Callable[..., None]) -> Callable[..., None]:
     What goes wrong ends it with a message that says what to do, and with the exit code for that.
     """
 
+    @wraps(command)
+    def with_client(connect: Connect, **given: Any) -> None:
+        with connect(HullClient) as client:
+            command(client, **given)
+
+    return connecting(with_client)
+
+
+def connecting(command: Callable[..., None]) -> Callable[..., None]:
+    """As `connected`, but the first argument is a function that makes a client of either kind."""
+
     def run(
         *,
         address: Address = "127.0.0.1:50051",
@@ -63,8 +86,7 @@ def connected(command: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         try:
             credentials = _credentials(tls, tls_ca, client_cert, client_key)
-            with HullClient(address, token=token, tls=credentials) as client:
-                command(client, **given)
+            command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
         except (UnavailableError, DeadlineError) as error:
             advice = "Is it running (dynhull serve), is the address right (--address), does it want TLS (--tls)?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")

@@ -7,7 +7,7 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from dynhull_client import AsyncHullClient, DynhullError, Event, HullCopy, Progress, Verification
+from dynhull_client import AsyncHullClient, AsyncWatch, DynhullError, Event, HullCopy, Progress, Verification
 
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
@@ -47,7 +47,6 @@ class HullFeed:
         area: its area; NaN before it is known.
         bounds: the smallest box around it; None where it is empty.
         verified: the last verification; None before the first.
-        trouble: why it is not followed at the moment; None where it is.
         rate: batches a second, over the last second.
         history: a row a second.
     """
@@ -62,10 +61,11 @@ class HullFeed:
         self._outline = Drawing(vertices_of(name), 0, NO_POINTS)
         self._inner = Drawing(points_of(name), 0, NO_POINTS)
         self.verified: Verified | None = None
-        self.trouble: str | None = "waiting for the first event"
         self.rate = math.nan
         self.history = History("time", "points", "vertices", "area", "rate")
         self._client = client
+        self._watch: AsyncWatch | None = None
+        self._failure: str | None = "waiting for the first event"
         self._verify_now = asyncio.Event()
         self._task = asyncio.create_task(self._run())
 
@@ -89,22 +89,29 @@ class HullFeed:
             tasks.create_task(self._repeat(self._sample, SAMPLE_SECONDS, asyncio.Event()))
             tasks.create_task(self._repeat(self._verify, VERIFY_SECONDS, self._verify_now))
 
+    @property
+    def trouble(self) -> str | None:
+        """Why it is not followed at the moment; None where it is."""
+        lost = self._watch and self._watch.lost
+        return self._failure or (str(lost) if lost else None)
+
     async def _follow(self) -> None:
+        """The watch outlives lost connections, but not its hull: one of the name may come again."""
         while True:
             copy = HullCopy()
             try:
                 async with self._client.watch(
-                    self.name, max_rate=MAX_RATE, progress_interval=PROGRESS_SECONDS, measures=True
-                ) as watch:
-                    async for event in watch:
-                        copy.update(event)
+                    self.name, max_rate=MAX_RATE, progress_interval=PROGRESS_SECONDS, measures=True, copy=copy
+                ) as self._watch:
+                    async for event in self._watch:
                         self._take(event, copy)
             except DynhullError as error:
-                self.trouble = str(error)
+                self._failure = str(error)
             await asyncio.sleep(RETRY_SECONDS)
 
     def _take(self, event: Event, copy: HullCopy) -> None:
-        self.revision, self.points, self.trouble = event.revision, event.points, None
+        self._failure = None
+        self.revision, self.points = event.revision, event.points
         if isinstance(event, Progress):
             return
         assert event.measures is not None  # asked for

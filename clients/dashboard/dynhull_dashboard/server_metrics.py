@@ -39,7 +39,7 @@ class Scrape:
     buckets: dict[float, float]
 
     @classmethod
-    def read(cls, text: str) -> Self:
+    def read(cls, text: str, at: float) -> Self:
         """The page as the server prints it."""
         updates = batches = seconds = 0.0
         buckets: dict[float, float] = {}
@@ -54,7 +54,7 @@ class Scrape:
                         seconds = sample.value
                     case "dynhull_batch_duration_seconds_bucket":
                         buckets[float(sample.labels["le"])] = sample.value
-        return cls(time.monotonic(), updates, batches, seconds, buckets)
+        return cls(at, updates, batches, seconds, buckets)
 
     def rates_since(self, before: Self) -> tuple[float, float, float]:
         """Updates a second, and the mean and 99th percentile of the milliseconds to an acknowledgement.
@@ -117,4 +117,4 @@ class ServerMetrics:
         except (HTTPClientError, OSError) as error:  # the lines have a gap there
             log.info("%s: %s", self._url, error)
             return None
-        return Scrape.read(response.body.decode())
+        return Scrape.read(response.body.decode(), time.monotonic())

@@ -1,0 +1,67 @@
+"""The monitoring kit: what the tools of its addressees say, and whether it speaks of metrics that there are."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from metrics import fetch, measured
+from server_process import COMMAND, PATIENCE
+
+from dynhull_client import HullClient
+
+KIT = Path(__file__).parents[2] / "deploy"
+NAME = re.compile(r"\b(?:dynhull|process)_[a-z_]+")
+
+
+def accepted(*command: str | Path) -> str:
+    """What a program of Debian's says, which must be content."""
+    program = shutil.which(command[0])
+    assert program, f"{command[0]} is not installed; tests/peers.sh installs it"
+    ended = subprocess.run([program, *command[1:]], capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout
+
+
+def expressions() -> list[str]:
+    """Of the Grafana dashboard, with its variables filled in."""
+    panels = json.loads((KIT / "grafana/dynhull.json").read_text())["panels"]
+    found = [target["expr"] for panel in panels for target in panel.get("targets", [])]
+    return [each.replace("$__rate_interval", "5m").replace("$instance", ".*") for each in found]
+
+
+def test_prometheus_takes_the_configuration() -> None:
+    accepted("promtool", "check", "config", KIT / "prometheus/prometheus.yml")
+
+
+def test_alerts_fire_on_what_they_are_for() -> None:
+    accepted("promtool", "test", "rules", KIT / "prometheus/alerts_test.yml")
+
+
+def test_prometheus_understands_the_grafana_dashboard(tmp_path: Path) -> None:
+    rules = [{"record": f"panel:{i}", "expr": expression} for i, expression in enumerate(expressions())]
+    file = tmp_path / "panels.yml"
+    file.write_text(json.dumps({"groups": [{"name": "panels", "rules": rules}]}))  # JSON is YAML
+    assert f"{len(rules)} rules found" in accepted("promtool", "check", "rules", file)
+
+
+def test_what_is_asked_for_is_there() -> None:
+    with measured() as (server, address), HullClient(server.address) as client:
+        client.create_hull("a")
+        client.apply("a", insert=[[0, 0]])
+        with client.watch("a") as watch:
+            next(watch)
+            there = {*NAME.findall(fetch(f"http://{address}/metrics"))}
+    asked = {*NAME.findall("\n".join(expressions())), *NAME.findall((KIT / "prometheus/alerts.yml").read_text())}
+    assert len(asked) > 10
+    assert asked <= there
+
+
+@pytest.mark.parametrize("unit", [*KIT.glob("*.service")], ids=lambda path: path.name)
+def test_systemd_takes_the_unit(unit: Path, tmp_path: Path) -> None:
+    installed = tmp_path / unit.name
+    installed.write_text(unit.read_text().replace("/opt/dynhull/bin/dynhull", COMMAND))
+    assert COMMAND in installed.read_text()
+    accepted("systemd-analyze", "verify", installed)
