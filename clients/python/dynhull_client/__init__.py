@@ -18,6 +18,7 @@ from .errors import (
     HullEmptyError,
     HullExistsError,
     HullNotFoundError,
+    HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
     PermissionDeniedError,
@@ -50,6 +51,7 @@ from .messages import (
     Tangents,
     Verification,
 )
+from .uses import Efficient, Measured, Phases, Separation
 from .watch import Watch
 from .writer import Writer
 
@@ -67,6 +69,7 @@ __all__ = [
     "Difference",
     "Distances",
     "DynhullError",
+    "Efficient",
     "Hull",
     "HullClient",
     "HullCopy",
@@ -74,17 +77,21 @@ __all__ = [
     "HullExistsError",
     "HullInfo",
     "HullNotFoundError",
+    "HullUnsuitableError",
     "Ingest",
     "Ingested",
     "InvalidRequestError",
     "LimitExceededError",
     "Located",
+    "Measured",
     "Measures",
     "PermissionDeniedError",
+    "Phases",
     "PointMissingError",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
+    "Separation",
     "SequenceGapError",
     "Sketch",
     "Snapshot",

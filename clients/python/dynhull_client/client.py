@@ -7,7 +7,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 
 import grpc
 
-from . import calls
+from . import calls, uses
 from .calls import Call
 from .connection import Connection
 from .errors import error_of
@@ -49,6 +49,10 @@ class HullClient(Connection):
     intersect_lines = _answering(calls.intersect_lines)
     get_hull = _answering(calls.get_hull)
     verify = _answering(calls.verify)
+    get_measures = _answering(uses.get_measures)
+    separate = _answering(uses.separate)
+    phase_diagram = _answering(uses.phase_diagram)
+    frontier = _answering(uses.frontier)
     ingest = opening(Ingest, calls.ingest)
     watch = opening(Watch, calls.watch)
     writer = opening(Writer, calls.writer)
