@@ -65,7 +65,7 @@ FIELDS = {
 def messages(draw: st.DrawFn, descriptor: Descriptor) -> Message:
     """A message any of whose fields may hold anything."""
     message = GetMessageClass(descriptor)()
-    for name in descriptor.fields_by_name.keys() & {"name", "other_name"}:
+    for name in {"name", "other_name"} & set(descriptor.fields_by_name):
         setattr(message, name, "a")
     # Few at a time, so that each has its say before another is refused.
     for field in draw(st.lists(st.sampled_from(list(descriptor.fields)), max_size=3, unique_by=lambda f: f.name)):
