@@ -4,7 +4,7 @@ BIN := .venv/bin
 KERNEL := $(wildcard dynhull/kernel/*)
 DAY ?= 2013-03-08
 
-.PHONY: demo test check proto contract fuzz fuzz-server robustness clean
+.PHONY: demo test check docs proto contract fuzz fuzz-server robustness clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
@@ -23,7 +23,7 @@ fuzz:  ## random lives of the kernel under sanitizers, SECONDS for each size of 
 		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
 	done
 
-check: .venv/.check  ## format, lint, types, import rules, proto rules
+check: docs  ## format, lint, types, import rules, proto rules, documentation
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp
@@ -33,6 +33,9 @@ check: .venv/.check  ## format, lint, types, import rules, proto rules
 	$(BIN)/buf format --diff --exit-code
 	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/python proto/generate.py --check
+
+docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
+	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict --quiet
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py

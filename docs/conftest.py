@@ -4,6 +4,8 @@ from typing import Any
 import pytest
 from server_process import server_process
 
+collect_ignore_glob = ["examples/*", "reference_pages.py"]  # programs, not modules
+
 PAGES_WITH_A_SERVER = {"client.md"}
 
 

@@ -79,6 +79,10 @@ class HullServiceStub:
     """Where lines enter and leave the hull."""
     GetHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]
     """The hull's counts, vertices and measures."""
+    SamplePoints: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]
+    """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+    coordinates have the smallest hashes.
+    """
     GetMeasures: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]
     """Every measure of the hull."""
     Separate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]
@@ -152,6 +156,10 @@ class HullServiceAsyncStub(HullServiceStub):
     """Where lines enter and leave the hull."""
     GetHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]  # type: ignore[assignment]
     """The hull's counts, vertices and measures."""
+    SamplePoints: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]  # type: ignore[assignment]
+    """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+    coordinates have the smallest hashes.
+    """
     GetMeasures: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]  # type: ignore[assignment]
     """Every measure of the hull."""
     Separate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]  # type: ignore[assignment]
@@ -306,6 +314,16 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetHullResponse, _abc.Awaitable[_hull_service_pb2.GetHullResponse]]:
         """The hull's counts, vertices and measures."""
+
+    @_abc_1.abstractmethod
+    def SamplePoints(
+        self,
+        request: _hull_service_pb2.SamplePointsRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.SamplePointsResponse, _abc.Awaitable[_hull_service_pb2.SamplePointsResponse]]:
+        """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+        coordinates have the smallest hashes.
+        """
 
     @_abc_1.abstractmethod
     def GetMeasures(
