@@ -73,7 +73,7 @@ def contact(a: Shape, b: Shape) -> Contact:
 
     Whether they intersect is decided as by `intersect`. Distance and depth: within 1e-12 of the sets' size for
     polytopes, balls and their sums; within 1e-6 of it for shapes with other curves (a ball scaled unevenly). All this
-    for coordinates up to 1e150; beyond, only the distance of two polygons.
+    for sets and gaps of a size from 1e-150 to 1e150: beyond, squares leave the range of doubles.
     Between unions, all pairs of pieces are looked at: the closest two are told, or the two that overlap most, whose
     depth is a lower bound of the unions'.
 

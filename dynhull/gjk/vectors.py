@@ -1,6 +1,6 @@
 """Vectors of three floats as tuples: for a handful of them much faster than arrays. The plane has a third zero."""
 
-from math import sqrt
+from math import hypot
 
 Vector = tuple[float, float, float]
 
@@ -34,7 +34,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 def length(a: Vector) -> float:
     """The Euclidean length."""
-    return sqrt(dot(a, a))
+    return hypot(*a)
 
 
 def unit(a: Vector) -> Vector:
