@@ -343,7 +343,7 @@ def growth(results: list[dict]) -> dict[str, list[tuple[int, float]]]:
     for result in results:
         if result["work"] == "window" and result["input"] == results[0]["input"]:
             lines.setdefault(result["who"], []).append((result["n"], result["median"]))
-    return {who: points for who, points in lines.items() if len(points) > 1}
+    return {who: sorted(points) for who, points in lines.items() if len(points) > 1}
 
 
 def chart(results: list[dict], path: Path) -> None:
@@ -352,14 +352,14 @@ def chart(results: list[dict], path: Path) -> None:
     mpl.use("svg" if path.suffix == ".svg" else "agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8, 6), layout="constrained")
     for who, points in growth(results).items():
         label = f"{who}: slope {slope(points):.2f}"
         axes.plot(*zip(*points, strict=True), marker="o", label=label, linewidth=2.5 if "dynhull" in who else 1)
     axes.set(xscale="log", yscale="log", xlabel="points", ylabel="µs an update")
     axes.set_title(f"A moving window, {results[0]['input']}")
     axes.grid(visible=True, which="both", alpha=0.2)
-    axes.legend(fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     figure.savefig(path, dpi=120)
 
 
