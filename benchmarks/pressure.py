@@ -23,8 +23,7 @@ from dynhull_client import HullClient
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-# A history that is full before the first measurement: it may grow to its bound.
-COMMAND = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning", "--history-bytes", "1000000"]
+COMMAND = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
 # Without this a client takes in megabytes that nobody reads.
 SMALL_WINDOW = [("grpc.http2.bdp_probe", 0)]
 VERTICES, BATCH = 4_096, 8_192

@@ -47,7 +47,7 @@ class Settings(BaseSettings):
     max_producers: int = Field(10_000, ge=1, description="How many numbering writers a hull may have in a day.")
     max_streams: int = Field(10_000, ge=1, description="How many streaming calls there may be at a time.")
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds a watcher may take for one event.")
-    history_bytes: int = Field(16 * 2**20, ge=0, description="Memory a hull may take for watches that resume.")
+    history_bytes: int = Field(4 * 2**20, ge=0, description="Memory a hull may take for watches that resume.")
 
     scrub_cpu: float = Field(
         0.05, ge=0, le=1, description="Share of a processor for comparing hulls with Chan's algorithm; 0 for none."

@@ -5,6 +5,7 @@ import json
 import subprocess
 
 import pytest
+import trustme
 from command_line import dynhull
 from server_process import COMMAND, PATIENCE, server_process
 
@@ -142,6 +143,21 @@ def test_tokens(tmp_path, monkeypatch):
         done = dynhull("load", "b", input="x,y\n1,2\n")
         assert done.exit_code == 4
         assert done.stderr.startswith("error: ")
+
+
+def test_tls(tmp_path):
+    authority = trustme.CA()
+    issued = authority.issue_cert("127.0.0.1")
+    names = {"ca": authority.cert_pem, "key": issued.private_key_pem, "cert": issued.cert_chain_pems[0]}
+    for name, pem in names.items():
+        pem.write_to_path(tmp_path / name)
+    with server_process("--tls-cert", str(tmp_path / "cert"), "--tls-key", str(tmp_path / "key")) as server:
+        where = ["--address", server.address]
+        assert dynhull("top", *where, "--tls-ca", tmp_path / "ca").exit_code == 0
+        assert dynhull("top", *where).exit_code == 3
+        assert dynhull("top", *where, "--tls").exit_code == 3
+        done = dynhull("top", *where, "--client-key", tmp_path / "key")
+        assert (done.exit_code, done.stderr) == (2, "error: --client-cert and --client-key go together\n")
 
 
 def test_a_reader_that_has_enough(hull, served):

@@ -76,6 +76,31 @@ def test_count(client: HullClient, filled: str) -> None:
     assert answer.counts.tolist() == [reference.count(x, y) for x, y in asked]
 
 
+def test_a_sample_of_few_points_is_all_of_them(client: HullClient, filled: str) -> None:
+    answer = client.sample_points(filled)
+    assert (answer.revision, answer.points.tolist()) == (1, DynamicHull(POINTS).points().tolist())
+
+
+def test_a_sample_of_many_points_stays_as_it_is_where_they_do(client: HullClient, hull: str) -> None:
+    client.apply(hull, insert=[[x, y] for x in range(100) for y in range(100)])
+    before = client.sample_points(hull, 1000).points.tolist()
+    assert before == sorted(before)
+    assert len({tuple(point) for point in before}) == 1000
+    quarters = np.histogram2d(*np.array(before).T, bins=2)[0]
+    assert 180 < quarters.min() <= quarters.max() < 320, "not spread over the points"
+    client.apply(hull, insert=[[0.5, 0.5]], delete=[before[7]])
+    after = client.sample_points(hull, 1000)
+    assert after.revision == 2
+    assert len({*map(tuple, before)} - {*map(tuple, after.points.tolist())}) in (1, 2)
+
+
+def test_a_sample_has_a_size(client: HullClient, stub: HullServiceStub, hull: str) -> None:
+    client.apply(hull, insert=[[x, 0] for x in range(2_000)])
+    assert len(stub.SamplePoints(pb.SamplePointsRequest(name=hull)).points.packed) == 1000 * 16
+    _, info, _ = refusal(lambda: stub.SamplePoints(pb.SamplePointsRequest(name=hull, sample_size=-1)))
+    assert dict(info.metadata) == {"field": "sample_size", "value": "-1"}
+
+
 def test_coordinates_instead_of_bytes(client: HullClient, stub: HullServiceStub, filled: str) -> None:
     coordinates = points_pb2.POINT_ENCODING_COORDINATES
     one = points_pb2.Points(coordinates=[100, 0])

@@ -54,6 +54,7 @@ EVERY_CALL = {
     "Count": lambda stub, name: stub.Count(pb.CountRequest(name=name)),
     "Support": lambda stub, name: stub.Support(pb.SupportRequest(name=name)),
     "Tangents": lambda stub, name: stub.Tangents(pb.TangentsRequest(name=name)),
+    "SamplePoints": lambda stub, name: stub.SamplePoints(pb.SamplePointsRequest(name=name)),
     "Distance": lambda stub, name: stub.Distance(pb.DistanceRequest(name=name)),
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),

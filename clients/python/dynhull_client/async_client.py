@@ -52,6 +52,7 @@ class AsyncHullClient(Connection):
     distance = _answering(calls.distance)
     intersect_lines = _answering(calls.intersect_lines)
     get_hull = _answering(calls.get_hull)
+    sample_points = _answering(calls.sample_points)
     verify = _answering(calls.verify)
     ingest = opening(AsyncIngest, calls.ingest)
     watch = opening(AsyncWatch, calls.watch)

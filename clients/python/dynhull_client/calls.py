@@ -28,6 +28,7 @@ from .messages import (
     Hull,
     HullInfo,
     Located,
+    Sampled,
     Supported,
     Tangents,
     Verification,
@@ -193,6 +194,19 @@ def intersect_lines(
 def get_hull(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Hull]:
     """The vertices, counts, area, perimeter, centroid and bounds."""
     return Call("GetHull", pb.GetHullRequest(name=name, min_revision=min_revision), messages.decode_hull, timeout)
+
+
+def sample_points(name: str, size: int = 1000, *, min_revision: int = 0, timeout: float | None = None) -> Call[Sampled]:
+    """At most `size` of the points, and never more than 100 000; all where they are no more.
+
+    A point that comes or goes changes at most one of the sample.
+    """
+    request = pb.SamplePointsRequest(name=name, sample_size=size, min_revision=min_revision)
+
+    def decode(response: pb.SamplePointsResponse) -> Sampled:
+        return Sampled(response.revision, messages.decode_points(response.points))
+
+    return Call("SamplePoints", request, decode, timeout)
 
 
 def verify(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Verification]:

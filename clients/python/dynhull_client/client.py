@@ -48,6 +48,7 @@ class HullClient(Connection):
     distance = _answering(calls.distance)
     intersect_lines = _answering(calls.intersect_lines)
     get_hull = _answering(calls.get_hull)
+    sample_points = _answering(calls.sample_points)
     verify = _answering(calls.verify)
     ingest = opening(Ingest, calls.ingest)
     watch = opening(Watch, calls.watch)

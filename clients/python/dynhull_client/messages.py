@@ -119,6 +119,14 @@ class Distances:
 
 
 @dataclass(frozen=True, slots=True)
+class Sampled:
+    """Some of the points, (n, 2), in lexicographic order."""
+
+    revision: int
+    points: Points
+
+
+@dataclass(frozen=True, slots=True)
 class Crossings:
     """(n, 2, 2) where lines enter and leave the hull, as of `DynamicHull.intersect_lines`."""
 

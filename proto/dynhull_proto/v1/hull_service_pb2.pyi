@@ -288,6 +288,26 @@ class GetHullResponse(_message.Message):
     measures: _hull_pb2.Measures
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
 
+class SamplePointsRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "sample_size", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    SAMPLE_SIZE_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    sample_size: int
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class SamplePointsResponse(_message.Message):
+    __slots__ = ("revision", "points")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    points: _points_pb2.Points
+    def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
 class WatchRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions")
     NAME_FIELD_NUMBER: _ClassVar[int]

@@ -118,6 +118,11 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullResponse.FromString,
                 _registered_method=True)
+        self.SamplePoints = channel.unary_unary(
+                '/dynhull.v1.HullService/SamplePoints',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.FromString,
+                _registered_method=True)
         self.Watch = channel.unary_stream(
                 '/dynhull.v1.HullService/Watch',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.SerializeToString,
@@ -247,6 +252,14 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def SamplePoints(self, request, context):
+        """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+        coordinates have the smallest hashes.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Watch(self, request, context):
         """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
         what it has received always makes the exact hull at the revision of the last event.
@@ -334,6 +347,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.GetHull,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullResponse.SerializeToString,
+            ),
+            'SamplePoints': grpc.unary_unary_rpc_method_handler(
+                    servicer.SamplePoints,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.SerializeToString,
             ),
             'Watch': grpc.unary_stream_rpc_method_handler(
                     servicer.Watch,
@@ -738,6 +756,33 @@ class HullService(object):
             '/dynhull.v1.HullService/GetHull',
             dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.GetHullResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SamplePoints(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/SamplePoints',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -79,6 +79,10 @@ class HullServiceStub:
     """Where lines enter and leave the hull."""
     GetHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]
     """The hull's counts, vertices and measures."""
+    SamplePoints: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]
+    """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+    coordinates have the smallest hashes.
+    """
     Watch: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]
     """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
     what it has received always makes the exact hull at the revision of the last event.
@@ -137,6 +141,10 @@ class HullServiceAsyncStub(HullServiceStub):
     """Where lines enter and leave the hull."""
     GetHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]  # type: ignore[assignment]
     """The hull's counts, vertices and measures."""
+    SamplePoints: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]  # type: ignore[assignment]
+    """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+    coordinates have the smallest hashes.
+    """
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
     """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
     what it has received always makes the exact hull at the revision of the last event.
@@ -276,6 +284,16 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetHullResponse, _abc.Awaitable[_hull_service_pb2.GetHullResponse]]:
         """The hull's counts, vertices and measures."""
+
+    @_abc_1.abstractmethod
+    def SamplePoints(
+        self,
+        request: _hull_service_pb2.SamplePointsRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.SamplePointsResponse, _abc.Awaitable[_hull_service_pb2.SamplePointsResponse]]:
+        """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+        coordinates have the smallest hashes.
+        """
 
     @_abc_1.abstractmethod
     def Watch(

@@ -26,6 +26,7 @@ from .errors import (
 from .history import History
 from .limits import Limits
 from .producers import Producers
+from .sample import sample
 from .serial import SerialExecutor
 from .storage import HullStore, Restored, storage_error
 from .verification import Verification, verify
@@ -160,6 +161,13 @@ class LiveHull:
             min_revision, lambda: (self._hull.points(), self._current_vertices()), small=False
         )
         return counts, await verify(points, vertices)
+
+    async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
+        """At most `size` of the points. Writes go on while they are chosen."""
+        counts, points = await self._read(min_revision, lambda: self._hull.points(), self._counts.points <= SMALL)
+        if len(points) <= size:
+            return counts, points
+        return counts, await asyncio.to_thread(sample, points, size)
 
     async def recall(self, uid: str, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where nobody was told them.

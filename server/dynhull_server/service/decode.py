@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynhull.arrays import Points
+from dynhull.arrays import Points, all_finite
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
@@ -17,6 +17,8 @@ NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
 NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
 DEFAULT_PAGE = 100
 LARGEST_PAGE = 1000
+DEFAULT_SAMPLE = 1000
+LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
 ONE_POINT = struct.Struct("<dd")
@@ -108,9 +110,8 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
     values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
     xy = values.reshape(-1, 2)
-    finite = np.isfinite(xy)
-    if not finite.all():
-        row = int(np.argmin(finite.all(axis=1)))
+    if not all_finite(xy):
+        row = int(np.argmin(np.isfinite(xy).all(axis=1)))
         raise InvalidFieldError(field, tuple(xy[row].tolist()), "coordinates must be finite", row)
     # Adding zero turns -0.0 into 0.0, and any byte order into the machine's.
     return np.asarray(xy + 0.0, np.float64)
@@ -167,6 +168,13 @@ def decode_view(view: hull_service_pb2.HullView) -> bool:
     if view not in hull_service_pb2.HullView.values():
         raise InvalidFieldError("view", view, "not a view this server knows")
     return view != hull_service_pb2.HULL_VIEW_BASIC
+
+
+def decode_sample_size(size: int) -> int:
+    """How many points at most."""
+    if size < 0:
+        raise InvalidFieldError("sample_size", size, "must not be negative")
+    return min(size or DEFAULT_SAMPLE, LARGEST_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)

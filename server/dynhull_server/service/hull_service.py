@@ -189,6 +189,13 @@ class HullService:
         self._metrics.verified("call", verification.difference is None)
         return encode.encode_verification(counts, verification, encoding)
 
+    async def SamplePoints(self, request: pb.SamplePointsRequest, call: Call) -> pb.SamplePointsResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        size = decode.decode_sample_size(request.sample_size)
+        counts, points = await hull.sample(size, request.min_revision)
+        return pb.SamplePointsResponse(revision=counts.revision, points=encode.encode_points(points, encoding))
+
     async def Watch(self, request: pb.WatchRequest, call: Call) -> None:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)

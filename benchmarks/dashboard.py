@@ -1,0 +1,128 @@
+"""What twenty viewers of the dashboard cost those who write: `python benchmarks/dashboard.py`.
+
+A writer streams as fast as the server takes it, in turns without a dashboard and with viewers on its page: a session
+of Bokeh's and a socket of hulls each. Server, writer, dashboard and viewers share this machine.
+"""
+
+import argparse
+import asyncio
+import json
+import multiprocessing
+import os
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from bokeh.util.token import generate_jwt_token, generate_session_id
+from tornado.websocket import websocket_connect
+
+from dynhull_client import HullClient
+
+SERVER = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
+DASHBOARD = ["-m", "dynhull_cli", "dashboard", "--port", "0", "--address"]
+POINTS, BATCH, VERTICES, CYCLE = 100_000, 2_048, 48, 64
+VERTICES_OF = "vertices of a"
+SETTLE = 1.0  # seconds before a measurement
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+@contextmanager
+def running(*command):
+    with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process.stdout.readline().split()[-1].removeprefix("http://"), process.pid
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def aside(function, *arguments):
+    process = multiprocessing.Process(target=function, args=arguments, daemon=True)
+    process.start()
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.join()
+
+
+def write(address):
+    """Moves without end; the outermost points are a ring that every batch turns."""
+    generator = np.random.default_rng(1)
+    inner = generator.uniform(-0.6, 0.6, size=(CYCLE, BATCH - VERTICES, 2))
+    turns = np.linspace(0, 2 * np.pi, VERTICES, endpoint=False) + generator.uniform(size=(CYCLE, 1))
+    batches = np.concatenate((np.stack((np.cos(turns), np.sin(turns)), axis=2), inner), axis=1)
+    with HullClient(address) as client, client.ingest("a") as stream:
+        stream.apply(insert=np.concatenate((generator.uniform(-0.6, 0.6, size=(POINTS, 2)), batches[0])))
+        for number in range(sys.maxsize):
+            stream.apply(move=(batches[number % CYCLE], batches[(number + 1) % CYCLE]))
+
+
+def view(address, viewers, told):
+    """Viewers; each sends on how many hulls it was sent."""
+
+    async def one(viewer):
+        token = generate_jwt_token(generate_session_id())
+        page = await websocket_connect(f"ws://{address}/ws", subprotocols=["bokeh", token])
+        hulls = await websocket_connect(f"ws://{address}/hulls?hull=a")
+        await asyncio.gather(read(page), read(hulls, viewer))
+
+    async def read(socket, viewer=None):
+        while (message := await socket.read_message()) is not None:
+            if viewer is not None and VERTICES_OF in message[:40]:
+                told[viewer] += 1
+
+    async def all_of_them():
+        await asyncio.gather(*map(one, range(viewers)))
+
+    asyncio.run(all_of_them())
+
+
+def processor_seconds(pid):
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--viewers", type=int, default=20)
+    parser.add_argument("--turns", type=int, default=4)
+    parser.add_argument("--seconds", type=float, default=4.0)
+    arguments = parser.parse_args()
+    rates = {"nobody": [], "viewers": []}
+    hulls, shares = [], []
+    with running(*SERVER) as (address, _), HullClient(address) as client:
+        client.create_hull("a")
+
+        def measure():
+            revision, begun = client.get_hull("a").revision, time.perf_counter()
+            time.sleep(arguments.seconds)
+            revision, took = client.get_hull("a").revision - revision, time.perf_counter() - begun
+            return revision * 2 * BATCH / took
+
+        with aside(write, address):
+            time.sleep(SETTLE)
+            for _ in range(arguments.turns):
+                rates["nobody"].append(measure())
+                told = multiprocessing.Array("l", arguments.viewers)
+                with running(*DASHBOARD, address) as (page, pid), aside(view, page, arguments.viewers, told):
+                    while min(told) == 0:
+                        time.sleep(0.1)
+                    before, processor = list(told), processor_seconds(pid)
+                    rates["viewers"].append(measure())
+                    shares.append((processor_seconds(pid) - processor) / arguments.seconds)
+                    hulls += [(n - m) / arguments.seconds for n, m in zip(told, before, strict=True)]
+    alone, watched = median(rates["nobody"]), median(rates["viewers"])
+    print(f"nobody looks: {alone:,.0f} updates a second ({json.dumps([round(each) for each in rates['nobody']])})")
+    print(f"{arguments.viewers} viewers: {watched:,.0f} ({json.dumps([round(each) for each in rates['viewers']])})")
+    print(f"ingest with viewers over ingest without: {watched / alone:.3f}")
+    print(f"hulls a second to a viewer: {min(hulls):.1f} to {max(hulls):.1f}")
+    print(f"processor of the dashboard: {median(shares):.2f} of one")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""What is told of each hull in words and figures."""
+
+import math
+import time
+from collections.abc import Iterable
+from html import escape
+
+from dynhull_client import Difference
+
+from .feed import HullFeed, Verified
+from .looks import Look
+
+MARKERS = {
+    "circle": '<circle cx="20" cy="8" r="5"/>',
+    "square": '<rect x="15.5" y="3.5" width="9" height="9"/>',
+    "triangle": '<path d="M20 2.5l5.5 10h-11z"/>',
+    "diamond": '<path d="M20 2l4.5 6-4.5 6-4.5-6z"/>',
+    "inverted_triangle": '<path d="M20 13.5l5.5-10h-11z"/>',
+    "hex": '<path d="M20 2.5l5 2.8v5.4l-5 2.8-5-2.8V5.3z"/>',
+}
+HEADINGS = ("Hull", "Revision", "Points", "Vertices", "Area", "Batches/s", "Live hull against Chan's algorithm")
+DIGITS, RATE_DIGITS = 6, 3
+SOON = 2.0
+
+
+def table(shown: Iterable[tuple[HullFeed, Look]]) -> str:
+    """A table of the hulls as HTML; on a narrow page its rows are cards."""
+    headings = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
+    rows = "".join(_row(feed, look) for feed, look in shown)
+    return f"<table><thead><tr>{headings}</tr></thead>{rows}</table>" if rows else "<p>Pick a hull to see it.</p>"
+
+
+def _row(feed: HullFeed, look: Look) -> str:
+    outline, _ = feed.drawings()
+    drawn = len(outline.points)
+    vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
+    figures = (f"{feed.revision:,}", f"{feed.points:,}", vertices, _number(feed.area), _number(feed.rate, RATE_DIGITS))
+    cells = "".join(
+        f'<td data-heading="{heading}">{figure}</td>' for heading, figure in zip(HEADINGS[1:], figures, strict=False)
+    )
+    state = f'<span class="bad">✗ {escape(feed.trouble)}</span>' if feed.trouble else _verified(feed.verified)
+    return f'<tr><th scope="row">{_key(look)}{escape(feed.name)}</th>{cells}<td class="state">{state}</td></tr>'
+
+
+def _key(look: Look) -> str:
+    """The hull's line and marker."""
+    dash = " ".join(map(str, look.dash))
+    return (
+        f'<svg width="40" height="16" fill="{look.colour}" aria-hidden="true"><path d="M0 8h40" stroke="{look.colour}" '
+        f'stroke-width="2" stroke-dasharray="{dash}"/>{MARKERS[look.marker]}</svg>'
+    )
+
+
+def _verified(verified: Verified | None) -> str:
+    if verified is None:
+        return "… being verified"
+    when = _ago(time.monotonic() - verified.at)
+    outcome = verified.outcome
+    if outcome.difference is None:
+        return f'<span class="good">✓ equal</span> at revision {outcome.revision:,}, {when}'
+    return f'<span class="bad">✗ different</span> at revision {outcome.revision:,}: {_difference(outcome.difference)}'
+
+
+def _difference(difference: Difference) -> str:
+    return f"vertex {difference.row} is {difference.live}, recomputed {difference.recomputed}"
+
+
+def _ago(seconds: float) -> str:
+    if seconds < SOON:
+        return "just now"
+    return f"{seconds:.0f} s ago" if seconds < 120 else f"{seconds / 60:.0f} min ago"
+
+
+def _number(value: float, digits: int = DIGITS) -> str:
+    if math.isnan(value):
+        return "-"
+    return f"{value:,.0f}" if 1000 <= abs(value) < 1e15 else f"{value:.{digits}g}"

@@ -1,0 +1,57 @@
+"""The dashboard's own server: Bokeh's."""
+
+import asyncio
+import signal
+from collections.abc import Sequence
+from functools import partial
+
+from bokeh.application import Application
+from bokeh.application.handlers import FunctionHandler
+from bokeh.document import Document
+from bokeh.server.contexts import BokehSessionContext
+from bokeh.server.server import BaseServer
+from bokeh.server.tornado import BokehTornado
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
+from tornado.netutil import bind_sockets
+
+from .hub import Hub
+from .hull_socket import HullSocket
+from .page import Page
+
+
+async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
+    """Show the hub's hulls until SIGTERM or SIGINT.
+
+    Args:
+        hub: where the hulls come from.
+        host: the address to listen on.
+        port: the port to listen on; 0 for a free one.
+        origins: HOST:PORT as browsers on other machines call the page.
+    """
+    stop = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    sockets = bind_sockets(port, host)
+    port = sockets[0].getsockname()[1]
+    # A page of another site must not get at the hulls through a browser that can.
+    allowed = [f"{host}:{port}", f"localhost:{port}", *origins]
+    page = Application(FunctionHandler(partial(_show, hub)))
+    hulls = ("/hulls", HullSocket, {"hub": hub})
+    application = BokehTornado({"/": page}, extra_websocket_origins=allowed, extra_patterns=[hulls])
+    http = HTTPServer(application)
+    http.add_sockets(sockets)
+    server = BaseServer(IOLoop.current(), application, http)
+    server.start()
+    print(f"dynhull dashboard on http://{host}:{port}", flush=True)  # noqa: T201  # the address is the command's output
+    await stop.wait()
+    server.stop()
+    await hub.close()
+
+
+def _show(hub: Hub, document: Document) -> None:
+    context = document.session_context
+    assert isinstance(context, BokehSessionContext)
+    assert context.request is not None
+    arguments = context.request.arguments
+    Page(document, hub, [name.decode() for name in arguments.get("hull", [])])

@@ -1,0 +1,120 @@
+"""The server's own figures, from its page for Prometheus."""
+
+import asyncio
+import logging
+import math
+import time
+from dataclasses import dataclass
+from typing import Self
+
+from prometheus_client.parser import text_string_to_metric_families
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError
+
+from .history import History
+
+POLL_SECONDS = 1.0
+PATIENCE = 2.0
+PERCENTILE = 0.99
+COUNTED = ("insert", "delete")
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Scrape:
+    """What the counters stood at.
+
+    Attributes:
+        at: when, by `time.monotonic`.
+        updates: points inserted and deleted.
+        batches: batches acknowledged.
+        seconds: the time their acknowledgements took, all together.
+        buckets: how many batches took at most so many seconds, by the bucket's bound.
+    """
+
+    at: float
+    updates: float
+    batches: float
+    seconds: float
+    buckets: dict[float, float]
+
+    @classmethod
+    def read(cls, text: str) -> Self:
+        """The page as the server prints it."""
+        updates = batches = seconds = 0.0
+        buckets: dict[float, float] = {}
+        for family in text_string_to_metric_families(text):
+            for sample in family.samples:
+                match sample.name:
+                    case "dynhull_updates_total" if sample.labels["operation"] in COUNTED:
+                        updates += sample.value
+                    case "dynhull_batch_duration_seconds_count":
+                        batches = sample.value
+                    case "dynhull_batch_duration_seconds_sum":
+                        seconds = sample.value
+                    case "dynhull_batch_duration_seconds_bucket":
+                        buckets[float(sample.labels["le"])] = sample.value
+        return cls(time.monotonic(), updates, batches, seconds, buckets)
+
+    def rates_since(self, before: Self) -> tuple[float, float, float]:
+        """Updates a second, and the mean and 99th percentile of the milliseconds to an acknowledgement.
+
+        NaN for the latter without batches, and for all where the server has begun anew.
+        """
+        batches = self.batches - before.batches
+        if batches < 0:
+            return math.nan, math.nan, math.nan
+        updates = (self.updates - before.updates) / (self.at - before.at)
+        if batches == 0:
+            return updates, math.nan, math.nan
+        new = {bound: count - before.buckets.get(bound, 0.0) for bound, count in self.buckets.items()}
+        mean = (self.seconds - before.seconds) / batches
+        return updates, 1000 * mean, 1000 * _quantile(new, PERCENTILE)
+
+
+def _quantile(buckets: dict[float, float], share: float) -> float:
+    """Of a histogram, as Prometheus's `histogram_quantile`: linear within a bucket, the last bound beyond it."""
+    wanted = share * buckets[math.inf]
+    low = below = 0.0
+    for bound, count in sorted(buckets.items()):
+        if count >= wanted:
+            return low if math.isinf(bound) else low + (bound - low) * (wanted - below) / (count - below)
+        low, below = bound, count
+    return math.nan
+
+
+class ServerMetrics:
+    """A row a second of what all writers to the server do.
+
+    Attributes:
+        history: updates a second, and the mean and the 99th percentile of the milliseconds from the arrival of a batch
+            to its acknowledgement.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.history = History("time", "updates", "mean", "percentile")
+        self._url = url
+        self._http = AsyncHTTPClient()
+        self._task = asyncio.create_task(self._run())
+
+    async def close(self) -> None:
+        """Ask no longer."""
+        self._task.cancel()
+        await asyncio.wait([self._task])
+
+    async def _run(self) -> None:
+        before: Scrape | None = None
+        while True:
+            now = await self._scrape()
+            rates = now.rates_since(before) if now and before else (math.nan, math.nan, math.nan)
+            self.history.append(time.time() * 1000, *rates)
+            before = now
+            await asyncio.sleep(POLL_SECONDS)
+
+    async def _scrape(self) -> Scrape | None:
+        try:
+            response = await self._http.fetch(self._url, request_timeout=PATIENCE)
+        except (HTTPClientError, OSError) as error:  # the lines have a gap there
+            log.info("%s: %s", self._url, error)
+            return None
+        return Scrape.read(response.body.decode())

@@ -1,0 +1,73 @@
+"""Time lines: a plot for each figure, over one axis of time."""
+
+from collections.abc import Mapping
+
+from bokeh.models import AdaptiveTicker, BasicTicker, ColumnDataSource, CustomJSTickFormatter, DataRange1d, HoverTool
+from bokeh.plotting import figure
+
+from .history import ROWS, History
+from .looks import Look
+from .styles import bare, compact_ticks
+
+SHOWN_MILLISECONDS = 5 * 60 * 1000
+LOCAL_TIME = 'return new Date(tick).toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})'
+# Full minutes and seconds, and few of them.
+SECONDS, TICKS = [1, 2, 5, 10, 15, 30], 3
+
+
+class Lines:
+    """Columns of one history, each as a line in a plot of its own."""
+
+    def __init__(self, history: History, name: str, plots: Mapping[str, figure], looks: Mapping[str, Look]) -> None:
+        self._history = history
+        self._seen = history.length
+        self._plots = plots
+        self._source = ColumnDataSource(dict(history.since(0)), name=f"time lines of {name}")
+        self._lines = {
+            column: plots[column].line(
+                "time",
+                column,
+                source=self._source,
+                color=look.colour,
+                line_width=2,
+                line_dash=look.dash,
+                name=name,
+            )
+            for column, look in looks.items()
+        }
+
+    def update(self) -> None:
+        """Draw the rows that are new."""
+        new = self._history.since(self._seen)
+        if new["time"]:
+            self._source.stream(dict(new), ROWS)
+            self._seen = self._history.length
+
+    def remove(self) -> None:
+        """Take the lines away."""
+        for column, line in self._lines.items():
+            self._plots[column].renderers = [each for each in self._plots[column].renderers if each is not line]
+
+
+def time_plots(*names: str) -> dict[str, figure]:
+    """Empty plots with one axis of time, which follows the newest row."""
+    times = DataRange1d(follow="end", follow_interval=SHOWN_MILLISECONDS, range_padding=0)
+    return {name: _time_plot(name, times) for name in names}
+
+
+def _time_plot(name: str, times: DataRange1d) -> figure:
+    plot = figure(
+        name=name,
+        sizing_mode="stretch_both",
+        x_range=times,
+        y_range=DataRange1d(start=0, range_padding=0.15),
+        tools=[HoverTool(tooltips=[("$name", "$snap_y{0,0.[000]}")])],
+        toolbar_location=None,
+    )
+    bare(plot)
+    plot.xgrid.visible = False
+    plot.xaxis.formatter = CustomJSTickFormatter(code=LOCAL_TIME)
+    plot.yaxis.formatter = compact_ticks()
+    plot.xaxis.ticker = AdaptiveTicker(base=60, mantissas=SECONDS, min_interval=1000, desired_num_ticks=TICKS)
+    plot.yaxis.ticker = BasicTicker(desired_num_ticks=TICKS)
+    return plot

@@ -1,0 +1,78 @@
+"""Makes the screenshots of the dashboard: `python docs/screenshots.py`. Two days of the demo, a minute in 50 ms.
+
+Needs a Chromium on the path.
+"""
+
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from datetime import date
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+from dynhull_cli.demo.flights import Flights
+from dynhull_client import HullClient
+
+SERVE = ["serve", "--in-memory", "--port", "0", "--metrics-port", "0", "--log-level", "warning"]
+DAYS = [date(2013, 3, 8), date(2013, 7, 11)]  # snow, and a summer's day
+EVENING, PACE = 17 * 60, 0.05
+IMAGES = Path(__file__).with_name("images")
+DESK = {"viewport": {"width": 1440, "height": 900}}
+PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+PICTURES = {
+    "dashboard.png": DESK | {"color_scheme": "light"},
+    "dashboard-dark.png": DESK | {"color_scheme": "dark"},
+    "dashboard-phone.png": PHONE | {"color_scheme": "light"},
+}
+
+
+@contextmanager
+def running(*arguments, lines=1):
+    """A command of ours; yields the addresses that it prints."""
+    command = [sys.executable, "-m", "dynhull_cli", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield [process.stdout.readline().split()[-1] for _ in range(lines)]
+        finally:
+            process.terminate()
+
+
+def fly(client, scene):
+    with client.ingest(scene.hull_name) as stream:
+        for frame in list(scene.frames())[:EVENING]:
+            stream.apply(insert=frame.insert, delete=frame.delete)
+            time.sleep(PACE)
+
+
+def main():
+    scenes = [Flights(day) for day in DAYS]
+    with (
+        running(*SERVE, lines=2) as (address, metrics),
+        running("dashboard", "--address", address, "--metrics", metrics, "--port", "0") as (url,),
+        HullClient(address) as client,
+        sync_playwright() as playwright,
+    ):
+        for scene in scenes:
+            client.create_hull(scene.hull_name)
+        flights = [threading.Thread(target=fly, args=(client, scene)) for scene in scenes]
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        query = "&".join(f"hull={scene.hull_name}" for scene in scenes)
+        pages = {name: browser.new_context(**look).new_page() for name, look in PICTURES.items()}
+        for page in pages.values():
+            page.goto(f"{url}/?{query}")
+        for flight in flights:
+            flight.start()
+        time.sleep(EVENING * PACE - 5)
+        for name, page in pages.items():
+            page.screenshot(path=IMAGES / name, full_page=True)
+        for flight in flights:
+            flight.join()
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,220 @@
+"""The dashboard in a real browser, on a real server."""
+
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dashboard_process import dashboard_process, opened, wait_for_vertices
+from metrics import measured, scrape
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+from server_process import Server, server_process
+
+from dynhull_client import HullClient
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
+PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A real Chromium."""
+    chromium = shutil.which("chromium")
+    assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[tuple[Server, str]]:
+    """A server, and the address of its metrics."""
+    with measured() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def url(server: tuple[Server, str]) -> Iterator[str]:
+    with dashboard_process(server[0].address, "--metrics", f"http://{server[1]}/metrics") as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def client(server: tuple[Server, str]) -> Iterator[HullClient]:
+    with HullClient(server[0].address) as client:
+        yield client
+
+
+@pytest.fixture
+def hull(client: HullClient, name: str) -> str:
+    client.create_hull(name)
+    client.apply(name, insert=[*SQUARE, [1, 2]])
+    return name
+
+
+def banner(page: Page):
+    return page.get_by_role("alert").filter(has_text="Connection to")
+
+
+def picture(page: Page) -> bytes:
+    return page.locator(".plane").screenshot()
+
+
+def let_go(page: Page, name: str) -> None:
+    page.locator(".choices__list--multiple .choices__item", has_text=name).locator("button").click()
+
+
+def wait_for_watchers(metrics: str, count: int) -> None:
+    while scrape(metrics)["dynhull_watchers"] != count:
+        time.sleep(0.05)
+
+
+def test_the_polygon_follows_the_hull(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    generator = np.random.default_rng(3)
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        before = picture(page)
+        with client.ingest(hull) as stream:
+            for _ in range(300):
+                stream.apply(insert=generator.normal(scale=5, size=(20, 2)))
+        final = client.get_hull(hull)
+        wait_for_vertices(page, hull, final.vertices.tolist())
+        assert picture(page) != before
+        row = page.get_by_role("row").filter(has_text=hull)
+        expect(row.locator("td").nth(0)).to_have_text("301")
+        expect(row.locator("td").nth(1)).to_have_text("6,005")
+        expect(row.locator("td").nth(2)).to_have_text(f"{len(final.vertices)}")
+        expect(row).to_contain_text("✓ equal")
+
+
+def test_hovering_tells_coordinates_and_revision(browser: Browser, url: str, hull: str) -> None:
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        at = page.evaluate("""() => {
+            const view = Bokeh.index.get_by_id(Bokeh.documents[0].get_model_by_name("plane").id)
+            const box = view.el.getBoundingClientRect()
+            const [x] = view.frame.x_scale.v_compute([4]), [y] = view.frame.y_scale.v_compute([4])
+            return [box.x + x, box.y + y]
+        }""")
+        page.mouse.move(*at)
+        tip = page.locator(".bk-Tooltip")
+        expect(tip).to_contain_text(f"a vertex of {hull}")
+        expect(tip).to_contain_text("revision")
+
+
+def test_hulls_are_picked_and_let_go(browser: Browser, url: str, hull: str) -> None:
+    with opened(browser, url) as page:
+        row = page.get_by_role("row").filter(has_text=hull)
+        page.get_by_placeholder("Pick hulls").fill(hull)
+        page.get_by_role("option", name=hull).click()
+        wait_for_vertices(page, hull, SQUARE)
+        expect(row).to_be_visible()
+        let_go(page, hull)
+        expect(row).to_be_hidden()
+
+
+def test_several_hulls_and_one_watch_each_for_all_viewers(browser: Browser) -> None:
+    with (
+        measured() as (server, metrics),
+        HullClient(server.address) as client,
+        dashboard_process(server.address) as url,
+        opened(browser, url, "fleet", "port") as one,
+        opened(browser, url, "fleet", "port") as two,
+    ):
+        client.create_hull("fleet")
+        client.create_hull("port")
+        client.apply("fleet", insert=SQUARE)
+        for page in (one, two):
+            wait_for_vertices(page, "fleet", SQUARE)
+            expect(page.get_by_role("row")).to_have_count(3)
+        dashes = [path.get_attribute("stroke-dasharray") for path in one.locator("th path[stroke]").all()]
+        assert len({*dashes}) == 2, "told apart by colour alone"
+        wait_for_watchers(metrics, 2)
+        let_go(one, "port")
+        let_go(two, "port")
+        wait_for_watchers(metrics, 1)
+
+
+def test_what_the_server_measures(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        client.apply(hull, insert=np.zeros((1000, 2)))
+        page.wait_for_function("""() => {
+            const {updates, mean} = Bokeh.documents[0].get_model_by_name("time lines of whole server").data
+            return updates.some(value => value > 100) && mean.some(value => value > 0)
+        }""")
+
+
+def test_the_hull_is_verified_when_asked_to(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    with opened(browser, url, hull) as page:
+        state = page.get_by_role("row").filter(has_text=hull).locator(".state")
+        expect(state).to_contain_text("✓ equal at revision 1,")
+        client.apply(hull, insert=[[8, 8]])
+        page.get_by_role("button", name="Verify now").click()
+        expect(state).to_contain_text("✓ equal at revision 2,")
+
+
+def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
+    kept = "--data", str(tmp_path)
+    with server_process(*kept, killed=True) as first, HullClient(first.address) as client:
+        client.create_hull("fleet")
+        client.apply("fleet", insert=SQUARE)
+        with dashboard_process(first.address) as url, opened(browser, url, "fleet") as page:
+            wait_for_vertices(page, "fleet", SQUARE)
+            expect(banner(page)).to_be_hidden()
+            first.process.kill()
+            expect(banner(page)).to_contain_text(f"Connection to {first.address} lost")
+            wait_for_vertices(page, "fleet", SQUARE)
+            with server_process(*kept, "--port", first.address.split(":")[1]):
+                expect(banner(page)).to_be_hidden(timeout=20_000)
+                client.apply("fleet", insert=[[9, 9]], timeout=20)
+                wait_for_vertices(page, "fleet", [[0, 0], [4, 0], [9, 9], [0, 4]])
+
+
+def test_a_dashboard_that_goes_and_comes_back(browser: Browser, server: tuple[Server, str], hull: str) -> None:
+    address = server[0].address
+    with dashboard_process(address) as url:
+        context = opened(browser, url, hull)
+        page = context.__enter__()
+        wait_for_vertices(page, hull, SQUARE)
+    expect(page.get_by_text("The dashboard does not answer.")).to_be_visible()
+    with dashboard_process(address, "--port", url.rsplit(":", 1)[1]):
+        expect(page.get_by_text("The dashboard does not answer.")).to_be_hidden(timeout=20_000)
+        wait_for_vertices(page, hull, SQUARE)
+        context.__exit__(None, None, None)
+
+
+def test_a_wrong_token(browser: Browser, tmp_path: Path) -> None:
+    tokens = tmp_path / "tokens.toml"
+    tokens.write_text("")
+    with (
+        server_process("--tokens", str(tokens), complaints="a valid token is required") as server,
+        dashboard_process(server.address, "--token", "wrong") as url,
+        opened(browser, url) as page,
+    ):
+        expect(banner(page)).to_contain_text("token")
+
+
+def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, hull: str) -> None:
+    with opened(browser, url, hull, **PHONE) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        plane = page.locator(".plane").bounding_box()
+        assert plane["width"] > 350
+        assert plane["height"] < 600
+
+
+def test_light_and_dark(browser: Browser, url: str, hull: str) -> None:
+    paper = "getComputedStyle(document.body).backgroundColor"
+    with (
+        opened(browser, url, hull, color_scheme="light") as light,
+        opened(browser, url, hull, color_scheme="dark") as dark,
+    ):
+        for page in (light, dark):
+            wait_for_vertices(page, hull, SQUARE)
+        assert light.evaluate(paper) == "rgb(255, 255, 255)"
+        assert dark.evaluate(paper) == "rgb(18, 22, 27)"
+        assert picture(light) != picture(dark)

@@ -1,0 +1,52 @@
+"""A real dashboard, in a process of its own, and what a real browser shows of it."""
+
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from urllib.parse import urlencode
+
+from playwright.sync_api import Browser, Page
+from server_process import COMMAND, PATIENCE
+
+PATIENCE_OF_BROWSER = 15_000  # milliseconds
+VERTICES = """name => {
+    const {renderers} = Bokeh.documents[0]?.get_model_by_name("plane") ?? {renderers: []}
+    const drawn = renderers.find(renderer => renderer.data_source.name == `vertices of ${name}`)
+    return drawn?.data_source.data.x.map((x, row) => [x, drawn.data_source.data.y[row]]) ?? []
+}"""
+
+
+@contextmanager
+def dashboard_process(address: str, *options: str) -> Iterator[str]:
+    """`dynhull dashboard` on a free port, unless the options name one; yields its URL. It must stop in peace."""
+    command = [COMMAND, "dashboard", "--port", "0", "--address", address, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            first_line = process.stdout.readline()
+            assert first_line.startswith("dynhull dashboard on http://")
+            yield first_line.split()[-1]
+        finally:
+            process.terminate()
+            assert process.wait(PATIENCE) == 0
+
+
+@contextmanager
+def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[Page]:
+    """The page with these hulls; nothing on it may fail."""
+    failures = []
+    context = browser.new_context(**{"viewport": {"width": 1440, "height": 900}, **look})
+    context.set_default_timeout(PATIENCE_OF_BROWSER)
+    page = context.new_page()
+    page.on("pageerror", lambda error: failures.append(error))
+    page.goto(f"{url}?{urlencode([('hull', hull) for hull in hulls])}")
+    try:
+        yield page
+    finally:
+        context.close()
+    assert not failures
+
+
+def wait_for_vertices(page: Page, name: str, vertices: list[list[float]]) -> None:
+    """Until the polygon on the page is this one."""
+    same = f"([name, vertices]) => JSON.stringify(({VERTICES})(name)) == JSON.stringify(vertices)"
+    page.wait_for_function(same, arg=[name, vertices])
