@@ -39,8 +39,11 @@ def length(a: Vector) -> float:
 
 def unit(a: Vector) -> Vector:
     """Of length one; zero stays zero."""
-    size = length(a)
-    return scale(1 / size, a) if size else a
+    largest = max(map(abs, a))
+    if not largest:
+        return a
+    b = a[0] / largest, a[1] / largest, a[2] / largest  # the reciprocal of a subnormal length would be infinite
+    return scale(1 / length(b), b)
 
 
 def normal(a: Vector, b: Vector, c: Vector) -> Vector:
