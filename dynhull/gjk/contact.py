@@ -65,7 +65,7 @@ def intersect(a: Shape, b: Shape) -> bool:
     >>> intersect(box([0, 0], [1, 1]), box([1, 1], [2, 2])), intersect(box([0, 0], [1, 1]), ball([3, 0.5], 1))
     (True, False)
     """
-    return any(_meeting(p, q, to_the_end=False)[0] for p, q in product(_pieces(a), _pieces(b)))
+    return any(_intersect(p, q) for p, q in product(_pieces(a), _pieces(b)))
 
 
 def contact(a: Shape, b: Shape) -> Contact:
@@ -73,7 +73,7 @@ def contact(a: Shape, b: Shape) -> Contact:
 
     Whether they intersect is decided as by `intersect`. Distance and depth: within 1e-12 of the sets' size for
     polytopes, balls and their sums; within 1e-6 of it for shapes with other curves (a ball scaled unevenly). All this
-    for coordinates up to 1e150; beyond, only the distance of two polygons.
+    for sets and gaps of a size from 1e-150 to 1e150: beyond, squares leave the range of doubles.
     Between unions, all pairs of pieces are looked at: the closest two are told, or the two that overlap most, whose
     depth is a lower bound of the unions'.
 
@@ -105,44 +105,48 @@ def _pieces(shape: Shape) -> Sequence[Convex]:
     return shape
 
 
-def _meeting(a: Convex, b: Convex, to_the_end: bool) -> tuple[bool, Walk, float]:
-    """Whether two convex sets intersect, how GJK saw their cores, and by how much these are smaller."""
-    if a.dimension != b.dimension or a.dimension not in (2, 3):
-        raise ValueError(f"shapes must both be of dimension 2 or 3, got {a.dimension} and {b.dimension}")
-    (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
-    difference = Difference(inner_a, inner_b)
+def _intersect(a: Convex, b: Convex) -> bool:
+    difference, radius_a, radius_b = _cores(a, b)
     radius = radius_a + radius_b
-    seen = walk(difference, inf if to_the_end else radius)
-    if radius or not (_is_polygon(a) and _is_polygon(b)):
-        return seen.distance <= radius, seen, radius
-    if certainly_apart(seen):
-        return False, seen, radius
-    return certainly_touching(seen) or polygons_intersect(_corners(a), _corners(b)), seen, radius
+    return _meet(a, b, walk(difference, enough=radius), radius)
 
 
 def _contact(a: Convex, b: Convex) -> Contact:
-    together, seen, radius = _meeting(a, b, to_the_end=True)
-    d = a.dimension
-    (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
-    iterations = seen.iterations
+    difference, radius_a, radius_b = _cores(a, b)
+    radius = radius_a + radius_b
+    seen = walk(difference, enough=inf)
+    iterations, points = seen.iterations, seen.points
     if seen.distance > 0:
-        away = seen.nearest
-        on_a, on_b = seen.points
-        gap = seen.distance - radius
-        outwards = unit(scale(-1.0, away))
+        gap, outwards = seen.distance - radius, unit(scale(-1.0, seen.nearest))
     else:
-        overlap = expand(Difference(inner_a, inner_b), seen.simplex)
-        iterations += overlap.iterations
-        on_a, on_b = overlap.points
-        gap = -overlap.depth - radius
-        outwards = overlap.normal
-    if not together and gap <= 0:  # only exact arithmetic sees the gap
-        gap = distance_of_polygons(_corners(a), _corners(b))
+        overlap = expand(difference, seen.simplex)
+        iterations, points = iterations + overlap.iterations, overlap.points
+        gap, outwards = -overlap.depth - radius, overlap.normal
+    d = a.dimension
     normal = np.array(outwards[:d]) + 0.0  # no negative zeros
-    points = np.array([on_a[:d], on_b[:d]]) + np.outer([radius_a, -radius_b], normal)
-    if together:
-        return Contact(True, 0.0, max(-gap, 0.0), normal, points, iterations)
-    return Contact(False, gap, 0.0, normal, points, iterations)
+    ends = np.array([p[:d] for p in points]) + np.outer([radius_a, -radius_b], normal)
+    if _meet(a, b, seen, radius):
+        return Contact(True, 0.0, max(-gap, 0.0), normal, ends, iterations)
+    if gap <= 0:  # only exact arithmetic sees it
+        gap = distance_of_polygons(_corners(a), _corners(b))
+    return Contact(False, gap, 0.0, normal, ends, iterations)
+
+
+def _cores(a: Convex, b: Convex) -> tuple[Difference, float, float]:
+    """The difference of the sets' cores, and the radius around each."""
+    if a.dimension != b.dimension or a.dimension not in (2, 3):
+        raise ValueError(f"shapes must both be of dimension 2 or 3, got {a.dimension} and {b.dimension}")
+    (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
+    return Difference(inner_a, inner_b), radius_a, radius_b
+
+
+def _meet(a: Convex, b: Convex, seen: Walk, radius: float) -> bool:
+    """Whether the sets intersect, from the walk through their cores: exact for polygons."""
+    if not (_is_polygon(a) and _is_polygon(b)):
+        return seen.distance <= radius
+    if certainly_apart(seen):
+        return False
+    return certainly_touching(seen) or polygons_intersect(_corners(a), _corners(b))
 
 
 def _is_polygon(shape: Convex) -> bool:

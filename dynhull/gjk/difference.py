@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..convex import Convex
-from .simplex import nearest
+from .simplex import foot, nearest
 from .vectors import ORIGIN, Vector, combine, dot, length, scale, subtract
 
 MOST_ITERATIONS = 256  # polytopes take a few; a curve is followed to the tolerance
@@ -86,11 +86,11 @@ def walk(difference: Difference, enough: float) -> Walk:
             break
         corners = [*simplex, last]
         kept, closer = nearest([corner.w for corner in corners])
-        u = combine(closer, [corners[i].w for i in kept])
         if len(kept) > difference.dimension:
             simplex, weights, v = corners, closer, ORIGIN
             break
-        if dot(u, u) >= dot(v, v):  # rounding: there is no nearer
+        u = foot([corners[i].w for i in kept])
+        if not dot(u, u) < dot(v, v):  # rounding, or a square out of range: there is no nearer
             break
         simplex, weights, v = [corners[i] for i in kept], closer, u
     on_a = combine(weights, [corner.p for corner in simplex])

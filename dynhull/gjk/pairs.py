@@ -127,8 +127,11 @@ def _nearest(p: Floats, q: Floats) -> Floats:
     """The point of each segment that is nearest to the origin."""
     way = q - p
     along, whole = -_dot(p, way), _dot(way, way)
-    share = np.where(whole > 0, np.clip(along / whole, 0, 1), 0)
-    return p + share[:, None] * way
+    # Between the ends along the normal, whose direction is right however far away the ends are.
+    turned = np.stack([way[:, 1], -way[:, 0]], axis=1)
+    between = turned * (_dot(p, turned) / whole)[:, None]
+    at_end = np.where((along >= whole)[:, None], q, p)
+    return np.where(((along > 0) & (along < whole))[:, None], between, np.where((along <= 0)[:, None], p, at_end))
 
 
 def _dot(p: Floats, q: Floats) -> Floats:

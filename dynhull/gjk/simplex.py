@@ -6,7 +6,7 @@ algorithm for faster and more reliable distance queries between convex objects" 
 
 from itertools import combinations
 
-from .vectors import Vector, combine, cross, dot, normal, subtract
+from .vectors import Vector, cross, dot, normal, scale, subtract
 
 # Which corners carry the nearest point, and with what weights: positive, in sum one.
 Place = tuple[tuple[int, ...], tuple[float, ...]]
@@ -26,9 +26,23 @@ def nearest(corners: list[Vector]) -> Place:
 
 def squared(place: Place, corners: list[Vector]) -> float:
     """The squared distance of the origin from a place."""
-    kept, weights = place
-    v = combine(weights, [corners[i] for i in kept])
+    v = foot([corners[i] for i in place[0]])
     return dot(v, v)
+
+
+def foot(corners: list[Vector]) -> Vector:
+    """The nearest point of the line or plane through up to three corners, where it is inside of them.
+
+    Along the normal: its direction is right even where the corners are so far away that a weighted sum is not.
+    """
+    if len(corners) == 1:
+        return corners[0]
+    if len(corners) == 2:
+        way = subtract(corners[1], corners[0])
+        across = cross(way, cross(corners[0], way))
+        return scale(1 / dot(way, way), across)
+    n = normal(*corners)
+    return scale(dot(n, corners[0]) / dot(n, n), n)
 
 
 def _on_point(_: list[Vector]) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """Vectors of three floats as tuples: for a handful of them much faster than arrays. The plane has a third zero."""
 
-from math import sqrt
+from math import hypot
 
 Vector = tuple[float, float, float]
 
@@ -34,13 +34,16 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 def length(a: Vector) -> float:
     """The Euclidean length."""
-    return sqrt(dot(a, a))
+    return hypot(*a)
 
 
 def unit(a: Vector) -> Vector:
     """Of length one; zero stays zero."""
-    size = length(a)
-    return scale(1 / size, a) if size else a
+    largest = max(map(abs, a))
+    if not largest:
+        return a
+    b = a[0] / largest, a[1] / largest, a[2] / largest  # the reciprocal of a subnormal length would be infinite
+    return scale(1 / length(b), b)
 
 
 def normal(a: Vector, b: Vector, c: Vector) -> Vector:

@@ -32,6 +32,9 @@ inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
   return find(nodes, p);
 }
 
+// One branch, which goes the same way almost always, where || makes two that each go either way.
+inline bool either(bool first, bool second) { return first + second != 0; }
+
 // Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
 //
 // `neighbours` are those of p on the chain, infinite where p is its end. With one of them between p and the bridge, the
@@ -39,7 +42,7 @@ inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
 inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
   for (; v != NONE; v = nodes.node(v).parent) {
     Edge& edge = nodes.bridge(v, side);
-    if ((neighbours.b < edge.a) | (neighbours.a > edge.b)) continue;
+    if (either(neighbours.b<edge.a, neighbours.a> edge.b)) continue;
     const Node& node = nodes.node(v);
     const bool on_left = p < node.separator;
     const bool beyond = on_left ? p < edge.a : p > edge.b;
@@ -72,11 +75,10 @@ inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone) {
 // Repair the bridges from v up for p, gone from the chain below, as far as p was on it. True where to the root.
 inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side) {
   for (; v != NONE; v = nodes.node(v).parent) {
-    Edge& edge = nodes.bridge(v, side);
-    if ((p == edge.a) | (p == edge.b))
-      edge = bridge_after(nodes, v, side, p);
-    else if ((p > edge.a) & (p < edge.b))
-      return false;
+    const Edge& edge = nodes.bridge(v, side);
+    if (either(p<edge.a, p> edge.b)) continue;
+    if (p != edge.a && p != edge.b) return false;
+    nodes.bridge(v, side) = bridge_after(nodes, v, side, p);
   }
   return true;
 }

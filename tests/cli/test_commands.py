@@ -5,6 +5,7 @@ import json
 import subprocess
 
 import pytest
+import trustme
 from command_line import dynhull
 from server_process import COMMAND, PATIENCE, server_process
 
@@ -91,6 +92,73 @@ def test_verify(hull, name):
     assert done.stderr == f"error: there is no hull '{name}-not-there'\n"
 
 
+def test_measure(hull):
+    done = dynhull("measure", hull)
+    assert done.exit_code == 0, done.stderr
+    lines = dict(line.split("\t", 1) for line in done.stdout.splitlines())
+    assert (lines["area"], lines["width"], lines["bounds"]) == ("16.0", "4.0", "0.0\t0.0\t4.0\t4.0")
+    assert lines["min_circle"].startswith("2.0\t2.0\t2.828")
+    told = json.loads(dynhull("measure", hull, "--json").stdout)
+    assert told["min_circle"] == [[2, 2], 8**0.5]
+    assert told.keys() == lines.keys()
+
+
+def test_separate(hull, served):
+    with HullClient(served) as client:
+        client.create_hull(f"{hull}-other")
+        client.apply(f"{hull}-other", insert=[[7, 2], [9, 1], [9, 3]])
+    done = dynhull("separate", hull, f"{hull}-other")
+    assert done.exit_code == 0, done.stderr
+    lines = dict(line.split("\t", 1) for line in done.stdout.splitlines())
+    assert (lines["intersect"], lines["distance"], lines["normal"]) == ("False", "3.0", "1.0\t0.0")
+    told = json.loads(dynhull("separate", hull, f"{hull}-other", "--json").stdout)
+    assert (told["intersect"], told["offset"], told["closest"]) == (False, 5.5, [[4, 2], [7, 2]])
+    assert told.keys() == lines.keys()
+    done = dynhull("separate", hull, f"{hull}-no")
+    assert (done.exit_code, done.stderr) == (1, f"error: there is no hull '{hull}-no'\n")
+
+
+def test_phases(served, name):
+    with HullClient(served) as client:
+        client.create_hull(name)
+        client.apply(name, insert=[[0, 0], [0.5, -1], [0.75, 0], [1, 0]])
+    assert dynhull("phases", name).stdout == "0.0\t0.0\n0.5\t-1.0\n1.0\t0.0\n"
+    assert json.loads(dynhull("phases", name, "--json").stdout.splitlines()[1]) == {"stable": [0.5, -1]}
+    done = dynhull("phases", name, "0.75,0", "0.5,-2")
+    numbers = [[0.75, 0, 0.5, 0.5, -1, 1, 0, 0.5, 0.5], [0.5, -2, -1, 0.5, -1, 0.5, -1, 1, 0]]
+    assert [[float(each) for each in line.split("\t")] for line in done.stdout.splitlines()] == numbers
+    assert dynhull("phases", name, "-", input="0.75 0\n0.5 -2\n").stdout == done.stdout
+    assert json.loads(dynhull("phases", name, "0.75,0", "--json").stdout) == {
+        "asked": [0.75, 0],
+        "energy_above_hull": 0.5,
+        "phases": [[0.5, -1], [1, 0]],
+        "shares": [0.5, 0.5],
+    }
+    done = dynhull("phases", name, "2,0")
+    assert (done.exit_code, done.stderr) == (1, "error: entries[0] is (2.0, 0.0): a composition is from 0 to 1\n")
+
+
+def test_frontier(served, name):
+    with HullClient(served) as client:
+        client.create_hull(name)
+        client.apply(name, insert=[[1, 2], [2, 5], [4, 6], [3, 3]])
+    assert dynhull("frontier", name).stdout == "1.0\t2.0\t-1.0\n2.0\t5.0\t4.0\n4.0\t6.0\tnan\n"
+    lines = dynhull("frontier", name, "--json").stdout.splitlines()
+    assert json.loads(lines[2]) == {"efficient": [4, 6], "turning_rate": None}
+    done = dynhull("frontier", name, "3,3", "2,5", "--rate", -2, "--rate", 0.5)
+    assert done.stdout.splitlines() == [
+        "3.0\t3.0\tdominated",
+        "2.0\t5.0\tnot dominated",
+        "-2.0\t1.0\t2.0\t4.0",
+        "0.5\t2.0\t5.0\t2.25",
+    ]
+    lines = dynhull("frontier", name, "3,3", "--rate", 0.5, "--json").stdout.splitlines()
+    assert [json.loads(line) for line in lines] == [
+        {"asked": [3, 3], "dominated": True},
+        {"rate": 0.5, "tangency": [2, 5], "sharpe_ratio": 2.25},
+    ]
+
+
 def test_top(hull, served):
     with HullClient(served) as client:
         client.create_hull(f"{hull}/other")
@@ -115,7 +183,18 @@ def test_bench(served):
         assert list(client.list_hulls("bench-")) == []
 
 
-COMMANDS = [("load", "a", "-"), ("query", "a"), ("watch", "a"), ("verify", "a"), ("top",), ("bench",)]
+COMMANDS = [
+    ("load", "a", "-"),
+    ("query", "a"),
+    ("watch", "a"),
+    ("verify", "a"),
+    ("measure", "a"),
+    ("separate", "a", "b"),
+    ("phases", "a"),
+    ("frontier", "a"),
+    ("top",),
+    ("bench",),
+]
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
@@ -142,6 +221,21 @@ def test_tokens(tmp_path, monkeypatch):
         done = dynhull("load", "b", input="x,y\n1,2\n")
         assert done.exit_code == 4
         assert done.stderr.startswith("error: ")
+
+
+def test_tls(tmp_path):
+    authority = trustme.CA()
+    issued = authority.issue_cert("127.0.0.1")
+    names = {"ca": authority.cert_pem, "key": issued.private_key_pem, "cert": issued.cert_chain_pems[0]}
+    for name, pem in names.items():
+        pem.write_to_path(tmp_path / name)
+    with server_process("--tls-cert", str(tmp_path / "cert"), "--tls-key", str(tmp_path / "key")) as server:
+        where = ["--address", server.address]
+        assert dynhull("top", *where, "--tls-ca", tmp_path / "ca").exit_code == 0
+        assert dynhull("top", *where).exit_code == 3
+        assert dynhull("top", *where, "--tls").exit_code == 3
+        done = dynhull("top", *where, "--client-key", tmp_path / "key")
+        assert (done.exit_code, done.stderr) == (2, "error: --client-cert and --client-key go together\n")
 
 
 def test_a_reader_that_has_enough(hull, served):

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from server_process import COMMAND, PATIENCE
@@ -51,6 +52,15 @@ def test_something_missing_that_is_loaded_late() -> None:
     assert "dynhull demo needs pandas" in result.stderr
     assert "pip install 'dynhull[demo]'" in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_a_format_that_is_not_installed(tmp_path: Path) -> None:
+    file = tmp_path / "points.geojson"
+    file.write_text("{}")
+    result = run_without("ijson", "load", "a", str(file))
+    assert result.returncode == 1
+    assert "dynhull load needs ijson" in result.stderr
+    assert "pip install 'dynhull[client,cli,files]'" in result.stderr
 
 
 def test_help_works_without_the_extra() -> None:

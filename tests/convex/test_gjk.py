@@ -208,6 +208,14 @@ def test_bad_input(ask, message):
         ask()
 
 
+def test_a_sliver_beside_the_origin():
+    """Ends so far away that their weighted sums are off by more than the distance."""
+    sliver = [(1166548778139278.0, 0.0), (1.0, 0.0), (-1.4295695843808416e16, 256955.0)]
+    distance = float(root(oracle.polygons([(0.0, 0.0)], sliver)))
+    assert contact(point([0, 0]), polygon(sliver)).distance == pytest.approx(distance, rel=1e-9)
+    assert distance_many([[[0, 0]]], [sliver]) == pytest.approx(distance, rel=1e-9)
+
+
 def test_the_gap_between_far_away_sets_is_exact():
     """Coordinates of 2**53 and a gap of one: the decision and the distance survive."""
     far = 2.0**53

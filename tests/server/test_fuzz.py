@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from server_process import server_process
 
+from dynhull_proto.v1 import batch_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -64,8 +65,8 @@ FIELDS = {
 def messages(draw: st.DrawFn, descriptor: Descriptor) -> Message:
     """A message any of whose fields may hold anything."""
     message = GetMessageClass(descriptor)()
-    if "name" in descriptor.fields_by_name:
-        message.name = "a"
+    for name in {"name", "other_name"} & set(descriptor.fields_by_name):
+        setattr(message, name, "a")
     # Few at a time, so that each has its say before another is refused.
     for field in draw(st.lists(st.sampled_from(list(descriptor.fields)), max_size=3, unique_by=lambda f: f.name)):
         set_field(draw, message, field)
@@ -138,7 +139,10 @@ def test_whatever_is_sent(channel: grpc.Channel, method) -> None:
         return [(hull.name, hull.uid, hull.revision, hull.point_count) for hull in hulls]
 
     def create(name: str) -> None:
+        """A hull that can be read in every way."""
         stub.CreateHull(pb.CreateHullRequest(name=name))
+        points = points_pb2.Points(coordinates=[0.25, 1, 0.5, -1e308, 1, 1.5, 5e-324, 0])
+        stub.Apply(pb.ApplyRequest(name=name, batch=batch_pb2.Batch(inserts=points)))
 
     @settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck))
     @given(requests(method))

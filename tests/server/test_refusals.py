@@ -108,6 +108,35 @@ INVALID_REQUESTS = {
         None,
         "5",
     ),
+    "no other name": ("Separate", lambda hull: pb.SeparateRequest(name=hull), "other_name", None, ""),
+    "an energy that is none": (
+        "PhaseDiagram",
+        lambda hull: pb.PhaseDiagramRequest(name=hull, entries=NAN_ROW),
+        "entries",
+        1,
+        "(1.0, nan)",
+    ),
+    "a composition beyond 1": (
+        "PhaseDiagram",
+        lambda hull: pb.PhaseDiagramRequest(name=hull, entries=points_pb2.Points(coordinates=[1, 2, 3, 4])),
+        "entries",
+        1,
+        "(3.0, 4.0)",
+    ),
+    "a risk of nothing": (
+        "Frontier",
+        lambda hull: pb.FrontierRequest(name=hull, points=points_pb2.Points(coordinates=[1, 2, -0.0, 4])),
+        "points",
+        1,
+        "(0.0, 4.0)",
+    ),
+    "an infinite rate": (
+        "Frontier",
+        lambda hull: pb.FrontierRequest(name=hull, rates=[0, math.inf]),
+        "rates",
+        1,
+        "inf",
+    ),
     "a rate that is none": (
         "Watch",
         lambda hull: pb.WatchRequest(name=hull, max_events_per_second=math.nan),
@@ -161,6 +190,14 @@ def test_no_such_hull(stub: HullServiceStub, name: str, method: str) -> None:
     code, info, details = refusal(lambda: finish(getattr(stub, method)(request)))
     assert (code, info.reason) == (grpc.StatusCode.NOT_FOUND, "HULL_NOT_FOUND")
     assert details[0].resource_name == name
+
+
+def test_a_hull_that_is_no_phase_diagram(stub: HullServiceStub, hull: str) -> None:
+    stub.Apply(pb.ApplyRequest(name=hull, batch=batch_pb2.Batch(inserts=TWO)))
+    code, info, details = refusal(lambda: stub.PhaseDiagram(pb.PhaseDiagramRequest(name=hull)))
+    assert (code, info.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "HULL_UNSUITABLE")
+    assert dict(info.metadata) == {"value": hull, "point": "(3.0, 4.0)"}
+    assert details[0].violations[0].subject == hull
 
 
 def test_a_hull_exists_already(stub: HullServiceStub, hull: str) -> None:

@@ -59,6 +59,10 @@ EVERY_CALL = {
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
+    "GetMeasures": lambda stub, name: stub.GetMeasures(pb.GetMeasuresRequest(name=name)),
+    "Separate": lambda stub, name: stub.Separate(pb.SeparateRequest(name=name, other_name=name)),
+    "PhaseDiagram": lambda stub, name: stub.PhaseDiagram(pb.PhaseDiagramRequest(name=name)),
+    "Frontier": lambda stub, name: stub.Frontier(pb.FrontierRequest(name=name)),
     "Verify": lambda stub, name: stub.Verify(pb.VerifyRequest(name=name)),
 }
 WRITES = {"CreateHull", "DeleteHull", "Apply", "Ingest", "Stream", "GetProducer"}
@@ -111,6 +115,15 @@ def test_out_of_scope_the_answer_is_the_same_whether_there_is_a_hull_or_not(guar
             code, info, _ = refusal(lambda name=name: EVERY_CALL[call](stub, name))
             assert (code, info.reason) == (grpc.StatusCode.PERMISSION_DENIED, "PERMISSION_DENIED")
             assert dict(info.metadata) == {"scope": "write" if call in WRITES else "read", "value": name}
+
+
+def test_both_of_two_hulls_must_be_in_scope(guarded: Server) -> None:
+    with HullClient(guarded.address, token=FLEET) as fleet:
+        assert fleet.separate("fleet/van-1", "fleet/van-1").intersect
+        for other in ("plane", "nobody"):
+            for pair in (("fleet/van-1", other), (other, "fleet/van-1")):
+                with pytest.raises(PermissionDeniedError, match=f"may not read '{other}'"):
+                    fleet.separate(*pair)
 
 
 def test_scopes(guarded: Server) -> None:

@@ -41,45 +41,20 @@ class Exit(IntEnum):
     FORBIDDEN = 4
 
 
-PANEL = "Server"
-Address = Annotated[str, typer.Option(envvar="DYNHULL_ADDRESS", help="HOST:PORT.", rich_help_panel=PANEL)]
-Token = Annotated[str | None, typer.Option(envvar="DYNHULL_TOKEN", help="Bearer token to show.", rich_help_panel=PANEL)]
-Tls = Annotated[
-    bool,
-    typer.Option(
-        "--tls", envvar="DYNHULL_TLS", help="Encrypt, and trust what this machine trusts.", rich_help_panel=PANEL
-    ),
-]
-TlsCa = Annotated[
-    Path | None,
-    typer.Option(
-        envvar="DYNHULL_TLS_CA",
-        help="Encrypt, and trust the certificates in this PEM file.",
-        exists=True,
-        dir_okay=False,
-        rich_help_panel=PANEL,
-    ),
-]
-ClientCert = Annotated[
-    Path | None,
-    typer.Option(
-        envvar="DYNHULL_CLIENT_CERT",
-        help="PEM file: certificate to show.",
-        exists=True,
-        dir_okay=False,
-        rich_help_panel=PANEL,
-    ),
-]
-ClientKey = Annotated[
-    Path | None,
-    typer.Option(
-        envvar="DYNHULL_CLIENT_KEY",
-        help="PEM file: its private key.",
-        exists=True,
-        dir_okay=False,
-        rich_help_panel=PANEL,
-    ),
-]
+def _option(variable: str, text: str, **more: Any) -> Any:
+    return typer.Option(envvar=f"DYNHULL_{variable}", help=text, rich_help_panel="Server", **more)
+
+
+def _pem(variable: str, text: str) -> Any:
+    return _option(variable, f"PEM file: {text}", exists=True, dir_okay=False)
+
+
+Address = Annotated[str, _option("ADDRESS", "HOST:PORT.")]
+Token = Annotated[str | None, _option("TOKEN", "Bearer token to show.")]
+Tls = Annotated[bool, _option("TLS", "Encrypt, and trust what this machine trusts.")]
+TlsCa = Annotated[Path | None, _pem("TLS_CA", "encrypt, and trust these certificates.")]
+ClientCert = Annotated[Path | None, _pem("CLIENT_CERT", "certificate to show.")]
+ClientKey = Annotated[Path | None, _pem("CLIENT_KEY", "its private key.")]
 
 
 def connected(command: Callable[..., None]) -> Callable[..., None]:

@@ -1,20 +1,18 @@
 """`dynhull query`: where points lie, and what lies where."""
 
-import math
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from enum import StrEnum
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from dynhull_client import HullClient
 from dynhull_client.messages import Points
 
+from .asked import STANDARD_INPUT, asked_rows
 from .connected import connected
 from .json_lines import json_line
-from .load.chunks import CHUNK_ROWS, cut
+from .tab_lines import tab_line
 
 SIDES = {1: "inside", 0: "boundary", -1: "outside"}
 
@@ -65,31 +63,13 @@ def query(
     """
     if question is Question.VERTICES:
         for vertex in client.get_hull(name).vertices.tolist():
-            typer.echo(json_line(vertex=vertex) if as_json else "\t".join(map(repr, vertex)))
+            typer.echo(json_line(vertex=vertex) if as_json else tab_line(vertex))
         return
     columns = 4 if question is Question.LINES else 2
-    for texts in cut(points or _lines(), CHUNK_ROWS):
-        asked = np.array([_numbers(text, columns) for text in texts])
+    for asked in asked_rows(points or STANDARD_INPUT, columns):
         for row, answer in zip(asked.tolist(), ANSWERS[question](client, name, asked), strict=True):
-            if as_json:
-                typer.echo(json_line(asked=row, answer=answer))
-            else:
-                typer.echo("\t".join([*map(repr, row), *map(str, np.ravel(answer).tolist())]))
+            typer.echo(json_line(asked=row, answer=answer) if as_json else tab_line(row, answer))
 
 
 # A point may begin with a minus sign.
 query.context_settings = {"ignore_unknown_options": True}  # type: ignore[attr-defined]
-
-
-def _lines() -> Iterator[str]:
-    return (line for line in sys.stdin if not line.isspace())
-
-
-def _numbers(text: str, columns: int) -> list[float]:
-    try:
-        numbers = [float(each) for each in text.replace(",", " ").split()]
-    except ValueError:
-        numbers = []
-    if len(numbers) != columns or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{text.strip()!r} is not {'X,Y' if columns == 2 else 'X,Y,X,Y'}")
-    return numbers

@@ -18,6 +18,7 @@ from .errors import (
     HullEmptyError,
     HullExistsError,
     HullNotFoundError,
+    HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
     PermissionDeniedError,
@@ -52,6 +53,7 @@ from .messages import (
     Tangents,
     Verification,
 )
+from .uses import Efficient, Measured, Phases, Separation
 from .watch import Watch
 from .writer import Writer
 
@@ -69,6 +71,7 @@ __all__ = [
     "Difference",
     "Distances",
     "DynhullError",
+    "Efficient",
     "Event",
     "Hull",
     "HullClient",
@@ -77,18 +80,22 @@ __all__ = [
     "HullExistsError",
     "HullInfo",
     "HullNotFoundError",
+    "HullUnsuitableError",
     "Ingest",
     "Ingested",
     "InvalidRequestError",
     "LimitExceededError",
     "Located",
+    "Measured",
     "Measures",
     "PermissionDeniedError",
+    "Phases",
     "PointMissingError",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
     "Sampled",
+    "Separation",
     "SequenceGapError",
     "Sketch",
     "Snapshot",

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Concatenate, ParamSpec, Self, TypeVar
 
 import grpc
 
-from . import calls
+from . import calls, uses
 from .async_ingest import AsyncIngest
 from .async_watch import AsyncWatch
 from .async_writer import AsyncWriter
@@ -54,6 +54,10 @@ class AsyncHullClient(Connection):
     get_hull = _answering(calls.get_hull)
     sample_points = _answering(calls.sample_points)
     verify = _answering(calls.verify)
+    get_measures = _answering(uses.get_measures)
+    separate = _answering(uses.separate)
+    phase_diagram = _answering(uses.phase_diagram)
+    frontier = _answering(uses.frontier)
     ingest = opening(AsyncIngest, calls.ingest)
     watch = opening(AsyncWatch, calls.watch)
     writer = opening(AsyncWriter, calls.writer)

@@ -30,19 +30,23 @@ class AsyncWatch(AsyncIterator[Event]):
         return self._place.lost
 
     async def __anext__(self) -> Event:
-        while not self._closed.is_set():
+        event = None
+        while event is None:
+            if self._closed.is_set():
+                raise StopAsyncIteration
+            if self._call.cancelled():  # as gRPC does when a wait for an event is given up
+                self._begin()
             try:
-                return self._place.take(await anext(self._events))
+                event = self._place.take(await anext(self._events))
             except grpc.RpcError as failure:
                 pause = self._place.pause_after(error_of(failure))
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._closed.wait(), pause)
+                self._begin()
             except asyncio.CancelledError:
-                if self._closed.is_set():
-                    break
-                raise
-            with suppress(TimeoutError):
-                await asyncio.wait_for(self._closed.wait(), pause)
-            self._begin()
-        raise StopAsyncIteration
+                if not self._closed.is_set():
+                    raise
+        return event
 
     async def close(self) -> None:
         """End the watch."""

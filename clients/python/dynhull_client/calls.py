@@ -1,6 +1,6 @@
 """Each call once: what is sent, how the answer is read, and what to tell whoever calls.
 
-`HullClient` and `AsyncHullClient` are made of these functions, which are their documentation too.
+`HullClient` and `AsyncHullClient` are made of these functions and those in `uses`, which are their documentation too.
 """
 
 from collections.abc import Callable
@@ -16,6 +16,7 @@ from google.protobuf.message import Message
 
 from dynhull.arrays import as_points
 from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1 import points_pb2
 
 from . import messages
 from .batch import Missing, encode_batch
@@ -121,7 +122,7 @@ def locate(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: floa
 
     With a `min_revision`, waits until the hull has it; so do the other reads.
     """
-    request = pb.LocateRequest(name=name, min_revision=min_revision, points=_encoded(xy, "xy"))
+    request = pb.LocateRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
 
     def decode(response: pb.LocateResponse) -> Located:
         return Located(response.revision, np.frombuffer(response.sides, np.int8))
@@ -131,7 +132,7 @@ def locate(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: floa
 
 def count(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Counted]:
     """How many times each of (n, 2) points is there."""
-    request = pb.CountRequest(name=name, min_revision=min_revision, points=_encoded(xy, "xy"))
+    request = pb.CountRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
 
     def decode(response: pb.CountResponse) -> Counted:
         return Counted(response.revision, np.array(response.counts, np.int64))
@@ -146,7 +147,7 @@ def support(
 
     HullEmptyError where there are no points.
     """
-    vectors = _encoded(directions, "directions")
+    vectors = encoded(directions, "directions")
     request = pb.SupportRequest(name=name, min_revision=min_revision, directions=vectors)
 
     def decode(response: pb.SupportResponse) -> Supported:
@@ -157,7 +158,7 @@ def support(
 
 def tangents(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Tangents]:
     """Left and right tangent points from each of (n, 2) points; NaN for those not strictly outside. Exact."""
-    request = pb.TangentsRequest(name=name, min_revision=min_revision, points=_encoded(xy, "xy"))
+    request = pb.TangentsRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
 
     def decode(response: pb.TangentsResponse) -> Tangents:
         left, right = messages.decode_points(response.left), messages.decode_points(response.right)
@@ -168,7 +169,7 @@ def tangents(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: fl
 
 def distance(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Distances]:
     """How far each of (n, 2) points is from the hull: 0 inside and on the boundary, infinite from an empty hull."""
-    request = pb.DistanceRequest(name=name, min_revision=min_revision, points=_encoded(xy, "xy"))
+    request = pb.DistanceRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
 
     def decode(response: pb.DistanceResponse) -> Distances:
         return Distances(response.revision, np.array(response.distances, np.float64))
@@ -181,7 +182,7 @@ def intersect_lines(
 ) -> Call[Crossings]:
     """Where the lines through each of (n, 2) points p and q enter and leave the hull; NaN for one that misses."""
     request = pb.IntersectLinesRequest(
-        name=name, min_revision=min_revision, origins=_encoded(p, "p"), targets=_encoded(q, "q")
+        name=name, min_revision=min_revision, origins=encoded(p, "p"), targets=encoded(q, "q")
     )
 
     def decode(response: pb.IntersectLinesResponse) -> Crossings:
@@ -353,7 +354,7 @@ def watch(
     if held is not None:
         request.resume.uid, request.resume.revision = held.uid, held.revision
     if directions is not None:
-        request.directions.CopyFrom(_encoded(directions, "directions"))
+        request.directions.CopyFrom(encoded(directions, "directions"))
     if progress_interval is not None:
         duration = Duration()
         duration.FromTimedelta(timedelta(seconds=progress_interval))
@@ -361,5 +362,6 @@ def watch(
     return Watching(request, copy, reconnect, timeout)
 
 
-def _encoded(xy: npt.ArrayLike, name: str) -> Any:
+def encoded(xy: npt.ArrayLike, name: str) -> points_pb2.Points:
+    """Points as sent; ValueError or TypeError names the argument and the first bad row."""
     return messages.encode_points(as_points(xy, name))

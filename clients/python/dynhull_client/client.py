@@ -7,7 +7,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 
 import grpc
 
-from . import calls
+from . import calls, uses
 from .calls import Call
 from .connection import Connection
 from .errors import error_of
@@ -50,6 +50,10 @@ class HullClient(Connection):
     get_hull = _answering(calls.get_hull)
     sample_points = _answering(calls.sample_points)
     verify = _answering(calls.verify)
+    get_measures = _answering(uses.get_measures)
+    separate = _answering(uses.separate)
+    phase_diagram = _answering(uses.phase_diagram)
+    frontier = _answering(uses.frontier)
     ingest = opening(Ingest, calls.ingest)
     watch = opening(Watch, calls.watch)
     writer = opening(Writer, calls.writer)

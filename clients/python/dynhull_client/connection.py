@@ -1,6 +1,7 @@
 """A channel to a server, and how calls begin on it."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import grpc
@@ -43,6 +44,9 @@ class Connection:
             also takes a root certificate, and a client's key and certificate.
         retries: how often a call is made again that found no server, after a growing pause. Only calls that may be
             repeated: reads, and batches with a producer and a sequence.
+
+    Attributes:
+        blocking: makes another connection with the same arguments, for threads.
     """
 
     _grpc: ClassVar[Any] = grpc
@@ -58,6 +62,15 @@ class Connection:
         retries: int = DEFAULT_RETRIES,
     ) -> None:
         self.address = address
+        self.blocking = partial(
+            Connection,
+            address,
+            timeout=timeout,
+            wait_for_ready=wait_for_ready,
+            token=token,
+            tls=tls,
+            retries=retries,
+        )
         self._timeout = timeout
         self._retries = retries
         self._wait_for_ready = wait_for_ready

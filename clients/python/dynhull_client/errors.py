@@ -65,6 +65,10 @@ class HullEmptyError(DynhullError, ValueError):
     """A question that a hull without points has no answer to."""
 
 
+class HullUnsuitableError(DynhullError, ValueError):
+    """A question that has no answer for a hull with such a point, which the message names."""
+
+
 class RevisionForgottenError(DynhullError, LookupError):
     """A watch cannot be resumed from that revision: watch anew. `oldest` is the oldest one that could be resumed."""
 
@@ -88,6 +92,7 @@ class DeadlineError(DynhullError, TimeoutError):
 BY_REASON: Mapping[str, type[DynhullError]] = {
     "SEQUENCE_GAP": SequenceGapError,
     "HULL_EMPTY": HullEmptyError,
+    "HULL_UNSUITABLE": HullUnsuitableError,
 }
 
 BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {

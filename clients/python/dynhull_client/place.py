@@ -4,7 +4,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from .calls import Watching
 from .errors import DynhullError, RevisionForgottenError, UnavailableError
-from .messages import Event, Snapshot, decode_event
+from .messages import Event, Progress, Snapshot, decode_event
 from .retry import Attempts, pauses
 
 
@@ -22,10 +22,11 @@ class Place:
         self.timeout = Attempts(watching.timeout, retries=0).timeout
         self._watching = watching
         self._begun = False
+        self._revision = -1
         self._pauses = pauses()
 
-    def take(self, message: pb.WatchResponse) -> Event:
-        """The event received, from which the watch can go on."""
+    def take(self, message: pb.WatchResponse) -> Event | None:
+        """The event received, from which the watch can go on; None where it is not one that the watcher asked for."""
         event = decode_event(message)
         if isinstance(event, Snapshot):
             self.request.resume.uid = event.uid
@@ -35,7 +36,9 @@ class Place:
             self._watching.copy.update(event)
         if self.lost is not None or not self._begun:
             self.lost, self._begun, self._pauses = None, True, pauses()
-        return event
+        news = event.revision > self._revision or self._watching.request.HasField("progress_interval")
+        self._revision = event.revision
+        return event if news or not isinstance(event, Progress) else None
 
     def pause_after(self, error: DynhullError) -> float:
         """Seconds until the next connection; raises the error where there is none."""
@@ -45,4 +48,6 @@ class Place:
             return 0.0
         if not (self._watching.reconnect and self._begun and isinstance(error, UnavailableError)):
             raise error from None
+        if not self.request.HasField("progress_interval"):  # to know of the new connection even if nothing changes
+            self.request.progress_interval.seconds = 1
         return next(self._pauses)

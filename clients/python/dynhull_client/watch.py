@@ -34,15 +34,16 @@ class Watch(Iterator[Event]):
         return self._place.lost
 
     def __next__(self) -> Event:
-        while True:
+        event = None
+        while event is None:
             try:
-                return self._place.take(next(self._call))
+                event = self._place.take(next(self._call))
             except grpc.RpcError as failure:
                 if self._closed.is_set():
                     raise StopIteration from None
-                pause = self._place.pause_after(error_of(failure))
-            self._closed.wait(pause)
-            self._call = self._begin()
+                self._closed.wait(self._place.pause_after(error_of(failure)))
+                self._call = self._begin()
+        return event
 
     def close(self) -> None:
         """End the watch."""

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 # What refuses the writer, not one of its batches.
 FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
 
-
 Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
 Settled = list[tuple[Any, Applied | DynhullError]]
 
@@ -133,6 +132,8 @@ class Window(Generic[Future]):
 
     def acknowledge(self, response: pb.StreamResponse) -> Settled:
         """The first batch under way has been applied."""
+        if not self._under_way:  # everything was abandoned while the response was on its way
+            return []
         applied = decode_applied(response.result)
         if applied.duplicate and self._under_way[0].sent == 1:
             batch = f"batch {response.sequence} of producer {self._writing.producer!r}"
@@ -151,17 +152,17 @@ class Window(Generic[Future]):
         self._on_this_connection = 0
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
             return self._end(error), None
-        unclear = isinstance(error, UnavailableError) or not error.reason
-        if error.code == grpc.StatusCode.RESOURCE_EXHAUSTED and not error.reason:
-            # gRPC's own limit on messages. It does not say which, and earlier ones may have been applied.
-            unclear, self._one_at_a_time = not alone, True
-        if unclear:
-            if self.empty or self._lost_since is None:
-                self._lost_since = now
-            if now - self._lost_since > self._writing.patience:
-                return self._end(error), None
-            return [], next(self._pauses)
-        return self._refuse(error)
+        if error.reason and not isinstance(error, UnavailableError):
+            return self._refuse(error)
+        if error.code == grpc.StatusCode.RESOURCE_EXHAUSTED and alone:  # gRPC's own limit on messages
+            return self._refuse(error)
+        # Where nobody says which batch it was, or whether it was applied, sending one at a time will tell.
+        self._one_at_a_time = not isinstance(error, UnavailableError)
+        if self.empty or self._lost_since is None:
+            self._lost_since = now
+        if now - self._lost_since > self._writing.patience:
+            return self._end(error), None
+        return [], next(self._pauses)
 
     def abandon(self) -> list[Future]:
         """Forget everything; returns the outcomes that nobody will know."""
@@ -185,6 +186,7 @@ class Window(Generic[Future]):
         self._refusal = self._refusal or error
         refused = self._under_way.popleft()
         self.settled += 1
+        self._lost_since = None
         for batch in self._under_way:
             assert batch.request is not None  # what is under way has been sent
             batch.request.sequence -= 1

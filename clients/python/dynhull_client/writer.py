@@ -133,7 +133,8 @@ class Writer:
             if pause is None:
                 return
             with self._turn:
-                self._turn.wait_for(lambda: self._closed, pause)
+                if self._turn.wait_for(lambda: self._closed, pause):
+                    return
 
     def _connect(self, window: Window["Future[Applied]"]) -> DynhullError:
         """Send batches and read acknowledgements; returns what ended the connection."""
@@ -141,6 +142,8 @@ class Writer:
         try:
             with self._turn:
                 self._call = call = self._client.begin(self._client.stub.Stream, requests, None)
+                if self._closed:
+                    call.cancel()
             for response in call:
                 with self._turn:
                     settled = window.acknowledge(response)

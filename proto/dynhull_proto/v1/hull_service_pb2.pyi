@@ -308,6 +308,134 @@ class SamplePointsResponse(_message.Message):
     points: _points_pb2.Points
     def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
+class GetMeasuresRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class GetMeasuresResponse(_message.Message):
+    __slots__ = ("revision", "measures", "diameter", "width", "min_box", "min_perimeter_box", "min_circle_x", "min_circle_y", "min_circle_radius")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    MEASURES_FIELD_NUMBER: _ClassVar[int]
+    DIAMETER_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_FIELD_NUMBER: _ClassVar[int]
+    MIN_BOX_FIELD_NUMBER: _ClassVar[int]
+    MIN_PERIMETER_BOX_FIELD_NUMBER: _ClassVar[int]
+    MIN_CIRCLE_X_FIELD_NUMBER: _ClassVar[int]
+    MIN_CIRCLE_Y_FIELD_NUMBER: _ClassVar[int]
+    MIN_CIRCLE_RADIUS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    measures: _hull_pb2.Measures
+    diameter: float
+    width: float
+    min_box: _points_pb2.Points
+    min_perimeter_box: _points_pb2.Points
+    min_circle_x: float
+    min_circle_y: float
+    min_circle_radius: float
+    def __init__(self, revision: _Optional[int] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., diameter: _Optional[float] = ..., width: _Optional[float] = ..., min_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_perimeter_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_circle_x: _Optional[float] = ..., min_circle_y: _Optional[float] = ..., min_circle_radius: _Optional[float] = ...) -> None: ...
+
+class SeparateRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "other_name", "other_min_revision", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    OTHER_NAME_FIELD_NUMBER: _ClassVar[int]
+    OTHER_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    other_name: str
+    other_min_revision: int
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., other_name: _Optional[str] = ..., other_min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class SeparateResponse(_message.Message):
+    __slots__ = ("revision", "other_revision", "intersect", "distance", "depth", "normal_x", "normal_y", "offset", "closest")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    OTHER_REVISION_FIELD_NUMBER: _ClassVar[int]
+    INTERSECT_FIELD_NUMBER: _ClassVar[int]
+    DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    DEPTH_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_X_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_Y_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_FIELD_NUMBER: _ClassVar[int]
+    CLOSEST_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    other_revision: int
+    intersect: bool
+    distance: float
+    depth: float
+    normal_x: float
+    normal_y: float
+    offset: float
+    closest: _points_pb2.Points
+    def __init__(self, revision: _Optional[int] = ..., other_revision: _Optional[int] = ..., intersect: bool = ..., distance: _Optional[float] = ..., depth: _Optional[float] = ..., normal_x: _Optional[float] = ..., normal_y: _Optional[float] = ..., offset: _Optional[float] = ..., closest: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+
+class PhaseDiagramRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "entries", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENTRIES_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    entries: _points_pb2.Points
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class PhaseDiagramResponse(_message.Message):
+    __slots__ = ("revision", "stable", "energies_above_hull", "left", "right", "left_shares", "right_shares")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    STABLE_FIELD_NUMBER: _ClassVar[int]
+    ENERGIES_ABOVE_HULL_FIELD_NUMBER: _ClassVar[int]
+    LEFT_FIELD_NUMBER: _ClassVar[int]
+    RIGHT_FIELD_NUMBER: _ClassVar[int]
+    LEFT_SHARES_FIELD_NUMBER: _ClassVar[int]
+    RIGHT_SHARES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    stable: _points_pb2.Points
+    energies_above_hull: _containers.RepeatedScalarFieldContainer[float]
+    left: _points_pb2.Points
+    right: _points_pb2.Points
+    left_shares: _containers.RepeatedScalarFieldContainer[float]
+    right_shares: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, revision: _Optional[int] = ..., stable: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., energies_above_hull: _Optional[_Iterable[float]] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., left_shares: _Optional[_Iterable[float]] = ..., right_shares: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class FrontierRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "points", "rates", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    RATES_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    points: _points_pb2.Points
+    rates: _containers.RepeatedScalarFieldContainer[float]
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., rates: _Optional[_Iterable[float]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class FrontierResponse(_message.Message):
+    __slots__ = ("revision", "efficient", "turning_rates", "dominated", "tangencies", "sharpe_ratios")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    EFFICIENT_FIELD_NUMBER: _ClassVar[int]
+    TURNING_RATES_FIELD_NUMBER: _ClassVar[int]
+    DOMINATED_FIELD_NUMBER: _ClassVar[int]
+    TANGENCIES_FIELD_NUMBER: _ClassVar[int]
+    SHARPE_RATIOS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    efficient: _points_pb2.Points
+    turning_rates: _containers.RepeatedScalarFieldContainer[float]
+    dominated: _containers.RepeatedScalarFieldContainer[bool]
+    tangencies: _points_pb2.Points
+    sharpe_ratios: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, revision: _Optional[int] = ..., efficient: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., turning_rates: _Optional[_Iterable[float]] = ..., dominated: _Optional[_Iterable[bool]] = ..., tangencies: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., sharpe_ratios: _Optional[_Iterable[float]] = ...) -> None: ...
+
 class WatchRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions")
     NAME_FIELD_NUMBER: _ClassVar[int]

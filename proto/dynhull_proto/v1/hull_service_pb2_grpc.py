@@ -123,6 +123,26 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.FromString,
                 _registered_method=True)
+        self.GetMeasures = channel.unary_unary(
+                '/dynhull.v1.HullService/GetMeasures',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresResponse.FromString,
+                _registered_method=True)
+        self.Separate = channel.unary_unary(
+                '/dynhull.v1.HullService/Separate',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SeparateRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SeparateResponse.FromString,
+                _registered_method=True)
+        self.PhaseDiagram = channel.unary_unary(
+                '/dynhull.v1.HullService/PhaseDiagram',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.PhaseDiagramRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.PhaseDiagramResponse.FromString,
+                _registered_method=True)
+        self.Frontier = channel.unary_unary(
+                '/dynhull.v1.HullService/Frontier',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierResponse.FromString,
+                _registered_method=True)
         self.Watch = channel.unary_stream(
                 '/dynhull.v1.HullService/Watch',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.SerializeToString,
@@ -260,6 +280,38 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetMeasures(self, request, context):
+        """Every measure of the hull.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Separate(self, request, context):
+        """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
+        out. FAILED_PRECONDITION where one of them has no points.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def PhaseDiagram(self, request, context):
+        """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
+        element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+        such composition (reason HULL_UNSUITABLE).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Frontier(self, request, context):
+        """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
+        has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Watch(self, request, context):
         """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
         what it has received always makes the exact hull at the revision of the last event.
@@ -352,6 +404,26 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.SamplePoints,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.SerializeToString,
+            ),
+            'GetMeasures': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetMeasures,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresResponse.SerializeToString,
+            ),
+            'Separate': grpc.unary_unary_rpc_method_handler(
+                    servicer.Separate,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SeparateRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SeparateResponse.SerializeToString,
+            ),
+            'PhaseDiagram': grpc.unary_unary_rpc_method_handler(
+                    servicer.PhaseDiagram,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.PhaseDiagramRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.PhaseDiagramResponse.SerializeToString,
+            ),
+            'Frontier': grpc.unary_unary_rpc_method_handler(
+                    servicer.Frontier,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierResponse.SerializeToString,
             ),
             'Watch': grpc.unary_stream_rpc_method_handler(
                     servicer.Watch,
@@ -783,6 +855,114 @@ class HullService(object):
             '/dynhull.v1.HullService/SamplePoints',
             dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetMeasures(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/GetMeasures',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Separate(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Separate',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SeparateRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SeparateResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def PhaseDiagram(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/PhaseDiagram',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.PhaseDiagramRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.PhaseDiagramResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Frontier(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Frontier',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierResponse.FromString,
             options,
             channel_credentials,
             insecure,

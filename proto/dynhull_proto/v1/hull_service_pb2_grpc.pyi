@@ -83,6 +83,21 @@ class HullServiceStub:
     """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
     coordinates have the smallest hashes.
     """
+    GetMeasures: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]
+    """Every measure of the hull."""
+    Separate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]
+    """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
+    out. FAILED_PRECONDITION where one of them has no points.
+    """
+    PhaseDiagram: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.PhaseDiagramRequest, _hull_service_pb2.PhaseDiagramResponse]
+    """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
+    element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+    such composition (reason HULL_UNSUITABLE).
+    """
+    Frontier: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.FrontierRequest, _hull_service_pb2.FrontierResponse]
+    """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
+    has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
+    """
     Watch: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]
     """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
     what it has received always makes the exact hull at the revision of the last event.
@@ -144,6 +159,21 @@ class HullServiceAsyncStub(HullServiceStub):
     SamplePoints: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]  # type: ignore[assignment]
     """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
     coordinates have the smallest hashes.
+    """
+    GetMeasures: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]  # type: ignore[assignment]
+    """Every measure of the hull."""
+    Separate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]  # type: ignore[assignment]
+    """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
+    out. FAILED_PRECONDITION where one of them has no points.
+    """
+    PhaseDiagram: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.PhaseDiagramRequest, _hull_service_pb2.PhaseDiagramResponse]  # type: ignore[assignment]
+    """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
+    element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+    such composition (reason HULL_UNSUITABLE).
+    """
+    Frontier: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.FrontierRequest, _hull_service_pb2.FrontierResponse]  # type: ignore[assignment]
+    """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
+    has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
     """
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
     """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
@@ -293,6 +323,45 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_hull_service_pb2.SamplePointsResponse, _abc.Awaitable[_hull_service_pb2.SamplePointsResponse]]:
         """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
         coordinates have the smallest hashes.
+        """
+
+    @_abc_1.abstractmethod
+    def GetMeasures(
+        self,
+        request: _hull_service_pb2.GetMeasuresRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetMeasuresResponse, _abc.Awaitable[_hull_service_pb2.GetMeasuresResponse]]:
+        """Every measure of the hull."""
+
+    @_abc_1.abstractmethod
+    def Separate(
+        self,
+        request: _hull_service_pb2.SeparateRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.SeparateResponse, _abc.Awaitable[_hull_service_pb2.SeparateResponse]]:
+        """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
+        out. FAILED_PRECONDITION where one of them has no points.
+        """
+
+    @_abc_1.abstractmethod
+    def PhaseDiagram(
+        self,
+        request: _hull_service_pb2.PhaseDiagramRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.PhaseDiagramResponse, _abc.Awaitable[_hull_service_pb2.PhaseDiagramResponse]]:
+        """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
+        element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+        such composition (reason HULL_UNSUITABLE).
+        """
+
+    @_abc_1.abstractmethod
+    def Frontier(
+        self,
+        request: _hull_service_pb2.FrontierRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.FrontierResponse, _abc.Awaitable[_hull_service_pb2.FrontierResponse]]:
+        """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
+        has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
         """
 
     @_abc_1.abstractmethod

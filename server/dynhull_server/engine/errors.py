@@ -71,8 +71,22 @@ class HullEmptyError(RefusedError):
     """A question that a hull without points has no answer to."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(f"the hull {name!r} has no points, so none is extreme")
+        super().__init__(f"the hull {name!r} has no points")
         self.name = name
+
+
+class HullUnsuitableError(RefusedError):
+    """A question that has no answer for a hull with such a point.
+
+    Attributes:
+        name: the hull.
+        point: the point.
+    """
+
+    def __init__(self, name: str, point: tuple[float, float], rule: str) -> None:
+        super().__init__(f"the hull {name!r} has the point {point}: {rule}")
+        self.name = name
+        self.point = point
 
 
 class RevisionForgottenError(RefusedError):

@@ -3,15 +3,18 @@
 import math
 import re
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from dynhull.arrays import Points
+from dynhull.arrays import Points, all_finite
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
 from ..engine.live_hull import Config
+from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
 NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
@@ -45,10 +48,10 @@ class InvalidFieldError(Exception):
         self.problem = problem
 
 
-def decode_name(name: str) -> str:
+def decode_name(name: str, field: str = "name") -> str:
     """A hull's name."""
     if not NAME.fullmatch(name):
-        raise InvalidFieldError("name", name, 'a hull\'s name is 1 to 200 letters, digits and "._-/"')
+        raise InvalidFieldError(field, name, 'a hull\'s name is 1 to 200 letters, digits and "._-/"')
     return name
 
 
@@ -110,10 +113,8 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
     values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
     xy = values.reshape(-1, 2)
-    finite = np.isfinite(xy)
-    if not finite.all():
-        row = int(np.argmin(finite.all(axis=1)))
-        raise InvalidFieldError(field, tuple(xy[row].tolist()), "coordinates must be finite", row)
+    if not all_finite(xy):
+        _refuse_rows((~np.isfinite(xy)).any(axis=1), field, xy, "coordinates must be finite")
     # Adding zero turns -0.0 into 0.0, and any byte order into the machine's.
     return np.asarray(xy + 0.0, np.float64)
 
@@ -121,9 +122,7 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
 def decode_directions(directions: points_pb2.Points) -> Points:
     """An (n, 2) array of vectors, none of them 0."""
     vectors = decode_points(directions, "directions")
-    zero = np.flatnonzero(~vectors.any(axis=1))
-    if zero.size:
-        raise InvalidFieldError("directions", (0.0, 0.0), "has no direction", int(zero[0]))
+    _refuse_rows((vectors == 0).all(axis=1), "directions", vectors, "has no direction")
     return vectors
 
 
@@ -134,11 +133,29 @@ def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Point
     if len(origins) != len(targets):
         problem = f"there must be as many as there are origins, {len(origins)}"
         raise InvalidFieldError("targets", f"{len(targets)} points", problem)
-    same = np.flatnonzero((origins == targets).all(axis=1))
-    if same.size:
-        row = int(same[0])
-        raise InvalidFieldError("targets", tuple(targets[row].tolist()), "the same point as the origin: no line", row)
+    _refuse_rows((origins == targets).all(axis=1), "targets", targets, "the same point as the origin: no line")
     return origins, targets
+
+
+def decode_read(points: points_pb2.Points, field: str, reading: Reading) -> Points:
+    """An (n, 2) array of points that can be read so."""
+    xy = decode_points(points, field)
+    _refuse_rows(reading.misfits(xy), field, xy, reading.rule)
+    return xy
+
+
+def decode_rates(rates: Sequence[float]) -> list[float]:
+    """Finite rates."""
+    for row, rate in enumerate(rates):
+        if not math.isfinite(rate):
+            raise InvalidFieldError("rates", rate, "a rate must be finite", row)
+    return list(rates)
+
+
+def _refuse_rows(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: str) -> None:
+    if bad.any():
+        row = int(bad.argmax())
+        raise InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
 
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch:

@@ -9,13 +9,15 @@ import numpy as np
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
+from ..engine.errors import HullEmptyError
 from ..engine.hulls import Engine
 from ..engine.live_hull import Config, LiveHull
 from ..engine.views import SketchView, VerticesView, View
 from ..engine.watch import watch
-from . import decode, encode
+from . import answers, decode, encode
 from .calls import Call
 from .metrics import Metrics
+from .readings import ENTRIES, RISKS
 from .writing import BatchStream, decode_write
 
 
@@ -182,6 +184,47 @@ class HullService:
             measures=measures,
         )
 
+    async def GetMeasures(self, request: pb.GetMeasuresRequest, call: Call) -> pb.GetMeasuresResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        counts, vertices = await hull.vertices(request.min_revision)
+        return await asyncio.to_thread(answers.measures, counts, vertices, encoding)
+
+    async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
+        hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
+        encoding = decode.decode_encoding(request.encoding)
+        # A hull and itself are one, read once.
+        wanted = {hull: request.min_revision}
+        wanted[other] = max(request.other_min_revision, wanted.get(other, 0))
+        for each, revision in wanted.items():  # wait for both before reading one
+            await each.reached(revision)
+        found = {each: await each.vertices(revision) for each, revision in wanted.items()}
+        for each, (_, vertices) in found.items():
+            if not len(vertices):
+                raise HullEmptyError(each.name)
+        return await asyncio.to_thread(answers.separation, *found[hull], *found[other], encoding)
+
+    async def PhaseDiagram(self, request: pb.PhaseDiagramRequest, call: Call) -> pb.PhaseDiagramResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        entries = decode.decode_read(request.entries, "entries", ENTRIES)
+        counts, vertices = await hull.vertices(request.min_revision)
+        ENTRIES.require(hull.name, vertices)
+        rows = len(vertices) + len(entries)
+        return await answers.aside(lambda: answers.phase_diagram(counts, vertices, entries, encoding), rows)
+
+    async def Frontier(self, request: pb.FrontierRequest, call: Call) -> pb.FrontierResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        points = decode.decode_read(request.points, "points", RISKS)
+        rates = decode.decode_rates(request.rates)
+        counts, vertices = await hull.vertices(request.min_revision)
+        RISKS.require(hull.name, vertices)
+        if rates and not len(vertices):
+            raise HullEmptyError(hull.name)
+        rows = len(vertices) + len(points) + len(rates)
+        return await answers.aside(lambda: answers.frontier(counts, vertices, points, rates, encoding), rows)
+
     async def Verify(self, request: pb.VerifyRequest, call: Call) -> pb.VerifyResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
@@ -230,8 +273,8 @@ class HullService:
 
     # Names
 
-    def _read(self, call: Call, name: str) -> LiveHull:
-        name = decode.decode_name(name)
+    def _read(self, call: Call, name: str, field: str = "name") -> LiveHull:
+        name = decode.decode_name(name, field)
         call.access.require_read(name)
         return self._engine.get(name)
 

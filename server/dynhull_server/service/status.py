@@ -13,6 +13,7 @@ from ..engine.errors import (
     HullExistsError,
     HullNotFoundError,
     HullReplacedError,
+    HullUnsuitableError,
     LimitExceededError,
     PointMissingError,
     RefusedError,
@@ -81,6 +82,11 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             failure = PreconditionFailure()
             failure.violations.add(type="HULL_EMPTY", subject=error.name, description=str(error))
             return _status(code.FAILED_PRECONDITION, str(error), "HULL_EMPTY", {"value": error.name}, failure)
+        case HullUnsuitableError():
+            failure = PreconditionFailure()
+            failure.violations.add(type="HULL_UNSUITABLE", subject=error.name, description=str(error))
+            metadata = {"value": error.name, "point": str(error.point)}
+            return _status(code.FAILED_PRECONDITION, str(error), "HULL_UNSUITABLE", metadata, failure)
         case RevisionForgottenError():
             metadata = {"field": "resume.revision", "value": str(error.revision)}
             metadata |= {"oldest": str(error.oldest), "newest": str(error.newest)}

@@ -73,13 +73,8 @@ def load(
         writer = client.writer(
             name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
         )
-        try:
-            with _progress(source) as told:
-                loaded, acknowledged = _send(writer, chain([first], batches), resume, told)
-        except (KeyboardInterrupt, DynhullError):
-            if producer is not None:
-                typer.echo("What was acknowledged is in. The same command with --resume loads the rest.", err=True)
-            raise
+        with _progress(source) as told:
+            loaded, acknowledged = _send(writer, chain([first], batches), resume, producer, told)
     for line in bad.report():
         typer.echo(line, err=True)
     held = "" if acknowledged is None else f", {acknowledged.points:,} in the hull"
@@ -100,7 +95,7 @@ def _make(client: HullClient, name: str, *, silent: bool) -> None:
 
 
 def _send(
-    writer: Writer, batches: Iterable[Points], resume: bool, told: Callable[[int], None]
+    writer: Writer, batches: Iterable[Points], resume: bool, producer: str | None, told: Callable[[int], None]
 ) -> tuple[int, Applied | None]:
     """Have each batch applied that was not before; how many points that were, and what the last one did."""
     loaded, outcome = 0, None
@@ -108,11 +103,20 @@ def _send(
         known = writer.sequence
         if known and not resume:
             raise ValueError("loaded before, at least in part: --resume loads what is missing, --again all once more")
-        for number, points in enumerate(batches, start=1):
-            if number > known:
-                outcome = writer.put(insert=points)
-                loaded += len(points)
-            told(len(points))
+        try:
+            for number, points in enumerate(batches, start=1):
+                if number > known:
+                    outcome = writer.put(insert=points)
+                    loaded += len(points)
+                told(len(points))
+            writer.flush()
+        except (KeyboardInterrupt, DynhullError, ValueError):
+            if producer is not None:
+                mended = f"where the file is mended first, with --producer {producer} too"
+                typer.echo(
+                    f"What was acknowledged is in. The same command with --resume loads the rest; {mended}.", err=True
+                )
+            raise
     return loaded, None if outcome is None else outcome.result()
 
 

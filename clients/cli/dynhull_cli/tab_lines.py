@@ -1,0 +1,21 @@
+"""Lines of numbers between tabs, for people and pipes."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+
+def tab_line(*values: Any) -> str:
+    """Everything in some values, however deep in arrays and tuples, between tabs."""
+    return "\t".join(map(str, _flat(values)))
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        for each in value:
+            yield from _flat(each)
+    else:
+        yield value
