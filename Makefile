@@ -52,7 +52,7 @@ fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 robustness: .venv/.test  ## kill, pause, cut off and starve a server a hundred times while a model checks its promises
 	$(BIN)/python tests/robustness/server/torture.py --faults 99
 
-tests/strangers/node_modules: tests/strangers/package-lock.json
+tests/strangers/node_modules: tests/strangers/package-lock.json tests/peers.sh
 	tests/peers.sh
 	touch $@
 

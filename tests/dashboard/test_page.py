@@ -56,7 +56,7 @@ def hull(client: HullClient, name: str) -> str:
 
 
 def banner(page: Page):
-    return page.get_by_role("alert").filter(has_text="Connection to")
+    return page.get_by_role("alert").filter(has_text="No connection to")
 
 
 def picture(page: Page) -> bytes:
@@ -105,8 +105,9 @@ def test_hovering_tells_coordinates_and_revision(browser: Browser, url: str, hul
         expect(tip).to_contain_text("revision")
 
 
-def test_hulls_are_picked_and_let_go(browser: Browser, url: str, hull: str) -> None:
-    with opened(browser, url) as page:
+def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    client.create_hull("shown")
+    with opened(browser, url, "shown") as page:
         row = page.get_by_role("row").filter(has_text=hull)
         page.get_by_placeholder("Pick hulls").fill(hull)
         page.get_by_role("option", name=hull).click()
@@ -114,6 +115,12 @@ def test_hulls_are_picked_and_let_go(browser: Browser, url: str, hull: str) -> N
         expect(row).to_be_visible()
         let_go(page, hull)
         expect(row).to_be_hidden()
+
+
+def test_the_largest_hull_is_shown_to_begin_with(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    client.apply(hull, insert=np.zeros((100_000, 2)))
+    with opened(browser, url) as page:
+        wait_for_vertices(page, hull, SQUARE)
 
 
 def test_several_hulls_and_one_watch_each_for_all_viewers(browser: Browser) -> None:
@@ -166,7 +173,7 @@ def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path
             wait_for_vertices(page, "fleet", SQUARE)
             expect(banner(page)).to_be_hidden()
             first.process.kill()
-            expect(banner(page)).to_contain_text(f"Connection to {first.address} lost")
+            expect(banner(page)).to_contain_text(f"No connection to {first.address}")
             wait_for_vertices(page, "fleet", SQUARE)
             with server_process(*kept, "--port", first.address.split(":")[1]):
                 expect(banner(page)).to_be_hidden(timeout=20_000)

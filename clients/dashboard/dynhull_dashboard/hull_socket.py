@@ -9,6 +9,7 @@ import asyncio
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from .hub import Hub
+from .looks import LOOKS
 
 INTERVAL_SECONDS = 0.1
 
@@ -23,7 +24,8 @@ class HullSocket(WebSocketHandler):
 
     def open(self) -> None:
         """The page is there."""
-        self._sending = asyncio.create_task(self._send(self.get_query_arguments("hull")))
+        names = list(dict.fromkeys(self.get_query_arguments("hull")))
+        self._sending = asyncio.create_task(self._send(names[: len(LOOKS)]))
 
     def on_close(self) -> None:
         """The page has gone, or shows other hulls."""

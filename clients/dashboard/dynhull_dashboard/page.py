@@ -142,8 +142,8 @@ class Page:
             self._server_lines.update()
         self._banner.visible = server.trouble is not None
         if server.trouble is not None:
-            lost = time.monotonic() - server.since
+            silent = time.monotonic() - server.since
             self._banner.text = (
-                f"<b>Connection to {escape(self._hub.address)} lost</b> {lost:.0f} s ago: {escape(server.trouble)}. "
+                f"<b>No connection to {escape(self._hub.address)}</b> for {silent:.0f} s: {escape(server.trouble)}. "
                 "What you see is the last that was told. Trying again."
             )

@@ -54,4 +54,5 @@ def _show(hub: Hub, document: Document) -> None:
     assert isinstance(context, BokehSessionContext)
     assert context.request is not None
     arguments = context.request.arguments
-    Page(document, hub, [name.decode() for name in arguments.get("hull", [])])
+    picked = dict.fromkeys(name.decode(errors="replace") for name in arguments.get("hull", []))
+    Page(document, hub, list(picked))

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+from bokeh.core.validation import silence
+from bokeh.core.validation.warnings import MISSING_RENDERERS
 from bokeh.models import AdaptiveTicker, BasicTicker, ColumnDataSource, CustomJSTickFormatter, DataRange1d, HoverTool
 from bokeh.plotting import figure
 
@@ -16,6 +18,8 @@ LOCAL_TIME = """
     return time.endsWith(":00") ? time.slice(0, 5) : time.slice(5)
 """
 SECONDS, TICKS = [1, 2, 5, 10, 15, 30], 3
+
+silence(MISSING_RENDERERS, True)  # where no hull is picked, the plots are empty
 
 
 class Lines:
