@@ -61,7 +61,7 @@ def paused(*pids):
             os.kill(pid, signal.SIGCONT)
 
 
-def write(address):
+def write(address, pause):
     """Moves without end; the outermost points are a ring that every batch turns."""
     generator = np.random.default_rng(1)
     inner = generator.uniform(-0.6, 0.6, size=(CYCLE, BATCH - VERTICES, 2))
@@ -71,6 +71,7 @@ def write(address):
         stream.apply(insert=np.concatenate((generator.uniform(-0.6, 0.6, size=(POINTS, 2)), batches[0])))
         for number in range(sys.maxsize):
             stream.apply(move=(batches[number % CYCLE], batches[(number + 1) % CYCLE]))
+            time.sleep(pause)
 
 
 def view(address, viewers, told):
@@ -103,6 +104,7 @@ def main():
     parser.add_argument("--viewers", type=int, default=20)
     parser.add_argument("--turns", type=int, default=15)
     parser.add_argument("--seconds", type=float, default=1.0)
+    parser.add_argument("--pause", type=float, default=0.0, help="seconds from a batch to the next")
     arguments = parser.parse_args()
     told = multiprocessing.Array("l", arguments.viewers)
     alone, watched = [], []
@@ -118,7 +120,7 @@ def main():
             return revision * 2 * BATCH / took
 
         with (
-            aside(write, address),
+            aside(write, address, arguments.pause),
             running(*DASHBOARD, address) as (page, pid),
             aside(view, page, arguments.viewers, told) as viewers,
         ):

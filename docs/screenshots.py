@@ -19,7 +19,7 @@ from dynhull_client import HullClient
 
 SERVE = ["serve", "--in-memory", "--port", "0", "--metrics-port", "0", "--log-level", "warning"]
 DAYS = [date(2013, 3, 8), date(2013, 7, 11)]  # snow, and a summer's day
-EVENING, PACE = 17 * 60, 0.05
+MORNING, EVENING, PACE = 8 * 60, 17 * 60, 0.1
 IMAGES = Path(__file__).with_name("images")
 DESK = {"viewport": {"width": 1440, "height": 900}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
@@ -43,8 +43,10 @@ def running(*arguments, lines=1):
 
 def fly(client, scene):
     with client.ingest(scene.hull_name) as stream:
-        for frame in list(scene.frames())[:EVENING]:
-            stream.apply(insert=frame.insert, delete=frame.delete)
+        before = None
+        for frame in list(scene.frames())[MORNING:EVENING]:
+            stream.apply(insert=frame.insert, delete=before)
+            before = frame.insert
             time.sleep(PACE)
 
 
@@ -66,7 +68,7 @@ def main():
             page.goto(f"{url}/?{query}")
         for flight in flights:
             flight.start()
-        time.sleep(EVENING * PACE - 5)
+        time.sleep((EVENING - MORNING) * PACE - 4)
         for name, page in pages.items():
             page.screenshot(path=IMAGES / name, full_page=True)
         for flight in flights:

@@ -175,16 +175,17 @@ def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path
 
 
 def test_a_dashboard_that_goes_and_comes_back(browser: Browser, server: tuple[Server, str], hull: str) -> None:
-    address = server[0].address
+    address, silence = server[0].address, "The dashboard does not answer."
+    page = browser.new_page()
     with dashboard_process(address) as url:
-        context = opened(browser, url, hull)
-        page = context.__enter__()
+        page.goto(f"{url}/?hull={hull}")
         wait_for_vertices(page, hull, SQUARE)
-    expect(page.get_by_text("The dashboard does not answer.")).to_be_visible()
+    expect(page.get_by_text(silence)).to_be_visible()
+    wait_for_vertices(page, hull, SQUARE)
     with dashboard_process(address, "--port", url.rsplit(":", 1)[1]):
-        expect(page.get_by_text("The dashboard does not answer.")).to_be_hidden(timeout=20_000)
+        expect(page.get_by_text(silence)).to_be_hidden(timeout=20_000)
         wait_for_vertices(page, hull, SQUARE)
-        context.__exit__(None, None, None)
+        page.close()
 
 
 def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, hull: str) -> None:

@@ -23,14 +23,14 @@ DIGITS, RATE_DIGITS = 6, 3
 SOON = 2.0
 
 
-def table(shown: Iterable[tuple[HullFeed, Look]]) -> str:
-    """A table of the hulls as HTML; on a narrow page its rows are cards."""
+def table(shown: Iterable[tuple[HullFeed, Look]], connected: bool) -> str:
+    """A table of the hulls as HTML; on a narrow page its rows are cards. Why it is not connected, a banner says."""
     headings = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
-    rows = "".join(_row(feed, look) for feed, look in shown)
+    rows = "".join(_row(feed, look, connected) for feed, look in shown)
     return f"<table><thead><tr>{headings}</tr></thead>{rows}</table>" if rows else "<p>Pick a hull to see it.</p>"
 
 
-def _row(feed: HullFeed, look: Look) -> str:
+def _row(feed: HullFeed, look: Look, connected: bool) -> str:
     outline, _ = feed.drawings()
     drawn = len(outline.points)
     vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
@@ -38,7 +38,8 @@ def _row(feed: HullFeed, look: Look) -> str:
     cells = "".join(
         f'<td data-heading="{heading}">{figure}</td>' for heading, figure in zip(HEADINGS[1:], figures, strict=False)
     )
-    state = f'<span class="bad">✗ {escape(feed.trouble)}</span>' if feed.trouble else _verified(feed.verified)
+    trouble = feed.trouble if connected else "connection lost"
+    state = f'<span class="bad">✗ {escape(trouble)}</span>' if trouble else _verified(feed.verified)
     return f'<tr><th scope="row">{_key(look)}{escape(feed.name)}</th>{cells}<td class="state">{state}</td></tr>'
 
 

@@ -18,7 +18,8 @@ PROGRESS_SECONDS = 0.5
 RETRY_SECONDS = 1.0
 TICK_SECONDS = 1.0
 SAMPLE_SIZE = 2_000
-SAMPLE_SECONDS = 0.5
+# Few points move with their hull; of many nobody misses one.
+FEW_POINTS_SECONDS, MANY_POINTS_SECONDS = 0.1, 2.0
 VERIFY_SECONDS = 30.0
 # Samples and verifications cost the server work in proportion to the points: they get a twentieth of the time.
 REST = 19
@@ -86,8 +87,8 @@ class HullFeed:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._follow())
             tasks.create_task(self._count())
-            tasks.create_task(self._repeat(self._sample, SAMPLE_SECONDS, asyncio.Event()))
-            tasks.create_task(self._repeat(self._verify, VERIFY_SECONDS, self._verify_now))
+            tasks.create_task(self._repeat(self._sample, self._sample_pause, asyncio.Event()))
+            tasks.create_task(self._repeat(self._verify, lambda: VERIFY_SECONDS, self._verify_now))
 
     @property
     def trouble(self) -> str | None:
@@ -141,11 +142,16 @@ class HullFeed:
             others = without(sampled.points, self._outline.points)
             self._inner = Drawing(points_of(self.name), sampled.revision, others)
 
+    def _sample_pause(self) -> float:
+        return FEW_POINTS_SECONDS if self.points <= SAMPLE_SIZE else MANY_POINTS_SECONDS
+
     async def _verify(self) -> None:
         outcome = await self._client.verify(self.name, timeout=None)
         self.verified = Verified(outcome, time.monotonic())
 
-    async def _repeat(self, work: Callable[[], Awaitable[None]], pause: float, at_once: asyncio.Event) -> None:
+    async def _repeat(
+        self, work: Callable[[], Awaitable[None]], pause: Callable[[], float], at_once: asyncio.Event
+    ) -> None:
         """Work again and again, with a pause between, longer after work that took long; none when told."""
         while True:
             begun = time.monotonic()
@@ -155,7 +161,7 @@ class HullFeed:
                 log.info("%s: %s", self.name, error)
             took = time.monotonic() - begun
             try:
-                await asyncio.wait_for(at_once.wait(), max(pause, REST * took))
+                await asyncio.wait_for(at_once.wait(), max(pause(), REST * took))
             except TimeoutError:
                 continue
             at_once.clear()

@@ -21,6 +21,12 @@ TICK_MILLISECONDS = 100
 TICKS_OF_TEXT = 5
 TEMPLATE = Template(Path(__file__).with_name("page.html").read_text("utf-8"))
 STYLE = Path(__file__).with_name("widgets.css").read_text("utf-8")
+ALARM: dict[str, str | None] = {
+    "color": "var(--alarm-ink)",
+    "background": "var(--alarm)",
+    "border-radius": "6px",
+    "padding": ".6rem .9rem",
+}
 
 HULL_COLUMNS = ("points", "vertices", "area", "rate")
 SERVER_LOOKS = {"updates": LOOKS[0], "mean": LOOKS[0], "percentile": LOOKS[1]}
@@ -51,7 +57,7 @@ class Page:
         self._models = document.models
         picked = (picked or hub.server.largest())[: len(LOOKS)]
         self._untouched = not picked
-        self._banner = Div(name="banner", visible=False, stylesheets=[STYLE], sizing_mode="stretch_width")
+        self._banner = Div(name="banner", visible=False, stylesheets=[STYLE], styles=ALARM, sizing_mode="stretch_width")
         self._picker = MultiChoice(
             name="picker",
             placeholder="Pick hulls",
@@ -127,7 +133,9 @@ class Page:
             self._picker.options = options
         if self._untouched and server.hulls:
             self._picker.value = server.largest()
-        self._table.text = cards.table((shown.feed, shown.look) for shown in self._shown.values())
+        self._table.text = cards.table(
+            ((shown.feed, shown.look) for shown in self._shown.values()), connected=server.trouble is None
+        )
         for shown in self._shown.values():
             shown.lines.update()
         if self._server_lines:

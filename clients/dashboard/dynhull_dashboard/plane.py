@@ -39,7 +39,14 @@ class DrawnHull:
             line_dash=look.dash,
         )
         self.markers = [
-            plot.scatter(source=points, size=POINT_SIZE, color=colour, alpha=POINT_ALPHA, name=f"a point of {name}"),
+            plot.scatter(
+                source=points,
+                size=POINT_SIZE,
+                color=colour,
+                alpha=POINT_ALPHA,
+                level="underlay",
+                name=f"a point of {name}",
+            ),
             plot.scatter(
                 source=vertices, marker=look.marker, size=VERTEX_SIZE, color=colour, name=f"a vertex of {name}"
             ),

@@ -3,6 +3,8 @@
 from bokeh.models import CustomJSTickFormatter
 from bokeh.plotting import figure
 
+LABEL_WIDTH = 48
+
 
 def bare(plot: figure) -> None:
     """Nothing but the data, faint lines to measure them by, and figures at the edge."""
@@ -10,6 +12,8 @@ def bare(plot: figure) -> None:
     plot.toolbar.autohide = True
     plot.outline_line_color = None
     plot.min_border = 4
+    # Room for the longest figure: labels that grow would be drawn beyond the edge, and stay there.
+    plot.min_border_left = LABEL_WIDTH
     plot.axis.axis_line_color = None
     plot.axis.major_tick_line_color = None
     plot.axis.minor_tick_line_color = None

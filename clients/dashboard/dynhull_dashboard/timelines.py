@@ -10,8 +10,11 @@ from .looks import Look
 from .styles import bare, compact_ticks
 
 SHOWN_MILLISECONDS = 5 * 60 * 1000
-LOCAL_TIME = 'return new Date(tick).toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})'
-# Full minutes and seconds, and few of them.
+# Hours and minutes of a full minute, between these the seconds alone.
+LOCAL_TIME = """
+    const time = new Date(tick).toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})
+    return time.endsWith(":00") ? time.slice(0, 5) : time.slice(5)
+"""
 SECONDS, TICKS = [1, 2, 5, 10, 15, 30], 3
 
 
