@@ -5,6 +5,8 @@ import pytest
 from hypothesis import settings
 from server_process import server_process
 
+collect_ignore = ["data/make_phases.py"]  # needs pymatgen, which the tests do not
+
 # A slow moment of the machine is not a failure.
 settings.register_profile("dynhull", deadline=None, print_blob=True)
 settings.load_profile("dynhull")

@@ -5,7 +5,8 @@ import sys
 
 from dynhull import DynamicHull
 
-right = DynamicHull.vertices
-DynamicHull.vertices = lambda self: right(self)[1:]
-sys.argv = sys.argv[1:]
-runpy.run_path(sys.argv[0], run_name="__main__")
+if __name__ == "__main__":
+    right = DynamicHull.vertices
+    DynamicHull.vertices = lambda self: right(self)[1:]
+    sys.argv = sys.argv[1:]
+    runpy.run_path(sys.argv[0], run_name="__main__")

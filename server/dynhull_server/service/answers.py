@@ -19,7 +19,7 @@ from .encode import encode_measures, encode_points
 Answer = TypeVar("Answer")
 Encoding = points_pb2.PointEncoding
 
-# With so few the trip to another thread would take longer.
+# With so few the trip to another thread would be a good part of the time.
 FEW_ROWS = 16
 
 
@@ -85,11 +85,12 @@ def frontier(
     """The efficient frontier of risks and returns, and what it says of others. Without vertices, there are no rates."""
     offers = Frontier(vertices)
     efficient = offers.efficient()
+    turns = Frontier(efficient).tangencies()  # those beyond the greatest return left out
     tangencies = np.array([offers.tangency(rate) for rate in rates]).reshape(-1, 2)
     return pb.FrontierResponse(
         revision=counts.revision,
         efficient=encode_points(efficient, encoding),
-        turning_rates=offers.tangencies().rates[: max(len(efficient) - 1, 0)],
+        turning_rates=turns.rates,
         dominated=offers.dominated(points),
         tangencies=encode_points(tangencies, encoding),
         sharpe_ratios=[offers.sharpe_ratio(rate) for rate in rates],
