@@ -28,16 +28,21 @@ class HullTree {
     const auto same = [](Bare a, Bare b) { return a.p == b.p; };
     const auto first_pair = std::adjacent_find(sorted, sorted + count, same) - sorted;
     auto kept = static_cast<std::size_t>(first_pair);
+    std::vector<std::pair<Point, std::uint64_t>> repeated;
     for (std::size_t i = kept, next; i < count; i = next) {
       for (next = i + 1; next < count && same(sorted[next], sorted[i]); ++next) {
       }
-      if (next - i > 1) copies_.emplace(sorted[i].p, next - i);
+      if (next - i > 1) repeated.emplace_back(sorted[i].p, next - i);
       sorted[kept++] = sorted[i];
     }
     nodes_ = built(reinterpret_cast<const Point*>(sorted), kept);
     size_ = count;
     distinct_ = kept;
-    mark_repeated();
+    copies_.reserve(repeated.size());
+    for (const auto& [p, copies] : repeated) {  // in order: one finds its way where the one before it was
+      copies_.emplace(p, copies);
+      mark_repeated(p);
+    }
   }
 
   std::size_t size() const { return size_; }
@@ -192,11 +197,9 @@ class HullTree {
     return count >= MANY && several_processors();
   }
 
-  void mark_repeated() {
-    for (const auto& [p, copies] : copies_) {
-      const Place place = find(nodes_, p);
-      if (place.there && copies > 1) nodes_.leaf(place.leaf).repeated |= bit(place.entry);
-    }
+  void mark_repeated(Point p) {
+    const Place place = find(nodes_, p);
+    if (place.there) nodes_.leaf(place.leaf).repeated |= bit(place.entry);
   }
 
   // A batch as large as the tree: merge it with the points and build anew.
@@ -218,7 +221,8 @@ class HullTree {
     std::vector<Point> after[2];
     for (Side side : SIDES) collect(fresh, fresh.root, side, LOWEST, HIGHEST, after[side]);
     nodes_ = std::move(fresh);
-    mark_repeated();
+    for (const auto& [p, copies] : copies_)
+      if (copies > 1) mark_repeated(p);
     if (before[UPPER] != after[UPPER] || before[LOWER] != after[LOWER]) changed();
   }
 
