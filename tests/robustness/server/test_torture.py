@@ -11,6 +11,6 @@ def test_no_promise_is_broken():
     run = subprocess.run([sys.executable, torture, "--faults", "18"], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     counts = run.stdout.splitlines()[-1]
-    assert "faults: 2 damage, 2 full disk, 8 kill, 2 pause, 4 sever;" in counts
+    assert "faults: 2 damage, 1 full disk, 10 kill, 2 pause, 3 sever;" in counts
     assert "lost: 0, doubled: 0" in counts
     assert int(re.search(r"batches acknowledged: (\d+)", counts)[1]) > 100
