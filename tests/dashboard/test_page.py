@@ -117,12 +117,6 @@ def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullCli
         expect(row).to_be_hidden()
 
 
-def test_the_largest_hull_is_shown_to_begin_with(browser: Browser, url: str, client: HullClient, hull: str) -> None:
-    client.apply(hull, insert=np.zeros((100_000, 2)))
-    with opened(browser, url) as page:
-        wait_for_vertices(page, hull, SQUARE)
-
-
 def test_several_hulls_and_one_watch_each_for_all_viewers(browser: Browser) -> None:
     with (
         measured() as (server, metrics),
@@ -167,10 +161,11 @@ def test_the_hull_is_verified_when_asked_to(browser: Browser, url: str, client: 
 def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     kept = "--data", str(tmp_path)
     with server_process(*kept, killed=True) as first, HullClient(first.address) as client:
+        client.create_hull("empty")
         client.create_hull("fleet")
         client.apply("fleet", insert=SQUARE)
-        with dashboard_process(first.address) as url, opened(browser, url, "fleet") as page:
-            wait_for_vertices(page, "fleet", SQUARE)
+        with dashboard_process(first.address) as url, opened(browser, url) as page:
+            wait_for_vertices(page, "fleet", SQUARE)  # the largest is shown to begin with
             expect(banner(page)).to_be_hidden()
             first.process.kill()
             expect(banner(page)).to_contain_text(f"No connection to {first.address}")
