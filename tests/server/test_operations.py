@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from itertools import repeat
 from pathlib import Path
 
 import grpc
@@ -102,6 +103,21 @@ def test_a_batch_under_way_is_finished_at_the_end() -> None:
         assert {first.result().result.revision, second.result().result.revision} == {1, 2}
         with pytest.raises(grpc.RpcError):
             list(watch)
+
+
+def test_what_a_writer_that_has_gone_left_behind_does_not_hold_up_the_end() -> None:
+    points = np.random.default_rng(0).normal(size=(8192, 2)).astype("<f8").tobytes()
+    request = pb.StreamRequest(name="a", batch={"inserts": {"packed": points}})
+    with server_process() as server:
+        channels = [grpc.insecure_channel(server.address) for _ in range(3)]
+        HullServiceStub(channels[0]).CreateHull(pb.CreateHullRequest(name="a"))
+        for channel in channels:
+            acknowledgements = HullServiceStub(channel).Stream(repeat(request))
+            for _ in range(5):
+                next(acknowledgements)
+        for channel in channels:
+            channel.close()
+        server.process.terminate()  # in peace, and without a word
 
 
 def test_a_port_in_use(address: str) -> None:

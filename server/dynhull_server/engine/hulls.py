@@ -119,7 +119,9 @@ class Engine:
         return hulls, False
 
     def close(self) -> None:
-        """Wait for the work under way, and commit it."""
+        """Wait for the work under way, and commit it. What waits behind it is left."""
+        for hull in self:
+            hull.stop()
         self._pool.shutdown()
         if self._journal is not None:
             self._journal.close()

@@ -234,6 +234,10 @@ class LiveHull:
         self._deleted = True
         self._wake()
 
+    def stop(self) -> None:
+        """Begin nothing more: the server ends."""
+        self._serial.stop()
+
     def _close(self, *, closed: bool) -> None:
         self._closed = closed
 

@@ -48,6 +48,11 @@ class SerialExecutor:
         self._after = after
         self._waiting: list[Job] = []
         self._busy = False
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Begin nothing more. What runs is committed; whoever waits behind it is gone, or hears of nothing."""
+        self._stopped = True
 
     def submit(
         self,
@@ -108,7 +113,7 @@ class SerialExecutor:
             failure = pending.exception()
             if failure is None:
                 loop.call_soon_threadsafe(self._end_trip, loop, jobs, outcomes)
-            else:
+            elif not self._stopped:
                 self._pool.submit(self._retreat, loop, jobs, failure)
 
         pending.add_done_callback(committed)
@@ -120,7 +125,7 @@ class SerialExecutor:
 
     def _end_trip(self, loop: asyncio.AbstractEventLoop, jobs: list[Job], outcomes: list[Outcome]) -> None:
         self._after()
-        if self._waiting:
+        if self._waiting and not self._stopped:
             self._start_trip(loop)
         else:
             self._busy = False
