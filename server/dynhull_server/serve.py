@@ -3,7 +3,10 @@
 import asyncio
 import gc
 import signal
+import socket
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from . import logs
 from .flags import with_settings
@@ -11,6 +14,8 @@ from .journal.errors import JournalError
 from .progress import progress_bar
 from .service.server import Server
 from .settings import Settings
+
+SIGNALS = signal.SIGTERM, signal.SIGINT
 
 
 @with_settings
@@ -32,22 +37,48 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
 
 
 async def _serve(settings: Settings) -> None:
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    # Not the loop's own handlers: those end with it, and a second signal on the way out would kill.
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: None if loop.is_closed() else loop.call_soon_threadsafe(stop.set))
-    server = Server(settings)
-    try:
-        with progress_bar("hulls read") as progress:
-            await server.start(progress)
-        gc.freeze()  # modules and what was read: to look through all that again and again would make calls wait 50 ms
-        print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the address is the command's output
-        if server.metrics_address:
-            print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
-        await stop.wait()
-    finally:
-        await server.drain()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, signal.SIG_IGN)  # Python gives back its own handlers before the process ends
+    with _told_to_stop() as stop:
+        server = Server(settings)
+        try:
+            with progress_bar("hulls read") as progress:
+                await server.start(progress)
+            gc.freeze()  # modules and what was read: to look through that again and again would make calls wait 50 ms
+            print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the command's output
+            if server.metrics_address:
+                print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
+            await stop.wait()
+        finally:
+            await server.drain()
     gc.unfreeze()
+
+
+@contextmanager
+def _told_to_stop() -> Iterator[asyncio.Event]:
+    """Set by SIGTERM and SIGINT, which are ignored from the end of the block to the end of the process.
+
+    The signal comes as a byte through a socket. Its handler alone could come too late: where the loop has just gone to
+    sleep, or another thread was interrupted. The loop's own handlers do the same, but end with it, and then a second
+    signal on the way out would kill.
+    """
+    loop = asyncio.get_running_loop()
+    stop = asyncio.Event()
+    wake, signalled = socket.socketpair()
+    with wake, signalled:
+
+        def received() -> None:
+            wake.recv(64)
+            stop.set()
+
+        for end in (wake, signalled):
+            end.setblocking(False)
+        loop.add_reader(wake, received)
+        signal.set_wakeup_fd(signalled.fileno())
+        for number in SIGNALS:
+            signal.signal(number, lambda *_: None)
+        try:
+            yield stop
+        finally:
+            for number in SIGNALS:
+                signal.signal(number, signal.SIG_IGN)
+            signal.set_wakeup_fd(-1)
+            loop.remove_reader(wake)

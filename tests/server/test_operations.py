@@ -1,8 +1,11 @@
 """The server as a process: health, reflection, the command line, its end."""
 
+import ctypes
+import signal
 import subprocess
 import sys
 import threading
+import time
 from itertools import repeat
 from pathlib import Path
 
@@ -118,6 +121,27 @@ def test_what_a_writer_that_has_gone_left_behind_does_not_hold_up_the_end() -> N
         for channel in channels:
             channel.close()
         server.process.terminate()  # in peace, and without a word
+
+
+def wait_for_rest(pid: int) -> None:
+    """Until the process has used no processor time for a while."""
+
+    def used() -> list[str]:
+        return Path(f"/proc/{pid}/stat").read_text().split()[13:15]
+
+    before = None
+    while (now := used()) != before:
+        before = now
+        time.sleep(0.3)
+
+
+def test_a_signal_that_another_thread_gets_ends_the_server() -> None:
+    with server_process() as server:
+        pid = server.process.pid
+        wait_for_rest(pid)
+        other = next(int(task.name) for task in Path(f"/proc/{pid}/task").iterdir() if int(task.name) != pid)
+        assert ctypes.CDLL(None).tgkill(pid, other, signal.SIGTERM) == 0
+        assert server.process.wait(20) == 0
 
 
 def test_a_port_in_use(address: str) -> None:
