@@ -42,7 +42,7 @@ class Proxy:
 
     def _connect(self, client: socket.socket) -> None:
         host, port = self.server.rsplit(":", 1)
-        with client, suppress(ConnectionRefusedError), socket.create_connection((host, int(port))) as server:
+        with client, suppress(OSError), socket.create_connection((host, int(port))) as server:
             self._open |= {client, server}
             back = self._start(forward, server, client)
             forward(client, server)

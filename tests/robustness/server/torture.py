@@ -18,7 +18,6 @@ import os
 import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -38,6 +37,9 @@ from dynhull_client.messages import decode_event
 from dynhull_proto.v1 import batch_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+sys.path.append(str(Path(__file__).parents[2]))
+from proxy import Proxy
 
 HULL = "tortured"
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
@@ -63,62 +65,19 @@ def require(condition: object, what: str) -> None:
         raise BrokenPromiseError(what)
 
 
-class Proxy:
-    """A connection to the server that can be cut. Listens on a port of its own for as long as the run lasts."""
-
-    def __init__(self) -> None:
-        self.server_port = 0
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listener.getsockname()[1]
-        self._pairs: set[tuple[socket.socket, socket.socket]] = set()
-        self._lock = threading.Lock()
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def sever(self) -> None:
-        with self._lock:
-            pairs, self._pairs = self._pairs, set()
-        for pair in pairs:
-            for end in pair:
-                with suppress(OSError):
-                    end.shutdown(socket.SHUT_RDWR)
-
-    def _accept(self) -> None:
-        while True:
-            client, _ = self._listener.accept()
-            try:
-                server = socket.create_connection(("127.0.0.1", self.server_port))
-            except OSError:
-                client.close()
-                continue
-            with self._lock:
-                self._pairs.add((client, server))
-            for source, target in ((client, server), (server, client)):
-                threading.Thread(target=self._pump, args=(source, target), daemon=True).start()
-
-    @staticmethod
-    def _pump(source: socket.socket, target: socket.socket) -> None:
-        with suppress(OSError):
-            while data := source.recv(65536):
-                target.sendall(data)
-        for end in (source, target):
-            with suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
-
-
 class Server:
     """`dynhull serve` on a folder; it keeps its port over its lives."""
 
     def __init__(self, folder: Path) -> None:
         self.data = folder / "data"
-        self.port = 0
+        self._port = 0
         self._log = folder / "server.log"
 
-    def start(self) -> int:
+    def start(self) -> None:
         require(self.starts(), f"the server did not start: {self.said()}")
-        return self.port
 
     def starts(self) -> bool:
-        command = [COMMAND, "serve", "--port", str(self.port), "--data", str(self.data)]
+        command = [COMMAND, "serve", "--port", str(self._port), "--data", str(self.data)]
         command += ["--snapshot-points", "2000", "--log-level", "warning", "--scrub-cpu", "0"]
         with self._log.open("ab") as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
@@ -126,8 +85,12 @@ class Server:
         if "serving on" not in line:
             self.process.wait()
             return False
-        self.port = int(line.rsplit(":", 1)[1])
+        self._port = int(line.rsplit(":", 1)[1])
         return True
+
+    @property
+    def address(self) -> str:
+        return f"127.0.0.1:{self._port}"
 
     def said(self) -> str:
         return self._log.read_text()
@@ -295,10 +258,10 @@ class Torture:
     def __init__(self, folder: Path, seed: int, writers: int) -> None:
         self._folder = folder
         self._random = random.Random(seed)
-        self._proxy = Proxy()
         self.server = Server(folder)
-        self._proxy.server_port = self.server.start()
-        self.shared = Shared(f"127.0.0.1:{self._proxy.port}")
+        self.server.start()
+        self._proxy = Proxy(self.server.address)
+        self.shared = Shared(self._proxy.address)
         self._channel, self._stub = self.shared.stub()
         self._call(self._stub.CreateHull, pb.CreateHullRequest(name=HULL))
         self.writers = [Writer(self.shared, i, seed + i) for i in range(writers)]
@@ -324,8 +287,8 @@ class Torture:
     def _kill(self) -> None:
         self.shared.gate.clear()
         self.server.kill()
-        self._proxy.sever()
-        self._proxy.server_port = self.server.start()
+        self._proxy.cut()
+        self.server.start()
 
     def _pause(self) -> None:
         self.server.process.send_signal(signal.SIGSTOP)
@@ -333,7 +296,7 @@ class Torture:
         self.server.process.send_signal(signal.SIGCONT)
 
     def _sever(self) -> None:
-        self._proxy.sever()
+        self._proxy.cut()
 
     def _full_disk(self) -> None:
         ballast = self._folder / "ballast"
@@ -344,7 +307,7 @@ class Torture:
         if self._random.random() < 0.5:
             self.server.kill()
             ballast.unlink()
-            self._proxy.server_port = self.server.start()
+            self.server.start()
         else:
             ballast.unlink()
 
@@ -355,12 +318,12 @@ class Torture:
         with tempfile.TemporaryDirectory() as folder:
             damaged = Server(Path(folder))
             shutil.copytree(self.server.data, damaged.data)
-            self._proxy.sever()
-            self._proxy.server_port = self.server.start()
+            self._proxy.cut()
+            self.server.start()
             acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
             where = self._change_byte(damaged.data)
             if damaged.starts():
-                with grpc.insecure_channel(f"127.0.0.1:{damaged.port}") as channel:
+                with grpc.insecure_channel(damaged.address) as channel:
                     self._check_damaged(HullServiceStub(channel), acknowledged, damaged, where)
                 damaged.kill()
                 self.damage["served"] += 1
@@ -451,6 +414,7 @@ class Torture:
         self.shared.over.set()
         self.shared.gate.set()
         self._channel.close()
+        self._proxy.close()
         self.server.process.terminate()
         self.server.process.wait()
 
