@@ -41,14 +41,18 @@ def read_points(
             _require(path, columns, option, name)
         rows, bad = _read(reader, x, y, identity, time)
     notes = [f"{path}: {len(rows):,} points from columns {x} and {y}"]
-    if bad:
-        notes.append(f"{len(bad):,} bad rows left out:")
-        notes += [f"  {reason}" for reason in bad[:SHOWN_BAD_ROWS]]
-        if len(bad) > SHOWN_BAD_ROWS:
-            notes.append(f"  ... and {len(bad) - SHOWN_BAD_ROWS:,} more")
+    notes += bad_rows_left_out(bad[:SHOWN_BAD_ROWS], len(bad))
     if not rows:
         raise ValueError("\n".join([f"{path} has no points", *notes[1:]]))
     return rows, notes
+
+
+def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
+    """Lines about so many bad rows, of which the first are shown; none where there are none."""
+    if not count:
+        return []
+    more = [f"  ... and {count - len(first):,} more"] if count > len(first) else []
+    return [f"{count:,} bad rows left out:", *(f"  {each}" for each in first), *more]
 
 
 def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, y: str | None) -> tuple[str, str]:

@@ -6,9 +6,8 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TextIO
 
+from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
 from .chunks import BadRow, Chunk, Points
-
-SHOWN = 5
 
 
 class BadRows:
@@ -30,16 +29,11 @@ class BadRows:
 
     def report(self) -> list[str]:
         """Lines about them."""
-        if not self.count:
-            return []
-        lines = [f"{self.count:,} bad rows left out:", *(f"  {each.place}: {each.reason}" for each in self._first)]
-        if self.count > len(self._first):
-            lines.append(f"  ... and {self.count - len(self._first):,} more")
-        return lines
+        return bad_rows_left_out([f"{each.place}: {each.reason}" for each in self._first], self.count)
 
     def _add(self, rows: list[BadRow]) -> None:
         self.count += len(rows)
-        self._first += rows[: SHOWN - len(self._first)]
+        self._first += rows[: SHOWN_BAD_ROWS - len(self._first)]
         if self._writer is not None:
             self._writer.writerows((each.place, each.reason, each.text) for each in rows)
         if self._most is not None and self.count > self._most:
