@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Points, as_tuples
-from ..exact import doubled_triangle, root, rounded, squared_length
+from ..exact import doubled_triangle, exact, root, rounded, squared_length
 from ..predicates import Point, cross_sign, dot_sign, orientation
 
 
@@ -108,5 +108,5 @@ def _meet(p: Point, q: Point, a: Point, b: Point) -> Point:
     """Where the line through p and q crosses the segment from a to b: their sides differ, or b is on the line."""
     at_a, at_b = doubled_triangle(p, q, a), doubled_triangle(p, q, b)
     share = at_a / (at_a - at_b)
-    ax, ay = Fraction(a[0]), Fraction(a[1])
-    return rounded(ax + share * (Fraction(b[0]) - ax)), rounded(ay + share * (Fraction(b[1]) - ay))
+    (ax, ay), (bx, by) = exact(a), exact(b)
+    return rounded(ax + share * (bx - ax)), rounded(ay + share * (by - ay))

@@ -10,13 +10,11 @@ HALF = np.uint64(32)
 
 
 def sample(points: Points, size: int) -> Points:
-    """The `size` points of smallest hash, in the order given; all where they are no more. O(n).
+    """The `size` points of smallest hash, in the order given, of more than that. O(n).
 
     A point that comes or goes changes at most one of the sample, so that a picture of it does not flicker: bottom-k
     sampling (Cohen and Kaplan, "Summarizing data using bottom-k sketches", 2007).
     """
-    if len(points) <= size:
-        return points
     mixed = np.ascontiguousarray(points).view(np.uint64) * FACTORS
     mixed ^= mixed >> HALF
     hashes = (mixed[:, 0] + mixed[:, 1]) * FACTORS[1]
