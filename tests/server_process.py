@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from patience import PATIENCE
+
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
-PATIENCE = 60
 
 
 @dataclass(frozen=True)

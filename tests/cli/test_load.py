@@ -3,7 +3,6 @@
 import json
 import signal
 import subprocess
-import time
 from contextlib import suppress
 
 import numpy as np
@@ -11,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from command_line import dynhull
+from patience import wait_until
 from server_process import COMMAND, server_process
 
 from dynhull import convex_hull
@@ -197,12 +197,11 @@ def test_resume_after_the_command_was_killed(tmp_path, served, name):
         HullClient(served) as client,
         subprocess.Popen([COMMAND, "load", name, file], stderr=subprocess.DEVNULL) as loading,
     ):
-        while not any(info.revision >= 2 for info in client.list_hulls(name)):
-            time.sleep(0.001)
+        wait_until(lambda: any(info.revision >= 2 for info in client.list_hulls(name)))
         loading.kill()
         loading.wait()
-        while (revision := client.get_hull(name).revision) != client.get_hull(name).revision:
-            time.sleep(0.001)
+        wait_until(lambda: client.get_hull(name).revision == client.get_hull(name).revision)
+        revision = client.get_hull(name).revision
         assert revision < 20
     refused = dynhull("load", name, file)
     assert refused.exit_code == 2
@@ -224,8 +223,7 @@ def test_a_server_that_goes_and_comes_back(tmp_path):
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading:
             loading.stdin.write("x,y\n" + rows)
             loading.stdin.flush()
-            while not any(info.revision >= 1 for info in client.list_hulls()):
-                time.sleep(0.001)
+            wait_until(lambda: any(info.revision >= 1 for info in client.list_hulls()))
             server.process.kill()
             server.process.wait()
             with suppress(BrokenPipeError):  # it may have given up before it has read everything
@@ -251,8 +249,7 @@ def test_an_interruption(served, name):
     ):
         loading.stdin.write("x,y\n" + "1,2\n" * 120_000)
         loading.stdin.flush()
-        while not any(info.revision >= 1 for info in client.list_hulls(name)):
-            time.sleep(0.001)
+        wait_until(lambda: any(info.revision >= 1 for info in client.list_hulls(name)))
         loading.send_signal(signal.SIGINT)
         said = loading.stderr.read()
         assert loading.wait() == 130

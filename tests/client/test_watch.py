@@ -2,12 +2,12 @@
 
 import asyncio
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from client_kinds import loop
+from patience import wait_until
 from proxy import proxy
 from server_process import server_process
 
@@ -35,8 +35,7 @@ class Follower:
         self._revision = revision
         self._thread = threading.Thread(target=self._follow)
         self._thread.start()
-        while not self.events:
-            time.sleep(0.001)
+        wait_until(lambda: self.events)
 
     def _follow(self):
         for event in self.watch:
@@ -73,17 +72,14 @@ def test_it_outlives_its_server(tmp_path: Path, connect: type[HullClient]) -> No
         client.create_hull("a")
         follower = Follower(client.watch("a", copy=copy), copy, 2)
         client.apply("a", insert=[[1, 2]])
-        while copy.revision < 1:
-            time.sleep(0.001)
+        wait_until(lambda: copy.revision >= 1)
         assert follower.watch.lost is None
         first.process.kill()
-        while follower.watch.lost is None:
-            time.sleep(0.001)
+        wait_until(lambda: follower.watch.lost is not None)
         assert isinstance(follower.watch.lost, UnavailableError)
         with server_process(*data) as second:
             way.server = second.address
-            while follower.watch.lost is not None:  # though nothing has changed
-                time.sleep(0.001)
+            wait_until(lambda: follower.watch.lost is None)  # though nothing has changed
             with HullClient(second.address) as writing:
                 writing.apply("a", insert=[[3, 4]])
             follower.join()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import wait_until
 from proxy import proxy
 from server_process import server_process
 
@@ -74,7 +75,7 @@ def test_or_ends_the_writer(client: HullClient, name: str) -> None:
         with client.writer(name, batch_points=1, stop_on_error=True) as writer:
             writer.put(insert=[[1, 1]])
             bad = writer.put(delete=[[2, 2]])
-            wait_for(bad)
+            wait_until(bad.done)
             with pytest.raises(PointMissingError):
                 writer.put(insert=[[3, 3]])
             assert writer.sequence == 1
@@ -82,11 +83,6 @@ def test_or_ends_the_writer(client: HullClient, name: str) -> None:
     with pytest.raises(PointMissingError):
         write()
     assert client.get_hull(name).info.points == 1
-
-
-def wait_for(outcome) -> None:
-    while not outcome.done():
-        time.sleep(0.001)
 
 
 def test_put_waits_while_too_much_is_under_way(connect: type[HullClient]) -> None:
@@ -122,8 +118,7 @@ def putting(writer, batches) -> Iterator[None]:
 
 
 def acknowledged(writer, sequence: int) -> None:
-    while writer.sequence < sequence:
-        time.sleep(0.001)
+    wait_until(lambda: writer.sequence >= sequence)
 
 
 def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:

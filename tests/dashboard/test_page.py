@@ -1,7 +1,6 @@
 """The dashboard in a real browser, on a real server."""
 
 import shutil
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
+from patience import wait_until
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from server_process import Server, server_process
 
@@ -68,8 +68,7 @@ def let_go(page: Page, name: str) -> None:
 
 
 def wait_for_watchers(metrics: str, count: int) -> None:
-    while scrape(metrics)["dynhull_watchers"] != count:
-        time.sleep(0.05)
+    wait_until(lambda: scrape(metrics)["dynhull_watchers"] == count)
 
 
 def test_the_polygon_follows_the_hull(browser: Browser, url: str, client: HullClient, hull: str) -> None:

@@ -2,14 +2,14 @@
 
 import asyncio
 import sys
-import time
 from itertools import count
 from pathlib import Path
 
 import grpc
 import numpy as np
 from grpc_health.v1 import health_pb2, health_pb2_grpc
-from server_process import PATIENCE, server_process
+from patience import wait_until
+from server_process import server_process
 
 from dynhull import DynamicHull
 from dynhull_client import HullClient
@@ -100,10 +100,7 @@ def test_health_tells_of_a_wrong_hull_until_the_server_ends() -> None:
         assert status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.SERVING
         client.create_hull("a")
         client.apply("a", insert=[[0, 0], [4, 0], [2, 3]])
-        end = time.monotonic() + PATIENCE
-        while status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.SERVING and time.monotonic() < end:
-            time.sleep(0.05)
-        assert status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.NOT_SERVING
+        wait_until(lambda: status("dynhull.v1.scrub") == health_pb2.HealthCheckResponse.NOT_SERVING)
         # One wrong hull is no reason to take all the others from everybody.
         assert status("dynhull.v1.HullService") == health_pb2.HealthCheckResponse.SERVING
         assert not client.verify("a").equal
