@@ -60,13 +60,21 @@ double coordinate(nb::handle value, const char* name) {
   return nb::cast<double>(nb::module_::import_("dynhull.arrays").attr("as_coordinate")(value, name));
 }
 
+// The tree of an array's rows; ValueError where a coordinate is not finite.
+HullTree tree_of(const nb::object& xy) {
+  const auto rows = nb::cast<Rows>(xy);
+  {
+    nb::gil_scoped_release release;
+    const Distinct points(points_of(rows), rows.shape(0));
+    if (points.finite()) return HullTree(points);
+  }
+  return tree_of(nb::module_::import_("dynhull.arrays").attr("as_points")(xy));  // which says where
+}
+
 class Hull {
  public:
   Hull() = default;
-  explicit Hull(const Rows& rows) {
-    nb::gil_scoped_release release;
-    tree_ = HullTree(points_of(rows), rows.shape(0));
-  }
+  explicit Hull(HullTree tree) : tree_(std::move(tree)) {}
 
   std::size_t size() { return settled().size(); }
   std::size_t distinct() { return settled().distinct(); }
@@ -321,13 +329,7 @@ NB_MODULE(_kernel, module) {
                    "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
       .def(nb::init<>())
       .def(
-          "__init__",
-          [](Hull* hull, nb::object xy) {
-            if (xy.is_none())
-              new (hull) Hull();
-            else
-              new (hull) Hull(nb::cast<Rows>(xy));
-          },
+          "__init__", [](Hull* hull, nb::object xy) { new (hull) Hull(xy.is_none() ? HullTree() : tree_of(xy)); },
           "xy"_a.none())
       .def("__len__", &Hull::size)
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
