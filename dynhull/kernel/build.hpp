@@ -19,7 +19,11 @@ class Building {
   }
 
   // The whole, detached. O(n).
-  Ref tree(bool threads = false) const { return subtree(0, parts_, threads); }
+  Ref tree(bool threads = false) const {
+    const Ref whole = subtree(0, parts_, threads);
+    nodes_.set_parent(whole, NONE);
+    return whole;
+  }
 
   // Note in its leaf, once that is built, that a point is there more than once.
   void mark_repeated(std::size_t point) const {

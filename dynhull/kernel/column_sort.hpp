@@ -17,30 +17,26 @@ class ColumnSort {
         half_(count / 2),
         width_(static_cast<unsigned>(std::min(count / A_COLUMN + 1, MOST))),
         threads_(threads),
-        parts_{{from, half_}, {from + half_, count - half_}} {}
-
-  // False where a coordinate is not finite: then they are not sorted.
-  bool run() {
+        parts_{{from, half_}, {from + half_, count - half_}} {
     choose_columns();
     place();
-    if (!parts_[0].finite || !parts_[1].finite) return false;
-    const auto middle = std::lower_bound(starts_.begin(), starts_.begin() + width_, half_) - starts_.begin();
-    const auto cut = static_cast<unsigned>(middle);
-    both(threads_, [&] { sort(0, cut); }, [&] { sort(cut, width_); });
-    return true;
+    if (finite()) sort();
   }
+
+  bool finite() const { return parts_[0].finite && parts_[1].finite; }        // false: a coordinate is not, and no more
+  bool repeated() const { return parts_[0].repeated || parts_[1].repeated; }  // whether some points are equal
 
  private:
   static constexpr std::size_t MOST = 256, A_COLUMN = 2048;
 
-  // Of the points as they come in, for one thread.
+  // For one thread: half of the points as they come in, then the columns with about half of them.
   struct Part {
     const Point* points;
     std::size_t count;
     Range range = {};
     Buffer<std::uint16_t> columns{count};     // of each point
     std::array<std::size_t, MOST> next = {};  // how many points each column has, then where its next one goes
-    bool finite = true;
+    bool finite = true, repeated = false;
   };
 
   template <class Work>
@@ -77,14 +73,25 @@ class ColumnSort {
     });
   }
 
-  // Sort each of the columns first..last.
-  void sort(unsigned first, unsigned last) const {
+  void sort() {
+    const auto middle = std::lower_bound(starts_.begin(), starts_.begin() + width_, half_) - starts_.begin();
+    const auto cut = static_cast<unsigned>(middle);
+    both(threads_, [&] { parts_[0].repeated = sort(0, cut); }, [&] { parts_[1].repeated = sort(cut, width_); });
+  }
+
+  // Sort each of the columns first..last. Whether some points are equal: those are in one column.
+  bool sort(unsigned first, unsigned last) const {
     const auto size = [&](unsigned column) { return starts_[column + 1] - starts_[column]; };
     std::size_t most = 0;
     for (unsigned column = first; column < last; ++column) most = std::max(most, size(column));
     const Buffer<Point> scratch(most);
-    for (unsigned column = first; column < last; ++column)
-      sort_by_point(to_ + starts_[column], scratch.data(), size(column));
+    bool repeated = false;
+    for (unsigned column = first; column < last; ++column) {
+      Point *const begin = to_ + starts_[column], *const end = begin + size(column);
+      sort_by_point(begin, scratch.data(), size(column));
+      repeated = repeated || std::adjacent_find(begin, end) != end;
+    }
+    return repeated;
   }
 
   Point* to_;

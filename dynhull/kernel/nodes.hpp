@@ -81,16 +81,11 @@ class Nodes {
     nodes_.reserve(extra);
     bridges_.reserve(extra);
   }
-  Ref take_leaf() {
-    const Ref tree = leaf_ref(leaves_.take());
-    leaf(tree).parent = NONE;
-    return tree;
-  }
+  // What is taken is not written to, and has no parent until it is linked or put in a place.
+  Ref take_leaf() { return leaf_ref(leaves_.take()); }
   Ref take_node() {
-    const Ref tree = nodes_.take();
     bridges_.take();
-    node(tree).parent = NONE;
-    return tree;
+    return nodes_.take();
   }
   void give_back(Ref tree) {
     if (is_leaf(tree)) {

@@ -87,7 +87,7 @@ inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side) {
 // Needs room for one more leaf and node.
 inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
   if (place.leaf == NONE) {
-    nodes.root = nodes.take_leaf();
+    nodes.replace(NONE, NONE, nodes.take_leaf());
     nodes.leaf(nodes.root).assign(&p, 1);
     return 0b11;
   }
