@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .implementation import kernel
+
 Points = npt.NDArray[np.float64]
 
 LARGEST_EXACT_INTEGER = 2**53
@@ -28,8 +30,7 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     if array.ndim != 2 or array.shape[1] != 2:
         hint = f"; one point is [[{array[0]}, {array[1]}]]" if array.shape == (2,) else ""
         raise ValueError(f"{name} must have shape (n, 2), got {array.shape}{hint}")
-    # Adding zero turns -0.0 into 0.0: they are the same point.
-    return np.ascontiguousarray(_finite(_as_double(array, name), name) + 0.0)
+    return _finite(_as_double(array, name), name)
 
 
 def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
@@ -39,7 +40,7 @@ def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] < 2:
         raise ValueError(f"{name} must have shape (n, d), d at least 2, got {array.shape}")
-    return _finite(_as_double(array, name), name) + 0.0
+    return _finite(_as_double(array, name), name)
 
 
 def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
@@ -73,7 +74,7 @@ def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
     if array.ndim == 0 or array.shape[-1] != 2:
         raise ValueError(f"{name} must have shape (..., 2), got {array.shape}")
     flat = array.reshape(-1, 2)
-    return _finite(_as_double(flat, name), name).reshape(array.shape) + 0.0
+    return _finite(_as_double(flat, name), name).reshape(array.shape)
 
 
 def as_coordinate(value: Any, name: str) -> float:
@@ -163,16 +164,21 @@ def _as_double_scalar(value: Any, name: str) -> float:
     return double
 
 
-def all_finite(array: Points) -> bool:
-    """Whether all entries are finite."""
-    return b"\0" not in np.isfinite(array).tobytes()  # for few rows a small part of what all() takes
+def finite_copy(rows: Points) -> Points | None:
+    """A C-contiguous copy of an (n, d) array without negative zeros, None where an entry is not finite."""
+    if kernel is not None:
+        copy: Points | None = kernel.finite_copy(np.ascontiguousarray(rows, np.float64))
+        return copy
+    # Adding zero turns -0.0 into 0.0: they are the same point.
+    return np.ascontiguousarray(rows + 0.0, np.float64) if np.isfinite(rows).all() else None
 
 
 def _finite(array: Points, name: str) -> Points:
-    if not all_finite(array):
+    copy = finite_copy(array)
+    if copy is None:
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=-1))[0])
         raise ValueError(f"{name} row {row} is {_text(array[row])}: coordinates must be finite")
-    return array
+    return copy
 
 
 def _text(row: npt.NDArray[Any]) -> str:

@@ -11,7 +11,7 @@ from dynhull.arrays import Points
 from .errors import PointMissingError
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Batch:
     """Points as (n, 2) arrays; `destinations` has a row for each of `origins`.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.arrays import Points, all_finite
+from dynhull.arrays import Points, finite_copy
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
@@ -112,11 +112,12 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
         problem = "two coordinates a point, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
     values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
-    xy = values.reshape(-1, 2)
-    if not all_finite(xy):
-        _refuse_rows((~np.isfinite(xy)).any(axis=1), field, xy, "coordinates must be finite")
-    # Adding zero turns -0.0 into 0.0, and any byte order into the machine's.
-    return np.asarray(xy + 0.0, np.float64)
+    given = values.reshape(-1, 2)
+    xy = finite_copy(given)
+    if xy is None:
+        bad = (~np.isfinite(given)).any(axis=1)
+        raise _bad_row(bad, field, given, "coordinates must be finite")
+    return xy
 
 
 def decode_directions(directions: points_pb2.Points) -> Points:
@@ -154,8 +155,12 @@ def decode_rates(rates: Sequence[float]) -> list[float]:
 
 def _refuse_rows(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: str) -> None:
     if bad.any():
-        row = int(bad.argmax())
-        raise InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
+        raise _bad_row(bad, field, xy, problem)
+
+
+def _bad_row(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: str) -> InvalidFieldError:
+    row = int(bad.argmax())
+    return InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
 
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch:
