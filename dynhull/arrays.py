@@ -24,6 +24,8 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
 
     The message names the first bad row.
     """
+    if type(xy) is np.ndarray and (points := plain_points(xy)) is not None:
+        return points
     array = _as_array(xy, name)
     if array.ndim == 1 and array.size == 0:
         return np.empty((0, 2))
@@ -164,21 +166,29 @@ def _as_double_scalar(value: Any, name: str) -> float:
     return double
 
 
-def finite_copy(rows: Points) -> Points | None:
-    """A C-contiguous copy of an (n, d) array without negative zeros, None where an entry is not finite."""
+def plain_points(xy: npt.NDArray[Any]) -> Points | None:
+    """What `as_points` makes of an (n, 2) array of finite doubles; None of anything else."""
     if kernel is not None:
-        copy: Points | None = kernel.finite_copy(np.ascontiguousarray(rows, np.float64))
-        return copy
-    # Adding zero turns -0.0 into 0.0: they are the same point.
-    return np.ascontiguousarray(rows + 0.0, np.float64) if np.isfinite(rows).all() else None
+        points: Points | None = kernel.plain_points(xy)
+        return points
+    if xy.dtype != np.float64 or xy.ndim != 2 or xy.shape[1] != 2:
+        return None
+    copy = _copy(xy)
+    return copy if np.isfinite(copy).all() else None
 
 
 def _finite(array: Points, name: str) -> Points:
-    copy = finite_copy(array)
-    if copy is None:
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=-1))[0])
+    copy = _copy(array)
+    finite = np.isfinite(copy)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=-1))[0])
         raise ValueError(f"{name} row {row} is {_text(array[row])}: coordinates must be finite")
     return copy
+
+
+def _copy(array: Points) -> Points:
+    """A copy, which no other thread writes to, without negative zeros: -0.0 and 0.0 are the same coordinate."""
+    return np.ascontiguousarray(array + 0.0)
 
 
 def _text(row: npt.NDArray[Any]) -> str:

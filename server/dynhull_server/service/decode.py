@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.arrays import Points, finite_copy
+from dynhull.arrays import Points, plain_points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
@@ -111,12 +111,11 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
     if len(coordinates) % 2:
         problem = "two coordinates a point, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
-    values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
-    given = values.reshape(-1, 2)
-    xy = finite_copy(given)
+    values = np.frombuffer(packed, "<f8") if packed else coordinates
+    given: Points = np.asarray(values, np.float64).reshape(-1, 2)
+    xy = plain_points(given)
     if xy is None:
-        bad = (~np.isfinite(given)).any(axis=1)
-        raise _bad_row(bad, field, given, "coordinates must be finite")
+        raise _bad_row(~np.isfinite(given).all(axis=1), field, given, "coordinates must be finite")
     return xy
 
 
@@ -158,8 +157,8 @@ def _refuse_rows(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: st
         raise _bad_row(bad, field, xy, problem)
 
 
-def _bad_row(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: str) -> InvalidFieldError:
-    row = int(bad.argmax())
+def _bad_row(bad: npt.ArrayLike, field: str, xy: Points, problem: str) -> InvalidFieldError:
+    row = int(np.argmax(bad))
     return InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
 
 
