@@ -54,21 +54,23 @@ class Call:
             raise LimitExceededError("max_message_bytes", self._max_message_bytes)
         return data
 
-    async def write(self, message: Message, patience: float | None = None) -> None:
-        """Send a message. Waits while the client does not read.
-
-        Raises LimitExceededError where that took longer than `patience` seconds: the client will get the message and
-        then the error, for gRPC cannot take back what it has begun to send.
-        """
-        data = self.serialize(message)
-        begun = time.monotonic()
+    async def write(self, message: Message) -> None:
+        """Send a message. Waits while the client does not read."""
         try:
-            await self._context.write(data)
+            await self._context.write(self.serialize(message))
         except grpc.aio.InternalError:
             # The client has gone while the message was on its way.
             raise asyncio.CancelledError from None
-        if patience is not None and time.monotonic() - begun > patience:
-            raise LimitExceededError("max_watch_lag", patience)
+
+    async def write_within(self, seconds: float, message: Message) -> None:
+        """Send a message, or raise LimitExceededError where that took longer.
+
+        The client will get the message and then the error, for gRPC cannot take back what it has begun to send.
+        """
+        begun = time.monotonic()
+        await self.write(message)
+        if time.monotonic() - begun > seconds:
+            raise LimitExceededError("max_watch_lag", seconds)
 
 
 class Calls:

@@ -168,14 +168,16 @@ def decode_batch(batch: batch_pb2.Batch) -> Batch:
         raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy this server knows")
     inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
     deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
-    origins = destinations = NO_POINTS
+    moves = 0
     if batch.HasField("moves"):
         origins = decode_points(batch.moves.origins, "batch.moves.origins")
         destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
-        if len(origins) != len(destinations):
-            problem = f"there must be as many as there are origins, {len(origins)}"
+        moves = len(origins)
+        if len(destinations) != moves:
+            problem = f"there must be as many as there are origins, {moves}"
             raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
-    return Batch(inserts, deletes, origins, destinations, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
+        inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
+    return Batch(inserts, deletes, moves, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:

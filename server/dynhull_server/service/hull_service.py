@@ -272,7 +272,7 @@ class HullService:
                         event = await anext(events)
                         message = await encode.encode_event_aside(event, encoding, request.include_measures)
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
-                        await call.write(message, self._max_watch_lag)
+                        await call.write_within(self._max_watch_lag, message)
 
     # Names
 
