@@ -67,14 +67,12 @@ class Groups {
     const Row* const last = rows_.data() + groups_[i + 1].first;
     std::uint64_t available = before;
     for (const Row* row = first; row < last; ++row) available += inserts(*row);
-    for (const Row* row = first; row < last; ++row) {
-      const bool removes = !inserts(*row), missing = removes && available == 0;
-      if (missing) [[unlikely]]
-        miss(row->row / 2);
-      available -= removes && !missing;
-    }
-    growth += static_cast<std::int64_t>(available - before);
-    return available;
+    const std::uint64_t deletes = before + static_cast<std::uint64_t>(last - first) - available;
+    if (deletes > available) [[unlikely]]
+      miss(first, deletes, available);
+    const std::uint64_t after = available - std::min(deletes, available);
+    growth += static_cast<std::int64_t>(after - before);
+    return after;
   }
 
  private:
@@ -86,9 +84,12 @@ class Groups {
   }
   static bool inserts(const Row& row) { return row.row % 2 == 0; }
 
-  void miss(std::int64_t row) {
-    --rows_applied;
-    if (first_missing < 0 || row < first_missing) first_missing = row;
+  // Of a group's deletes, the first ones find the points that are available.
+  void miss(const Row* row, std::uint64_t deletes, std::uint64_t available) {
+    rows_applied -= static_cast<std::int64_t>(deletes - available);
+    for (std::uint64_t found = 0; found <= available; ++row) found += !inserts(*row);
+    const std::int64_t number = row[-1].row / 2;
+    if (first_missing < 0 || number < first_missing) first_missing = number;
   }
 
   // Find the leaves of the groups from..to, at most TOGETHER, below `tree`: side by side, so that cache misses overlap.

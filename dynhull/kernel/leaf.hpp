@@ -42,8 +42,8 @@ struct Leaf {
   std::uint32_t parent;
   std::uint32_t size;
   Mask chain[2];
-  Mask repeated;  // points that are there more than once: the tree knows how often
-  double x[LEAF], y[LEAF];
+  Mask repeated;            // points that are there more than once: the tree knows how often
+  double x[LEAF], y[LEAF];  // past the end, x is infinite: a search need not know the size
 
   Point operator[](unsigned i) const { return {x[i], y[i]}; }
   Point first() const { return (*this)[0]; }
@@ -55,13 +55,12 @@ struct Leaf {
     for (unsigned i = 0; i < offsetof(Leaf, y); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
   }
 
-  // The first entry whose x is not less. A binary search without branches.
+  // The first entry whose x is not less. A binary search without branches, over all LEAF.
   unsigned find_x(double least) const {
     unsigned from = 0;
-    for (unsigned rest = size; rest > 0;) {
+    for (unsigned rest = LEAF; rest > 0; rest /= 2) {
       const unsigned half = (rest + 1) / 2;
       from += half & -static_cast<unsigned>(x[from + half - 1] < least);
-      rest -= half;
     }
     return from;
   }
@@ -82,6 +81,7 @@ struct Leaf {
       x[i] = points[i].x;
       y[i] = points[i].y;
     }
+    std::fill(x + size, x + LEAF, INFINITE);
     for (Side side : SIDES) chain[side] = scan(side, 0, count - 1);
   }
 
@@ -108,7 +108,7 @@ struct Leaf {
       if (chain[side] & bit(i)) sides |= 1u << side;
     std::copy(x + i + 1, x + size, x + i);
     std::copy(y + i + 1, y + size, y + i);
-    --size;
+    x[--size] = INFINITE;
     repeated = closed(repeated, i);
     for (Side side : SIDES) {
       chain[side] = closed(chain[side], i);
