@@ -15,9 +15,9 @@ namespace dynhull {
 
 class Commit {
  public:
-  // All memory is taken here, with a reserve in nodes; apply() cannot fail.
-  Commit(Nodes& nodes, const Plan& plan) : nodes_(nodes), changes_(plan.changes.data()), count_(plan.changes.size()) {
-    nodes.reserve(plan.extra_leaves);
+  // Needs room in nodes for the plan's extra leaves. All other memory is taken here; apply() cannot fail.
+  Commit(Nodes& nodes, const Plan& plan)
+      : nodes_(nodes), changes_(plan.changes().data()), count_(plan.changes().size()) {
     for (Side side : SIDES) candidates_[side].resize(count_);
     if (count_ > FEW) {
       points_.resize(LEAF + count_);
@@ -72,7 +72,7 @@ class Commit {
         const Change& change = changes_[i];
         if (!insert && i + LOOKAHEAD < count_) nodes_.leaf(changes_[i + LOOKAHEAD].leaf).fetch();
         if (change.insert != insert) continue;
-        const Place place = find_near(nodes_, change.leaf, change.p);
+        const Place place = place_of(nodes_, change);
         const unsigned changed = insert ? insert_point(nodes_, place, change.p) : remove_point(nodes_, place, change.p);
         for (Side side : SIDES)
           if (changed & (1u << side)) propose(found, side, from, i);

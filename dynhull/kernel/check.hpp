@@ -58,6 +58,7 @@ class Check {
     const std::size_t from = next_;
     require(0 < leaf.size && leaf.size <= LEAF, "a leaf of a wrong size");
     for (unsigned i = 0; i < leaf.size; ++i) require(leaf[i] == points_[next_++], "a point out of place");
+    for (unsigned i = leaf.size; i < LEAF; ++i) require(leaf.x[i] == INFINITE, "a leaf without its end");
     for (Side side : SIDES) {
       const Mask mask = leaf.chain[side];
       require(mask & 1 && highest(mask) == leaf.size - 1, "a chain without its ends");

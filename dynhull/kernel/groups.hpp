@@ -20,10 +20,11 @@ struct PointHash {
 // How often, for the points that are there more than once.
 using Copies = std::unordered_map<Point, std::uint64_t, PointHash>;
 
-inline std::uint64_t count_of(const Nodes& nodes, const Copies& copies, const Place& place) {
-  if (!place.there) return 0;
+// The number of a point that is there more than once, or nullptr.
+inline std::uint64_t* copies_at(const Nodes& nodes, Copies& copies, const Place& place) {
   const Leaf& leaf = nodes.leaf(place.leaf);
-  return leaf.repeated & bit(place.entry) ? copies.find(leaf[place.entry])->second : 1;
+  const bool repeated = place.there & (leaf.repeated >> place.entry & 1);
+  return repeated ? &copies.find(leaf[place.entry])->second : nullptr;
 }
 
 struct Group {
@@ -34,23 +35,15 @@ struct Group {
 
 class Groups {
  public:
-  static constexpr std::size_t LOOKAHEAD = 8;  // groups whose leaf is on its way from memory
-
   std::int64_t rows_applied;
   std::int64_t first_missing = -1;  // the first row that deletes what is not there
   std::int64_t growth = 0;          // points more than before, with multiplicity
-  std::size_t inserts = 0;          // rows that insert
 
   Groups(const std::int8_t* ops, const Point* points, std::size_t count)
-      : rows_applied(static_cast<std::int64_t>(count)), rows_(count) {
-    if (count >= NONE) throw std::bad_alloc();
-    std::vector<Row> scratch(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      rows_[i] = {points[i], static_cast<std::int64_t>(2 * i + (ops[i] < 0))};
-      inserts += ops[i] > 0;
-    }
+      : rows_applied(static_cast<std::int64_t>(count)), rows_(few(count)), groups_(count + 1) {
+    const Buffer<Row> scratch(count);
+    for (std::size_t i = 0; i < count; ++i) rows_[i] = {points[i], static_cast<std::int64_t>(2 * i + (ops[i] < 0))};
     sort_by_point(rows_.data(), scratch.data(), count);
-    groups_.resize(count + 1);
     Group* next = groups_.data();
     for (std::size_t i = 0; i < count; ++i)
       if (i == 0 || !(rows_[i].p == rows_[i - 1].p)) *next++ = {rows_[i].p, NONE, static_cast<std::uint32_t>(i)};
@@ -59,7 +52,6 @@ class Groups {
   }
 
   std::size_t size() const { return size_; }
-  std::size_t rows() const { return rows_.size(); }
   const Group& operator[](std::size_t i) const { return groups_[i]; }
 
   // Find the leaf of each group.
@@ -69,41 +61,36 @@ class Groups {
 
   bool new_leaf(std::size_t i) const { return i == 0 || groups_[i].leaf != groups_[i - 1].leaf; }
 
-  std::size_t touched_leaves() const {
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < size_; ++i) count += new_leaf(i);
-    return count;
-  }
-
-  // How many rows of a group insert.
-  std::size_t inserts_of(std::size_t i) const {
-    std::size_t count = 0;
-    for (std::uint32_t row = groups_[i].first; row < groups_[i + 1].first; ++row) count += rows_[row].row % 2 == 0;
-    return count;
-  }
-
   // How often a group's point is there after its rows; notes the deletes that find none left.
   std::uint64_t settle(std::size_t i, std::uint64_t before) {
     const Row* const first = rows_.data() + groups_[i].first;
     const Row* const last = rows_.data() + groups_[i + 1].first;
     std::uint64_t available = before;
-    for (const Row* row = first; row < last; ++row) available += row->row % 2 == 0;
-    for (const Row* row = first; row < last; ++row) {
-      if (row->row % 2 == 0) continue;
-      if (available > 0) {
-        --available;
-        continue;
-      }
-      --rows_applied;
-      const std::int64_t number = row->row / 2;
-      if (first_missing < 0 || number < first_missing) first_missing = number;
-    }
-    growth += static_cast<std::int64_t>(available - before);
-    return available;
+    for (const Row* row = first; row < last; ++row) available += inserts(*row);
+    const std::uint64_t deletes = before + static_cast<std::uint64_t>(last - first) - available;
+    if (deletes > available) [[unlikely]]
+      miss(first, deletes, available);
+    const std::uint64_t after = available - std::min(deletes, available);
+    growth += static_cast<std::int64_t>(after - before);
+    return after;
   }
 
  private:
   static constexpr std::size_t TOGETHER = 12;  // descents side by side
+
+  static std::size_t few(std::size_t count) {
+    if (count >= NONE) throw std::bad_alloc();
+    return count;
+  }
+  static bool inserts(const Row& row) { return row.row % 2 == 0; }
+
+  // Of a group's deletes, the first ones find the points that are available.
+  void miss(const Row* row, std::uint64_t deletes, std::uint64_t available) {
+    rows_applied -= static_cast<std::int64_t>(deletes - available);
+    for (std::uint64_t found = 0; found <= available; ++row) found += !inserts(*row);
+    const std::int64_t number = row[-1].row / 2;
+    if (first_missing < 0 || number < first_missing) first_missing = number;
+  }
 
   // Find the leaves of the groups from..to, at most TOGETHER, below `tree`: side by side, so that cache misses overlap.
   void descend_together(const Nodes& nodes, Ref tree, std::size_t from, std::size_t to) {
@@ -124,9 +111,9 @@ class Groups {
   void descend(const Nodes& nodes, Ref tree, std::size_t from, std::size_t to) {
     while (to - from > TOGETHER && !is_leaf(tree)) {
       const Point separator = nodes.node(tree).separator;
-      const auto middle = std::partition_point(groups_.begin() + from, groups_.begin() + to,
+      const auto middle = std::partition_point(groups_.data() + from, groups_.data() + to,
                                                [&](const Group& group) { return group.p < separator; });
-      const auto cut = static_cast<std::size_t>(middle - groups_.begin());
+      const auto cut = static_cast<std::size_t>(middle - groups_.data());
       if (from < cut && cut < to) descend(nodes, nodes.node(tree).child[0], from, cut);
       tree = nodes.node(tree).child[cut < to];
       if (cut < to) from = cut;
@@ -134,8 +121,8 @@ class Groups {
     for (; from < to; from += TOGETHER) descend_together(nodes, tree, from, std::min(from + TOGETHER, to));
   }
 
-  std::vector<Row> rows_;
-  std::vector<Group> groups_;
+  Buffer<Row> rows_;
+  Buffer<Group> groups_;
   std::size_t size_;
 };
 

@@ -15,7 +15,7 @@
 namespace dynhull {
 
 constexpr unsigned LEAF = DYNHULL_LEAF;
-static_assert(4 <= LEAF && LEAF <= 64);
+static_assert(4 <= LEAF && LEAF < 64);                  // a bit of a mask an entry, and one past the end
 constexpr unsigned FILL = LEAF * 27 / 32;               // entries of a leaf built in bulk
 constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);  // a leaf with fewer entries is merged with its neighbour
 constexpr unsigned MERGE_STEP = 4;                      // a try at every fourth size: its neighbour may be full
@@ -23,7 +23,7 @@ constexpr std::uint32_t NONE = ~std::uint32_t{0};
 
 using Mask = std::uint64_t;
 inline Mask bit(unsigned i) { return Mask{1} << i; }
-inline Mask below(unsigned i) { return i < 64 ? bit(i) - 1 : ~Mask{0}; }
+inline Mask below(unsigned i) { return bit(i) - 1; }
 inline unsigned lowest(Mask mask) { return static_cast<unsigned>(std::countr_zero(mask)); }
 inline bool several(Mask mask) { return (mask & (mask - 1)) != 0; }
 inline unsigned highest(Mask mask) { return 63 - static_cast<unsigned>(std::countl_zero(mask)); }
@@ -42,8 +42,8 @@ struct Leaf {
   std::uint32_t parent;
   std::uint32_t size;
   Mask chain[2];
-  Mask repeated;  // points that are there more than once: the tree knows how often
-  double x[LEAF], y[LEAF];
+  Mask repeated;            // points that are there more than once: the tree knows how often
+  double x[LEAF], y[LEAF];  // past the end, x is infinite: a search need not know the size
 
   Point operator[](unsigned i) const { return {x[i], y[i]}; }
   Point first() const { return (*this)[0]; }
@@ -55,18 +55,24 @@ struct Leaf {
     for (unsigned i = 0; i < offsetof(Leaf, y); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
   }
 
-  // The first entry that is not less than p. A binary search in x without branches; y decides between equal x.
-  unsigned find(Point p) const {
+  // The first entry whose x is not less. A binary search without branches, over all LEAF.
+  unsigned find_x(double least) const {
     unsigned from = 0;
-    for (unsigned rest = size; rest > 0;) {
+    for (unsigned rest = LEAF; rest > 0; rest /= 2) {
       const unsigned half = (rest + 1) / 2;
-      from += half & -static_cast<unsigned>(x[from + half - 1] < p.x);
-      rest -= half;
+      from += half & -static_cast<unsigned>(x[from + half - 1] < least);
     }
-    while (from < size && x[from] == p.x && y[from] < p.y) ++from;
     return from;
   }
+  // The first entry that is not less than p, from the first whose x is not less: y decides between equal x.
+  unsigned find_y(unsigned from, Point p) const {
+    while (from < size && int{x[from] == p.x} + int{y[from] < p.y} > 1) ++from;  // one branch, foreseen
+    return from;
+  }
+  unsigned find(Point p) const { return find_y(find_x(p.x), p); }
   bool holds(unsigned i, Point p) const { return i < size && (*this)[i] == p; }
+  // Whether p is entry i or belongs there, between two others.
+  bool has_place(unsigned i, Point p) const { return 0 < i && i < size && (*this)[i - 1] < p && p <= (*this)[i]; }
 
   void assign(const Point* points, unsigned count) {
     size = count;
@@ -75,6 +81,7 @@ struct Leaf {
       x[i] = points[i].x;
       y[i] = points[i].y;
     }
+    std::fill(x + size, x + LEAF, INFINITE);
     for (Side side : SIDES) chain[side] = scan(side, 0, count - 1);
   }
 
@@ -101,7 +108,7 @@ struct Leaf {
       if (chain[side] & bit(i)) sides |= 1u << side;
     std::copy(x + i + 1, x + size, x + i);
     std::copy(y + i + 1, y + size, y + i);
-    --size;
+    x[--size] = INFINITE;
     repeated = closed(repeated, i);
     for (Side side : SIDES) {
       chain[side] = closed(chain[side], i);

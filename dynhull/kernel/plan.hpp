@@ -1,61 +1,104 @@
-// What a large batch amounts to: read the tree, change nothing. What remains are points that are new, points that go,
-// and points that only change their number.
+// What a batch amounts to: read the tree, change nothing. What remains are points that are new, points that go, and
+// points that only change their number.
 #pragma once
+
+#include <span>
 
 #include "groups.hpp"
 
 namespace dynhull {
 
-// A point that the batch adds or removes, and the leaf where it belongs.
+// A point that the batch adds or removes, and its place before the batch.
 struct Change {
   Point p;
   Ref leaf;
+  std::uint8_t entry, size;  // in the leaf, and of it
   bool insert;
 };
+
+// The place now. While changes are applied in order, those before it have moved it, and none of the points after it.
+inline Place place_of(const Nodes& nodes, const Change& change) {
+  const Leaf& leaf = nodes.leaf(change.leaf);
+  const unsigned entry = leaf.size - (change.size - change.entry);
+  if (leaf.has_place(entry, change.p)) return {change.leaf, entry, !change.insert};
+  return find_near(nodes, change.leaf, change.p);
+}
 
 // A point that is there more than once before or after.
 struct Recount {
   Point p;
-  std::uint64_t copies;
+  Place place;  // before
+  std::uint64_t before, after;
+  std::uint64_t* copies;  // the entry, where there is one
 };
 
 class Plan {
  public:
-  std::vector<Change> changes;  // in order
-  std::vector<Recount> recounts;
   std::size_t inserts = 0;       // changes that insert
+  std::size_t leaves = 0;        // in which something changes
   std::size_t extra_leaves = 1;  // the changes need at most so many more; one where all goes before something comes
+  std::vector<Recount> recounts;
 
-  Plan(const Nodes& nodes, const Copies& copies, Groups& groups) {
-    changes.resize(groups.size());
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < groups.size(); ++i) {
-      const std::size_t ahead = i + Groups::LOOKAHEAD;
-      if (ahead < groups.size() && groups[ahead].leaf != NONE && groups.new_leaf(ahead))
-        nodes.leaf(groups[ahead].leaf).fetch_x();
-      const Group& group = groups[i];
-      const Place place = group.leaf == NONE ? Place{NONE, 0, false} : find_in(nodes, group.leaf, group.p);
-      const std::uint64_t before = count_of(nodes, copies, place);
-      const std::uint64_t after = groups.settle(i, before);
-      if (before != after && (before > 1 || after > 1)) recounts.push_back({group.p, after});
-      changes[kept] = {group.p, group.leaf, before == 0};
-      kept += (before == 0) != (after == 0);
-      inserts += before == 0 && after > 0;
-    }
-    changes.resize(kept);
-    count_leaves(nodes);
+  Plan(const Nodes& nodes, Copies& copies, Groups& groups) : changes_(groups.size()), changes_end_(changes_.data()) {
+    for (std::size_t from = 0; from < groups.size(); from += BLOCK)
+      read(nodes, copies, groups, from, std::min(from + BLOCK, groups.size()));
   }
+
+  std::span<const Change> changes() const { return {changes_.data(), changes_end_}; }
+
+  // Whether so many changes share a leaf that they are better applied together: measured, see docs/performance.md.
+  bool crowded() const { return changes().size() >= LEAF / 2 * leaves; }
 
  private:
-  // After its first split, a leaf needs half a leaf's worth of inserts for each further one.
-  void count_leaves(const Nodes& nodes) {
-    for (std::size_t from = 0, to; from < changes.size(); from = to) {
-      std::size_t added = 0;
-      for (to = from; to < changes.size() && changes[to].leaf == changes[from].leaf; ++to) added += changes[to].insert;
-      const std::size_t size = changes[from].leaf == NONE ? 0 : nodes.leaf(changes[from].leaf).size;
-      if (added > 0 && size + added > LEAF) extra_leaves += 1 + added / (LEAF / 2);
+  static constexpr std::size_t BLOCK = 16;
+  static constexpr std::size_t LOOKAHEAD = 12;  // groups whose leaf is on its way from memory
+
+  // First of all groups of a block the searches in x, which branch nowhere, so that they overlap.
+  void read(const Nodes& nodes, Copies& copies, Groups& groups, std::size_t from, std::size_t to) {
+    const bool empty = nodes.root == NONE;
+    unsigned entries[BLOCK] = {};
+    for (std::size_t i = from; i < to && !empty; ++i) {
+      const std::size_t ahead = i + LOOKAHEAD;
+      if (ahead < groups.size() && groups.new_leaf(ahead)) nodes.leaf(groups[ahead].leaf).fetch_x();
+      const Leaf& leaf = nodes.leaf(groups[i].leaf);
+      entries[i - from] = leaf.find_x(groups[i].p.x);
+      prefetch(&leaf.y[entries[i - from]]);
+    }
+    for (std::size_t i = from; i < to; ++i) {
+      const Group& group = groups[i];
+      Place place = {NONE, 0, false};
+      unsigned size = 0;
+      std::uint64_t* repeated = nullptr;
+      if (!empty) {
+        const Leaf& leaf = nodes.leaf(group.leaf);
+        const unsigned entry = leaf.find_y(entries[i - from], group.p);
+        place = {group.leaf, entry, leaf.holds(entry, group.p)};
+        repeated = copies_at(nodes, copies, place);
+        size = leaf.size;
+      }
+      const std::uint64_t before = repeated != nullptr ? *repeated : place.there;
+      const std::uint64_t after = groups.settle(i, before);
+      if (before != after && (before > 1 || after > 1)) recounts.push_back({group.p, place, before, after, repeated});
+      if ((before == 0) != (after == 0))
+        note({group.p, group.leaf, static_cast<std::uint8_t>(place.entry), static_cast<std::uint8_t>(size),
+              before == 0});
     }
   }
+
+  void note(const Change& change) {
+    const bool first = changes_end_ == changes_.data() || changes_end_[-1].leaf != change.leaf;
+    leaves += first;
+    inserts += change.insert;
+    added_ = added_ * !first + change.insert;
+    // After its first split, a leaf needs half a leaf's worth of inserts for each further one.
+    const std::size_t size = change.size + added_;
+    if (size > LEAF && change.insert) extra_leaves += (size - LEAF) % (LEAF / 2) == 1;
+    *changes_end_++ = change;
+  }
+
+  Buffer<Change> changes_;
+  Change* changes_end_;
+  std::size_t added_ = 0;  // to the leaf of the last change
 };
 
 }  // namespace dynhull

@@ -39,8 +39,9 @@ class Cursor {
   }
 
  private:
-  // Pass the bridges that lie under the chain: those that reach beyond its ends.
+  // Pass the edges that do not lie between the two ends: at inner nodes, they are bridges under the chain.
   void descend() {
+    if (lowest_ == highest_) return settle(lowest_);
     while (!is_leaf(tree_)) {
       const Edge& edge = nodes_.bridge(tree_, side_);
       if (edge.b > highest_) {
@@ -55,20 +56,28 @@ class Cursor {
     }
     const Leaf& leaf = nodes_.leaf(tree_);
     leaf.fetch();
-    Mask mask = leaf.chain[side_];
-    if (lowest_ > leaf.first()) mask &= ~below(leaf.find(lowest_));
-    if (highest_ < leaf[leaf.size - 1]) mask &= below(leaf.find(highest_) + 1);
-    chain_ = mask;
+    chain_ = leaf.chain[side_];
     halve();
   }
   // Halve what is left of a leaf's chain by entries, not by vertices: that needs no list of them.
   void halve() {
     const Leaf& leaf = nodes_.leaf(tree_);
-    const unsigned first = lowest(chain_), last = highest(chain_);
-    single = first == last;
-    before_ = chain_ & below((first + last) / 2 + 1);
-    a = leaf[highest(before_)];
-    b = single ? a : leaf[lowest(chain_ & ~before_)];
+    while (several(chain_)) {
+      before_ = chain_ & below((lowest(chain_) + highest(chain_)) / 2 + 1);
+      a = leaf[highest(before_)];
+      b = leaf[lowest(chain_ & ~before_)];
+      if (b > highest_)
+        chain_ &= before_;
+      else if (a < lowest_)
+        chain_ &= ~before_;
+      else
+        return;
+    }
+    settle(leaf[lowest(chain_)]);
+  }
+  void settle(Point vertex) {
+    a = b = vertex;
+    single = true;
   }
 
   const Nodes& nodes_;

@@ -109,6 +109,8 @@ inline void split(Nodes& nodes, Ref left) {
   high.size = low.size - half;
   std::copy(low.x + half, low.x + low.size, high.x);
   std::copy(low.y + half, low.y + low.size, high.y);
+  std::fill(low.x + half, low.x + LEAF, INFINITE);
+  std::fill(high.x + high.size, high.x + LEAF, INFINITE);
   high.repeated = low.repeated >> half;
   low.repeated &= below(half);
   low.size = half;

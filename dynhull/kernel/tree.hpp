@@ -37,7 +37,11 @@ class HullTree {
   const Nodes& nodes() const { return nodes_; }
   const Copies& copies() const { return copies_; }
 
-  std::uint64_t count(Point p) const { return count_of(nodes_, copies_, find(nodes_, p)); }
+  std::uint64_t count(Point p) const {
+    const Place place = find(nodes_, p);
+    if (!place.there) return 0;
+    return nodes_.leaf(place.leaf).repeated & bit(place.entry) ? copies_.find(p)->second : 1;
+  }
 
   void clear() {
     if (nodes_.root == NONE) return;
@@ -54,7 +58,7 @@ class HullTree {
     const Place place = find(nodes_, p);
     if (place.there) {
       ++copies_.try_emplace(p, 1).first->second;
-      nodes_.leaf(place.leaf).repeated |= bit(place.entry);
+      mark(place, true);
       ++size_;
       return false;
     }
@@ -69,9 +73,12 @@ class HullTree {
     const Place place = find(nodes_, p);
     if (!place.there) return Removal::MISSING;
     --size_;
-    Leaf& leaf = nodes_.leaf(place.leaf);
-    if (leaf.repeated & bit(place.entry)) {
-      recount({p, count_of(nodes_, copies_, place) - 1});
+    if (nodes_.leaf(place.leaf).repeated & bit(place.entry)) {
+      const auto entry = copies_.find(p);
+      if (--entry->second == 1) {
+        copies_.erase(entry);
+        mark(place, false);
+      }
       return Removal::HULL_STANDS;
     }
     --distinct_;
@@ -86,12 +93,19 @@ class HullTree {
                 std::optional<bool> together = {}) {
     Groups groups(ops, points, count);
     groups.descend(nodes_);
-    const bool crowded = groups.inserts >= distinct_ || groups.size() >= CROWDED * groups.touched_leaves();
-    if (nodes_.root == NONE || together.value_or(crowded))
-      apply_together(groups, ignore_missing);
-    else
-      apply_one_by_one(groups, ignore_missing);
+    Plan plan(nodes_, copies_, groups);
     if (groups.first_missing >= 0 && !ignore_missing) return {0, groups.first_missing};
+    make_room_for_copies(plan);
+    try {
+      if (apply(plan, together)) changed();
+    } catch (...) {
+      drop_room_for_copies();
+      throw;
+    }
+    size_ += groups.growth;
+    distinct_ += 2 * plan.inserts - plan.changes().size();
+    for (const Recount& entry : plan.recounts)
+      if (entry.before == 0 && entry.after > 1) mark(find(nodes_, entry.p), true);
     return {groups.rows_applied, groups.first_missing};
   }
 
@@ -112,44 +126,20 @@ class HullTree {
   std::size_t reserved_bytes() const { return nodes_.reserved_bytes(); }
 
  private:
-  // With so many distinct points a touched leaf, a batch is applied together: measured, see docs/performance.md.
-  static constexpr std::size_t CROWDED = LEAF / 2;
-
-  void apply_one_by_one(Groups& groups, bool ignore_missing) {
-    Sequence sequence(nodes_, copies_, groups);
-    try {
-      sequence.apply(ignore_missing);
-    } catch (...) {
-      sequence.go_back();
-      throw;
+  // True where the hull changed.
+  bool apply(const Plan& plan, std::optional<bool> together) {
+    if (plan.changes().empty()) return recount(plan), false;
+    const bool as_large = plan.inserts >= distinct_;
+    if (nodes_.root != NONE && !together.value_or(as_large || plan.crowded())) {
+      nodes_.reserve(plan.extra_leaves);
+      recount(plan);
+      return apply_in_order(nodes_, plan.changes());
     }
-    if (groups.first_missing >= 0 && !ignore_missing) {
-      sequence.go_back();
-      for (std::size_t i = 0; i < groups.size(); ++i) groups.settle(i, count(groups[i].p));  // the first of all
-      return;
-    }
-    sequence.drop_room();
-    size_ += groups.growth;
-    distinct_ += sequence.distinct_growth;
-    if (sequence.changed) changed();
-  }
-
-  void apply_together(Groups& groups, bool ignore_missing) {
-    const Plan plan(nodes_, copies_, groups);
-    if (groups.first_missing >= 0 && !ignore_missing) return;
-    make_room_for_copies(plan);
-    try {
-      if (plan.inserts > 0 && plan.inserts >= distinct_)
-        rebuild(plan);
-      else if (!plan.changes.empty() && Commit(nodes_, plan).apply())
-        changed();
-    } catch (...) {
-      drop_room_for_copies();
-      throw;
-    }
-    size_ += groups.growth;
-    distinct_ += 2 * plan.inserts - plan.changes.size();
-    for (const Recount& entry : plan.recounts) recount(entry);
+    if (as_large) return rebuild(plan);
+    nodes_.reserve(plan.extra_leaves);
+    Commit commit(nodes_, plan);
+    recount(plan);
+    return commit.apply();
   }
 
   bool changed() {
@@ -169,17 +159,18 @@ class HullTree {
     return nodes;
   }
 
-  void mark_repeated(Point p) {
-    const Place place = find(nodes_, p);
-    if (place.there) nodes_.leaf(place.leaf).repeated |= bit(place.entry);
+  // Note in its leaf whether a point is there more than once.
+  void mark(const Place& place, bool repeated) {
+    Mask& marks = nodes_.leaf(place.leaf).repeated;
+    marks = repeated ? marks | bit(place.entry) : marks & ~bit(place.entry);
   }
 
   // A batch as large as the tree: merge it with the points and build anew.
-  void rebuild(const Plan& plan) {
+  bool rebuild(const Plan& plan) {
     std::vector<Point> merged;
     merged.reserve(distinct_ + plan.inserts);
-    auto next = plan.changes.begin();
-    const auto last = plan.changes.end();
+    auto next = plan.changes().begin();
+    const auto last = plan.changes().end();
     for_each([&](Point p, std::uint64_t) {
       for (; next != last && next->p < p; ++next) merged.push_back(next->p);
       if (next != last && next->p == p)
@@ -192,17 +183,20 @@ class HullTree {
     Nodes fresh = built(merged.data(), merged.size());
     std::vector<Point> after[2];
     for (Side side : SIDES) collect(fresh, fresh.root, side, LOWEST, HIGHEST, after[side]);
+    recount(plan);
     nodes_ = std::move(fresh);
-    for (const auto& [p, copies] : copies_)
-      if (copies > 1) mark_repeated(p);
-    if (before[UPPER] != after[UPPER] || before[LOWER] != after[LOWER]) changed();
+    for (const auto& [p, copies] : copies_) {
+      const Place place = find(nodes_, p);
+      if (copies > 1 && place.there) mark(place, true);
+    }
+    return before[UPPER] != after[UPPER] || before[LOWER] != after[LOWER];
   }
 
   // So that recount() cannot fail. An entry of one says that it is only room.
-  void make_room_for_copies(const Plan& plan) {
+  void make_room_for_copies(Plan& plan) {
     try {
-      for (const Recount& entry : plan.recounts)
-        if (entry.copies > 1) copies_.try_emplace(entry.p, 1);
+      for (Recount& entry : plan.recounts)
+        if (entry.copies == nullptr) entry.copies = &copies_.try_emplace(entry.p, 1).first->second;
     } catch (...) {
       drop_room_for_copies();
       throw;
@@ -212,15 +206,15 @@ class HullTree {
     std::erase_if(copies_, [](const auto& entry) { return entry.second == 1; });
   }
 
-  void recount(const Recount& entry) {
-    if (entry.copies > 1)
-      copies_.find(entry.p)->second = entry.copies;
-    else
-      copies_.erase(entry.p);
-    const Place place = find(nodes_, entry.p);
-    if (!place.there) return;
-    Mask& repeated = nodes_.leaf(place.leaf).repeated;
-    repeated = entry.copies > 1 ? repeated | bit(place.entry) : repeated & ~bit(place.entry);
+  // Before the changes are applied, once nothing can fail any more: new points are marked afterwards.
+  void recount(const Plan& plan) {
+    for (const Recount& entry : plan.recounts) {
+      if (entry.after > 1)
+        *entry.copies = entry.after;
+      else
+        copies_.erase(entry.p);
+      if (entry.before > 0 && entry.after > 0) mark(entry.place, entry.after > 1);
+    }
   }
 
   template <class Visit>

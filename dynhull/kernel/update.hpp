@@ -62,23 +62,33 @@ inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours
   return true;
 }
 
-// The bridge of v anew, after `gone`, one of its ends, left its child's chain. That chain has sunk below the old
-// bridge, so that at its other end the bridge stays or moves towards the separator.
-inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone) {
+// The bridge of v anew, after `gone`, one of its ends, left its child's chain; `neighbours` are those it had there.
+// That chain has sunk below the old bridge, between them only: its new end lies there too, and at its other end the
+// bridge stays or moves towards the separator.
+inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone, Edge neighbours) {
   const Node& node = nodes.node(v);
   const Edge& old = nodes.bridge(v, side);
   const bool on_left = gone == old.a;
-  return find_bridge(Cursor(nodes, node.child[0], side, on_left ? LOWEST : old.a, HIGHEST),
-                     Cursor(nodes, node.child[1], side, LOWEST, on_left ? old.b : HIGHEST), side, node.separator);
+  const Edge left = on_left ? neighbours : Edge{old.a, HIGHEST};
+  const Edge right = on_left ? Edge{LOWEST, old.b} : neighbours;
+  return find_bridge(Cursor(nodes, node.child[0], side, left.a, left.b),
+                     Cursor(nodes, node.child[1], side, right.a, right.b), side, node.separator);
 }
 
 // Repair the bridges from v up for p, gone from the chain below, as far as p was on it. True where to the root.
-inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side) {
+//
+// `neighbours` are those of p on the chain, infinite where p was its end.
+inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
   for (; v != NONE; v = nodes.node(v).parent) {
-    const Edge& edge = nodes.bridge(v, side);
+    Edge& edge = nodes.bridge(v, side);
     if (either(p<edge.a, p> edge.b)) continue;
     if (p != edge.a && p != edge.b) return false;
-    nodes.bridge(v, side) = bridge_after(nodes, v, side, p);
+    const Edge old = edge;
+    edge = bridge_after(nodes, v, side, p, neighbours);
+    if (p == old.a)
+      neighbours.b = old.b;
+    else
+      neighbours.a = old.a;
   }
   return true;
 }
@@ -107,12 +117,13 @@ inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
 // Remove a point that is there. Returns the sides, as bits, on which the hull changed.
 inline unsigned remove_point(Nodes& nodes, Place place, Point p) {
   Leaf& leaf = nodes.leaf(place.leaf);
+  const Edge neighbours[] = {leaf.neighbours(UPPER, place.entry), leaf.neighbours(LOWER, place.entry)};
   const unsigned on_leaf = leaf.remove(place.entry);
   const bool empty = leaf.size == 0;
   const Ref above = empty ? drop(nodes, place.leaf) : leaf.parent;
   unsigned changed = 0;
   for (Side side : SIDES)
-    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side)) changed |= 1u << side;
+    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side, neighbours[side])) changed |= 1u << side;
   if (empty)
     rebalance(nodes, above);
   else if (leaf.size < LOW && leaf.size % MERGE_STEP == 1)
