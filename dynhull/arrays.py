@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .implementation import kernel
+
 Points = npt.NDArray[np.float64]
 
 LARGEST_EXACT_INTEGER = 2**53
@@ -22,14 +24,15 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
 
     The message names the first bad row.
     """
+    if type(xy) is np.ndarray and (points := plain_points(xy)) is not None:
+        return points
     array = _as_array(xy, name)
     if array.ndim == 1 and array.size == 0:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] != 2:
         hint = f"; one point is [[{array[0]}, {array[1]}]]" if array.shape == (2,) else ""
         raise ValueError(f"{name} must have shape (n, 2), got {array.shape}{hint}")
-    # Adding zero turns -0.0 into 0.0: they are the same point.
-    return np.ascontiguousarray(_finite(_as_double(array, name), name) + 0.0)
+    return _finite(_as_double(array, name), name)
 
 
 def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
@@ -39,7 +42,7 @@ def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] < 2:
         raise ValueError(f"{name} must have shape (n, d), d at least 2, got {array.shape}")
-    return _finite(_as_double(array, name), name) + 0.0
+    return _finite(_as_double(array, name), name)
 
 
 def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
@@ -73,7 +76,7 @@ def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
     if array.ndim == 0 or array.shape[-1] != 2:
         raise ValueError(f"{name} must have shape (..., 2), got {array.shape}")
     flat = array.reshape(-1, 2)
-    return _finite(_as_double(flat, name), name).reshape(array.shape) + 0.0
+    return _finite(_as_double(flat, name), name).reshape(array.shape)
 
 
 def as_coordinate(value: Any, name: str) -> float:
@@ -163,16 +166,29 @@ def _as_double_scalar(value: Any, name: str) -> float:
     return double
 
 
-def all_finite(array: Points) -> bool:
-    """Whether all entries are finite."""
-    return b"\0" not in np.isfinite(array).tobytes()  # for few rows a small part of what all() takes
+def plain_points(xy: npt.NDArray[Any]) -> Points | None:
+    """What `as_points` makes of an (n, 2) array of finite doubles; None of anything else."""
+    if kernel is not None:
+        points: Points | None = kernel.plain_points(xy)
+        return points
+    if xy.dtype != np.float64 or xy.ndim != 2 or xy.shape[1] != 2:
+        return None
+    copy = _copy(xy)
+    return copy if np.isfinite(copy).all() else None
 
 
 def _finite(array: Points, name: str) -> Points:
-    if not all_finite(array):
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=-1))[0])
+    copy = _copy(array)
+    finite = np.isfinite(copy)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=-1))[0])
         raise ValueError(f"{name} row {row} is {_text(array[row])}: coordinates must be finite")
-    return array
+    return copy
+
+
+def _copy(array: Points) -> Points:
+    """A copy, which no other thread writes to, without negative zeros: -0.0 and 0.0 are the same coordinate."""
+    return np.ascontiguousarray(array + 0.0)
 
 
 def _text(row: npt.NDArray[Any]) -> str:

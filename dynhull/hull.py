@@ -14,6 +14,8 @@ from .tree import HullTree
 
 T = TypeVar("T")
 
+INSERT, DELETE = np.array([1], np.int8), np.array([-1], np.int8)
+
 
 class MissingPointError(KeyError):
     """A delete names a point that is not there.
@@ -79,7 +81,7 @@ class DynamicHull:
     def insert_many(self, xy: npt.ArrayLike) -> int:
         """Add points as one batch. Returns how many. O(log² n) each, O((n + k) log k) for k >= n."""
         points = as_points(xy)
-        return self._tree.apply(np.ones(len(points), np.int8), points, False)[0]
+        return self._tree.apply(INSERT.repeat(len(points)), points, False)[0]
 
     def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
         """Remove points as one batch. Returns how many were removed. O(log² n) each.
@@ -90,7 +92,7 @@ class DynamicHull:
                 anything changes; "ignore" passes over it.
         """
         points = as_points(xy)
-        return self._apply(np.full(len(points), -1, np.int8), points, missing)
+        return self._apply(DELETE.repeat(len(points)), points, missing)
 
     def apply(self, ops: npt.ArrayLike, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
         """Apply inserts and deletes as one batch. Returns how many rows were applied. O(log² n) each.

@@ -262,6 +262,28 @@ nb::tuple chan(const Rows& rows) {
   return nb::make_tuple(array_of(hull.vertices), rounds);
 }
 
+// What dynhull.arrays.as_points makes of an array; None where it has more to look at than doubles that may not be
+// finite. Copied first, checked then: with the GIL let go of, other threads may write to the original.
+nb::object plain_points(nb::handle xy) {
+  Rows rows;
+  if (!nb::try_cast(xy, rows, false)) return nb::none();
+  const std::size_t count = rows.shape(0);
+  const Output<double> output(2 * count);
+  Point strange = {0, 0};  // a finite number minus itself is 0, any other is NaN
+  {
+    std::optional<nb::gil_scoped_release> release;
+    if (count > FEW_ROWS) release.emplace();
+    auto* const copies = reinterpret_cast<Point*>(output.data);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Point p = points_of(rows)[i], copy = {p.x + 0.0, p.y + 0.0};  // -0.0 is 0.0
+      copies[i] = copy;
+      strange.x += copy.x - copy.x;
+      strange.y += copy.y - copy.y;
+    }
+  }
+  return strange == Point{0, 0} ? output.array({count, 2}) : nb::none();
+}
+
 Point point_of(nb::handle pair) {
   PyObject* tuple = pair.ptr();
   if (!PyTuple_CheckExact(tuple) || PyTuple_GET_SIZE(tuple) != 2) throw nb::type_error("a point is a tuple (x, y)");
@@ -337,6 +359,8 @@ NB_MODULE(_kernel, module) {
   module.def(
       "plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
       "a * b - c * d as the predicates' filters compute it: three roundings. For the test of the build's flags.");
+  module.def("plain_points", &plain_points, "xy"_a,
+             "A copy of an (n, 2) array of finite doubles without negative zeros; None of anything else.");
   module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
              "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. "
              "Whether to discard points by a sample's hull first, and to use two threads, the input decides where not "

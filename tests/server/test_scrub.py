@@ -33,7 +33,7 @@ class Liar(DynamicHull):
 
 
 async def insert(hull: LiveHull, points: np.ndarray) -> None:
-    await hull.apply(Write(lambda: Batch(points, NONE, NONE, NONE, False), len(points)))
+    await hull.apply(Write(lambda: Batch(points, NONE, 0, False), len(points)))
 
 
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:

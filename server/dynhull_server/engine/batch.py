@@ -11,34 +11,22 @@ from dynhull.arrays import Points
 from .errors import PointMissingError
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Batch:
-    """Points as (n, 2) arrays; `destinations` has a row for each of `origins`.
+    """Points as (n, 2) arrays. The last `moves` of each are the origins and the destinations of moves.
 
     With `count_missing`, points to delete that are not there are passed over and counted.
     """
 
     inserts: Points
     deletes: Points
-    origins: Points
-    destinations: Points
+    moves: int
     count_missing: bool
-
-    @property
-    def all_inserts(self) -> Points:
-        """Inserts and destinations."""
-        return np.concatenate((self.inserts, self.destinations)) if len(self.destinations) else self.inserts
-
-    @property
-    def all_deletes(self) -> Points:
-        """Deletes and origins."""
-        return np.concatenate((self.deletes, self.origins)) if len(self.origins) else self.deletes
 
     @property
     def growth(self) -> int:
         """How many more points there are afterwards, at most."""
-        grown = len(self.inserts) + len(self.destinations)
-        return grown if self.count_missing else grown - len(self.deletes) - len(self.origins)
+        return len(self.inserts) if self.count_missing else len(self.inserts) - len(self.deletes)
 
 
 @dataclass(slots=True)
@@ -60,14 +48,13 @@ def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
     Raises:
         PointMissingError: a point to delete is not there, and missing points are not to be counted; nothing changed.
     """
-    inserted = len(batch.inserts) + len(batch.destinations)
-    to_delete = len(batch.deletes) + len(batch.origins)
+    inserted, to_delete = len(batch.inserts), len(batch.deletes)
     changes = hull.changes
     if inserted + to_delete == 1:
         deleted = _apply_one(hull, batch)
     elif to_delete == 0:
         deleted = 0
-        hull.insert_many(batch.all_inserts)
+        hull.insert_many(batch.inserts)
     else:
         deleted = _apply_many(hull, batch)
     return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))
@@ -90,7 +77,7 @@ def _apply_one(hull: DynamicHull, batch: Batch) -> int:
 
 
 def _apply_many(hull: DynamicHull, batch: Batch) -> int:
-    inserts, deletes = batch.all_inserts, batch.all_deletes
+    inserts, deletes = batch.inserts, batch.deletes
     missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
     try:
         if not len(inserts):
@@ -101,7 +88,8 @@ def _apply_many(hull: DynamicHull, batch: Batch) -> int:
         if error.row is None:
             raise
         row = error.row - len(inserts)
-        if row < len(batch.deletes):
+        first_origin = len(deletes) - batch.moves
+        if row < first_origin:
             raise PointMissingError("deletes", row, error.point) from None
-        raise PointMissingError("origins", row - len(batch.deletes), error.point) from None
+        raise PointMissingError("origins", row - first_origin, error.point) from None
     return applied - len(inserts)

@@ -265,11 +265,11 @@ class LiveHull:
             self._producers.applied(write.producer, write.sequence)
         self._counts = Counts(applied.revision, applied.points, self._hull.distinct)
         if self._store is not None:
-            inserts, deletes, lenient = batch.all_inserts, batch.all_deletes, applied.missing > 0
+            lenient = applied.missing > 0
             self._uncommitted.append(
-                Record(applied.revision, inserts, deletes, write.producer, write.sequence, lenient)
+                Record(applied.revision, batch.inserts, batch.deletes, write.producer, write.sequence, lenient)
             )
-            self.unsaved += len(inserts) + len(deletes)
+            self.unsaved += len(batch.inserts) + len(batch.deletes)
         return applied
 
     def _commit(self) -> Future[None] | None:

@@ -80,6 +80,8 @@ class SerialExecutor:
 
     async def run(self, function: Callable[[], T], *, small: bool, writes: bool = False) -> T:
         """The function's result, or its exception. A caller that is cancelled stops waiting, its function runs."""
+        if small and not writes and not self._busy:
+            return function()  # nothing to commit, nobody to tell
         future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
 
         def done(result: T, error: Exception | None) -> None:

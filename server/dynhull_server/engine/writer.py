@@ -12,7 +12,7 @@ from .serial import SerialExecutor
 SMALL = 64
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Write:
     """A batch to come, of about `rows` points: `make` decodes it, off the event loop where it is large.
 

@@ -3,8 +3,8 @@
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager, nullcontext
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any
 
@@ -18,6 +18,7 @@ from .metrics import Metrics
 from .status import ANSWERED, DrainingError, StartingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
+Work = Callable[[Any, "Call"], Awaitable[Any]]
 
 SUSPICIOUS = ("UNAUTHENTICATED", "PERMISSION_DENIED")
 
@@ -46,33 +47,37 @@ class Call:
             raise message
         return None if message is grpc.aio.EOF else message
 
-    async def write(self, message: Message, patience: float | None = None) -> None:
-        """Send a message. Waits while the client does not read.
+    def serialize(self, message: Message) -> bytes:
+        """The bytes of a message. Raises LimitExceededError where it is too large to be sent."""
+        data: bytes = message.SerializeToString()
+        if len(data) > self._max_message_bytes:
+            raise LimitExceededError("max_message_bytes", self._max_message_bytes)
+        return data
 
-        Raises LimitExceededError where that took longer than `patience` seconds: the client will get the message and
-        then the error, for gRPC cannot take back what it has begun to send.
-        """
-        self.check_size(message)
-        begun = time.monotonic()
+    async def write(self, message: Message) -> None:
+        """Send a message. Waits while the client does not read."""
         try:
-            await self._context.write(message)
+            await self._context.write(self.serialize(message))
         except grpc.aio.InternalError:
             # The client has gone while the message was on its way.
             raise asyncio.CancelledError from None
-        if patience is not None and time.monotonic() - begun > patience:
-            raise LimitExceededError("max_watch_lag", patience)
 
-    def check_size(self, message: Message) -> None:
-        """Raise LimitExceededError where a message is too large to be sent."""
-        if message.ByteSize() > self._max_message_bytes:
-            raise LimitExceededError("max_message_bytes", self._max_message_bytes)
+    async def write_within(self, seconds: float, message: Message) -> None:
+        """Send a message, or raise LimitExceededError where that took longer.
+
+        The client will get the message and then the error, for gRPC cannot take back what it has begun to send.
+        """
+        begun = time.monotonic()
+        await self.write(message)
+        if time.monotonic() - begun > seconds:
+            raise LimitExceededError("max_watch_lag", seconds)
 
 
 class Calls:
-    """Every call runs inside `enter`.
+    """Every call goes through `serve`.
 
     Args:
-        authenticate: what the caller with this metadata may do; raises UnauthenticatedError.
+        authenticate: what a caller may do; raises UnauthenticatedError.
         metrics: where calls are counted.
         max_message_bytes: the largest message sent.
         max_streams: how many streaming calls there may be at a time.
@@ -80,7 +85,7 @@ class Calls:
 
     def __init__(
         self,
-        authenticate: Callable[[Mapping[str, Any]], Access],
+        authenticate: Callable[[Context], Access],
         metrics: Metrics,
         max_message_bytes: int,
         max_streams: int,
@@ -107,9 +112,8 @@ class Calls:
         if self._short:
             await asyncio.wait(self._short, timeout=grace)
 
-    @asynccontextmanager
-    async def enter(self, method: str, context: Context, request: object, *, stream: bool) -> AsyncIterator[Call]:
-        """A call. Its refusals become statuses."""
+    async def serve(self, method: str, work: Work, request: object, context: Context) -> Any:
+        """What `work` makes of a request. Its refusals become statuses."""
         begun = time.perf_counter()
         code = "OK"
         call = None
@@ -118,11 +122,10 @@ class Calls:
                 raise StartingError
             if self.draining:
                 raise DrainingError
-            call = Call(self, context, self._authenticate(dict(context.invocation_metadata() or ())))
+            call = Call(self, context, self._authenticate(context))
             if isinstance(request, Exception):
                 raise request
-            with self._streaming() if stream else nullcontext():
-                yield call
+            return await work(request, call)
         except ANSWERED as error:
             status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
             code = status.code.name
@@ -137,7 +140,9 @@ class Calls:
             log.exception("a call failed; this is a bug", extra={"method": method})
             await context.abort(grpc.StatusCode.INTERNAL, "internal error, see the server's log")
         finally:
-            self._metrics.call(method, code, time.perf_counter() - begun)
+            # The answer leaves first: the caller waits for it.
+            seconds = time.perf_counter() - begun
+            asyncio.get_running_loop().call_soon(self._metrics.call, method, code, seconds)
 
     @contextmanager
     def short(self) -> Iterator[None]:
@@ -155,7 +160,8 @@ class Calls:
         return Cutoff(self)
 
     @contextmanager
-    def _streaming(self) -> Iterator[None]:
+    def stream(self) -> Iterator[None]:
+        """What happens inside is a streaming call, of which there are not too many."""
         if self._streams >= self._max_streams:
             raise LimitExceededError("max_streams", self._max_streams)
         self._streams += 1

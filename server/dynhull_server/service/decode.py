@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.arrays import Points, all_finite
+from dynhull.arrays import Points, plain_points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
@@ -111,12 +111,12 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
     if len(coordinates) % 2:
         problem = "two coordinates a point, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
-    values = np.frombuffer(packed, "<f8") if packed else np.array(coordinates, np.float64)
-    xy = values.reshape(-1, 2)
-    if not all_finite(xy):
-        _refuse_rows((~np.isfinite(xy)).any(axis=1), field, xy, "coordinates must be finite")
-    # Adding zero turns -0.0 into 0.0, and any byte order into the machine's.
-    return np.asarray(xy + 0.0, np.float64)
+    values = np.frombuffer(packed, "<f8") if packed else coordinates
+    given: Points = np.asarray(values, np.float64).reshape(-1, 2)
+    xy = plain_points(given)
+    if xy is None:
+        raise _bad_row(~np.isfinite(given).all(axis=1), field, given, "coordinates must be finite")
+    return xy
 
 
 def decode_directions(directions: points_pb2.Points) -> Points:
@@ -154,8 +154,12 @@ def decode_rates(rates: Sequence[float]) -> list[float]:
 
 def _refuse_rows(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: str) -> None:
     if bad.any():
-        row = int(bad.argmax())
-        raise InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
+        raise _bad_row(bad, field, xy, problem)
+
+
+def _bad_row(bad: npt.ArrayLike, field: str, xy: Points, problem: str) -> InvalidFieldError:
+    row = int(np.argmax(bad))
+    return InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
 
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch:
@@ -164,14 +168,16 @@ def decode_batch(batch: batch_pb2.Batch) -> Batch:
         raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy this server knows")
     inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
     deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
-    origins = destinations = NO_POINTS
+    moves = 0
     if batch.HasField("moves"):
         origins = decode_points(batch.moves.origins, "batch.moves.origins")
         destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
-        if len(origins) != len(destinations):
-            problem = f"there must be as many as there are origins, {len(origins)}"
+        moves = len(origins)
+        if len(destinations) != moves:
+            problem = f"there must be as many as there are origins, {moves}"
             raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
-    return Batch(inserts, deletes, origins, destinations, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
+        inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
+    return Batch(inserts, deletes, moves, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:

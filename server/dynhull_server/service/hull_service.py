@@ -71,10 +71,12 @@ class HullService:
             try:
                 applied = await hull.apply(write)
             except Exception:
-                self._metrics.refused()
+                self._metrics.batches.refused()
                 raise
-        self._metrics.applied(applied, time.perf_counter() - begun)
-        return pb.ApplyResponse(result=encode.encode_applied(applied))
+        self._metrics.batches.applied(applied, time.perf_counter() - begun)
+        response = pb.ApplyResponse()
+        encode.encode_applied(applied, response.result)
+        return response
 
     async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
         call.batches = 0
@@ -105,8 +107,9 @@ class HullService:
             async with aclosing(BatchStream(call, first, hull, self._metrics).applied()) as batches:
                 async for sequence, applied in batches:
                     call.batches += 1
-                    result = encode.encode_applied(applied)
-                    await call.write(pb.StreamResponse(result=result, sequence=sequence))
+                    response = pb.StreamResponse(sequence=sequence)
+                    encode.encode_applied(applied, response.result)
+                    await call.write(response)
 
     async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
         name = decode.decode_name(request.name)
@@ -269,7 +272,7 @@ class HullService:
                         event = await anext(events)
                         message = await encode.encode_event_aside(event, encoding, request.include_measures)
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
-                        await call.write(message, self._max_watch_lag)
+                        await call.write_within(self._max_watch_lag, message)
 
     # Names
 

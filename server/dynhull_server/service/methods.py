@@ -1,6 +1,7 @@
-"""The service's methods as gRPC wants them: each inside `Calls.enter`, bytes that are no message refused."""
+"""The service's methods as gRPC wants them: each through `Calls.serve`, bytes that are no message refused."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import grpc
@@ -10,7 +11,7 @@ from google.protobuf.message_factory import GetMessageClass
 from dynhull_proto.v1 import hull_service_pb2
 
 from ..engine.errors import LimitExceededError
-from .calls import Calls, Context
+from .calls import Call, Calls, Work
 from .hull_service import HullService
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
@@ -31,34 +32,32 @@ def method_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandle
     handlers = {}
     for method in DESCRIPTOR.methods:
         streams = method.client_streaming, method.server_streaming
-        behave = _streaming if any(streams) else _unary
+        wrap = _streaming if any(streams) else _unary
         handlers[method.name] = MAKERS[streams](
-            behave(method.name, getattr(service, method.name), calls),
+            partial(calls.serve, method.name, wrap(method.name, getattr(service, method.name), calls)),
             request_deserializer=_message_or_error(GetMessageClass(method.input_type), calls.max_message_bytes),
-            response_serializer=GetMessageClass(method.output_type).SerializeToString,
         )
     return grpc.method_handlers_generic_handler(DESCRIPTOR.full_name, handlers)
 
 
-def _unary(name: str, method: Callable[..., Awaitable[Message]], calls: Calls) -> Callable[..., Awaitable[Message]]:
+def _unary(name: str, method: Work, calls: Calls) -> Work:
     until_drain = calls.short if name in FINISHED else calls.cutoff
 
-    async def behave(request: Any, context: Context) -> Message:
-        async with calls.enter(name, context, request, stream=False) as call:
-            with until_drain():
-                response = await method(request, call)
-            call.check_size(response)
-            return response
+    async def work(request: Any, call: Call) -> bytes:
+        with until_drain():
+            response = await method(request, call)
+        return call.serialize(response)
 
-    return behave
+    return work
 
 
-def _streaming(name: str, method: Callable[..., Awaitable[Any]], calls: Calls) -> Callable[..., Awaitable[Any]]:
-    async def behave(request: Any, context: Context) -> Any:
-        async with calls.enter(name, context, request, stream=True) as call:
-            return await method(request, call)
+def _streaming(_: str, method: Work, calls: Calls) -> Work:
+    async def work(request: Any, call: Call) -> bytes | None:
+        with calls.stream():
+            response = await method(request, call)
+        return None if response is None else call.serialize(response)
 
-    return behave
+    return work
 
 
 def _message_or_error(kind: type[Message], max_bytes: int) -> Callable[[bytes], Message | Exception]:

@@ -10,10 +10,11 @@ from typing import Any
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, PlatformCollector, ProcessCollector
 from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from ..engine.batch import Applied
 from ..engine.hulls import Engine
+from .batch_counts import BatchCounts
 
 # Seconds; from a small batch applied at once to one that fills a message.
 BUCKETS = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
@@ -24,7 +25,11 @@ PATIENCE = 5.0
 
 
 class Metrics:
-    """Counters of one server, in a registry of its own."""
+    """Counters of one server, in a registry of its own.
+
+    Attributes:
+        batches: counts of batches, which a StateCollector tells.
+    """
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
@@ -40,16 +45,7 @@ class Metrics:
             buckets=BUCKETS,
             registry=self.registry,
         )
-        batches = Counter("dynhull_batches", "Batches, by what became of them.", ["outcome"], registry=self.registry)
-        self._applied, self._duplicates, self._refused = map(batches.labels, ("applied", "duplicate", "refused"))
-        updates = Counter("dynhull_updates", "Points inserted and deleted.", ["operation"], registry=self.registry)
-        self._inserted, self._deleted, self._missing = map(updates.labels, ("insert", "delete", "missing"))
-        self._batch_durations = Histogram(
-            "dynhull_batch_duration_seconds",
-            "From the arrival of a batch to its acknowledgement being ready.",
-            buckets=BUCKETS,
-            registry=self.registry,
-        )
+        self.batches = BatchCounts(BUCKETS)
         self._events = Counter(
             "dynhull_watch_events", "Events sent to watchers, by kind.", ["kind"], registry=self.registry
         )
@@ -82,24 +78,6 @@ class Metrics:
         calls, durations = ended
         calls.inc()
         durations.observe(seconds)
-
-    def applied(self, applied: Applied, seconds: float) -> None:
-        """A batch has been applied, `seconds` after it came."""
-        self._batch_durations.observe(seconds)
-        if applied.duplicate:
-            self._duplicates.inc()
-            return
-        self._applied.inc()
-        if applied.inserted:
-            self._inserted.inc(applied.inserted)
-        if applied.deleted:
-            self._deleted.inc(applied.deleted)
-        if applied.missing:
-            self._missing.inc(applied.missing)
-
-    def refused(self) -> None:
-        """A batch has been refused."""
-        self._refused.inc()
 
     def verified(self, origin: str, equal: bool, seconds: float = 0.0) -> None:
         """A hull has been compared."""
@@ -141,16 +119,16 @@ class Metrics:
 
 
 class StateCollector(Collector):
-    """What is there at the moment of asking: hulls and watchers. Asked in other threads than the event loop's."""
+    """Hulls, watchers and counts of batches at the moment of asking, in other threads than the event loop's."""
 
     def __init__(self, engine: Engine, metrics: Metrics, loop: asyncio.AbstractEventLoop) -> None:
         self._engine = engine
         self._metrics = metrics
         self._loop = loop
 
-    def collect(self) -> Iterator[GaugeMetricFamily]:
-        """Gauges of the state."""
-        yield from _on(self._loop, self._gauges)
+    def collect(self) -> Iterator[Metric]:
+        """Gauges of the state, and the counts."""
+        yield from _on(self._loop, lambda: [*self._gauges(), *self._metrics.batches.families()])
 
     def _gauges(self) -> list[GaugeMetricFamily]:
         hulls = list(self._engine)

@@ -2,8 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
@@ -19,7 +18,7 @@ from ..engine.verification import Verification
 from ..journal.journal import Journal
 from ..settings import Settings
 from .access import EVERYTHING, Access, TokenFile
-from .calls import Calls
+from .calls import Calls, Context
 from .hull_service import HullService
 from .methods import DESCRIPTOR, method_handlers
 from .metrics import Metrics, StateCollector
@@ -57,7 +56,7 @@ class Server:
             Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes), journal
         )
         self._metrics = Metrics()
-        authenticate = _anonymous if settings.tokens is None else TokenFile(settings.tokens).access
+        authenticate = _anonymous if settings.tokens is None else _bearer(TokenFile(settings.tokens))
         self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, settings.max_streams)
         self._health = health.aio.HealthServicer()
         self._server = grpc.aio.server(
@@ -176,5 +175,9 @@ class Server:
             asyncio.get_running_loop().create_task(self._health.set(SCRUB, NOT_SERVING))
 
 
-def _anonymous(_: Mapping[str, Any]) -> Access:
+def _anonymous(_: Context) -> Access:
     return EVERYTHING
+
+
+def _bearer(tokens: TokenFile) -> Callable[[Context], Access]:
+    return lambda context: tokens.access(dict(context.invocation_metadata() or ()))

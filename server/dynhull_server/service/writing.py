@@ -65,10 +65,10 @@ class BatchStream:
                     applied = writer.applied.popleft()
                     sequence, came = self._untold.popleft()
                     self._room.set()
-                    self._metrics.applied(applied, time.perf_counter() - came)
+                    self._metrics.batches.applied(applied, time.perf_counter() - came)
                     yield sequence, applied
                 if writer.refusal is not None:
-                    self._metrics.refused()
+                    self._metrics.batches.refused()
                     raise writer.refusal
                 if reading.done() and not writer.batches:
                     if self._failure is not None:
