@@ -76,7 +76,7 @@ class Groups {
   }
 
  private:
-  static constexpr std::size_t TOGETHER = 12;  // descents side by side
+  static constexpr std::size_t TOGETHER = 32;  // descents side by side
 
   static std::size_t few(std::size_t count) {
     if (count >= NONE) throw std::bad_alloc();

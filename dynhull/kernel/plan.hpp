@@ -34,14 +34,18 @@ struct Recount {
 
 class Plan {
  public:
-  std::size_t inserts = 0;       // changes that insert
-  std::size_t leaves = 0;        // in which something changes
-  std::size_t extra_leaves = 1;  // the changes need at most so many more; one where all goes before something comes
+  std::size_t inserts = 0;  // changes that insert
+  std::size_t leaves = 0;   // in which something changes
+  // The changes need at most so many more: one where all goes before something comes, one for each leaf that overflows,
+  // and one for half a leaf's worth of inserts, which it takes to split again what a split has made. Where a merge has
+  // made what splits, it gave a leaf back.
+  std::size_t extra_leaves = 1;
   std::vector<Recount> recounts;
 
   Plan(const Nodes& nodes, Copies& copies, Groups& groups) : changes_(groups.size()), changes_end_(changes_.data()) {
     for (std::size_t from = 0; from < groups.size(); from += BLOCK)
       read(nodes, copies, groups, from, std::min(from + BLOCK, groups.size()));
+    extra_leaves += inserts / (LEAF / 2);
   }
 
   std::span<const Change> changes() const { return {changes_.data(), changes_end_}; }
@@ -90,9 +94,7 @@ class Plan {
     leaves += first;
     inserts += change.insert;
     added_ = added_ * !first + change.insert;
-    // After its first split, a leaf needs half a leaf's worth of inserts for each further one.
-    const std::size_t size = change.size + added_;
-    if (size > LEAF && change.insert) extra_leaves += (size - LEAF) % (LEAF / 2) == 1;
+    extra_leaves += change.insert & (change.size + added_ == LEAF + 1);
     *changes_end_++ = change;
   }
 
