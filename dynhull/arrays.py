@@ -26,13 +26,16 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     """
     if type(xy) is np.ndarray and (points := plain_points(xy)) is not None:
         return points
-    array = _as_array(xy, name)
-    if array.ndim == 1 and array.size == 0:
-        return np.empty((0, 2))
-    if array.ndim != 2 or array.shape[1] != 2:
-        hint = f"; one point is [[{array[0]}, {array[1]}]]" if array.shape == (2,) else ""
-        raise ValueError(f"{name} must have shape (n, 2), got {array.shape}{hint}")
-    return _finite(_as_double(array, name), name)
+    return _finite(_as_pairs(xy, name), name)
+
+
+def as_pairs(xy: npt.ArrayLike, name: str = "points") -> Points:
+    """Return `xy` like `as_points` but for what stands in it: entries need not be finite, zeros may be negative.
+
+    An array that is like that already is not copied.
+    """
+    pairs = _as_pairs(xy, name)
+    return pairs if pairs.flags.c_contiguous and pairs.flags.aligned else pairs.copy(order="C")
 
 
 def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
@@ -98,6 +101,16 @@ def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
     if bad.size:
         raise ValueError(f"ops row {bad[0]} is {array[bad[0]]!s}: must be +1 (insert) or -1 (delete)")
     return np.ascontiguousarray(array, dtype=np.int8)
+
+
+def _as_pairs(xy: npt.ArrayLike, name: str) -> Points:
+    array = _as_array(xy, name)
+    if array.ndim == 1 and array.size == 0:
+        return np.empty((0, 2))
+    if array.ndim != 2 or array.shape[1] != 2:
+        hint = f"; one point is [[{array[0]}, {array[1]}]]" if array.shape == (2,) else ""
+        raise ValueError(f"{name} must have shape (n, 2), got {array.shape}{hint}")
+    return _as_double(array, name)
 
 
 def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
-from .arrays import Points, as_coordinate, as_directions, as_operations, as_points
+from .arrays import Points, as_coordinate, as_directions, as_operations, as_pairs, as_points
 from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
@@ -62,7 +62,7 @@ class DynamicHull:
     _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
-        self._tree = self._tree_type(None if points is None else as_points(points))
+        self._tree = self._tree_type(None if points is None else as_pairs(points))
         self._measured: tuple[int, dict[str, Any]] = (0, {})
 
     # Updates

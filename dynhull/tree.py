@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Points, as_coordinate
+from .arrays import Points, as_coordinate, as_points
 from .nodes import (
     HIGHEST,
     LOWER,
@@ -40,7 +40,8 @@ from .predicates import Point, direction_sign, orientation
 class HullTree:
     """A multiset of points and its convex hull.
 
-    Single coordinates are checked. In arrays they are finite floats and zeros are positive: callers see to it.
+    Single coordinates are checked, and the array to build from. In others coordinates are finite floats and zeros are
+    positive: callers see to it.
 
     O(log² n) an update, O(log n) a query, O(n) space.
     """
@@ -48,14 +49,14 @@ class HullTree:
     LEAF = 64  # distinct points a leaf holds at most: measured, see benchmarks/tree.py
 
     def __init__(self, xy: Points | None = None) -> None:
-        """Build from an (n, 2) array. O(n log n)."""
+        """Build from an (n, 2) array, ValueError where an entry is not finite. O(n log n)."""
         self._root: Tree | None = None
         self._copies: dict[Point, int] = {}  # how many, for the points that are there more than once
         self._size = 0
         self._distinct = 0
         self.changes = 0
         if xy is not None:
-            self._build(Counter(_tuples(xy)))
+            self._build(Counter(_tuples(as_points(xy))))
 
     def __len__(self) -> int:
         return self._size

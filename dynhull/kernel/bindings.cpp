@@ -60,13 +60,21 @@ double coordinate(nb::handle value, const char* name) {
   return nb::cast<double>(nb::module_::import_("dynhull.arrays").attr("as_coordinate")(value, name));
 }
 
+// The tree of an array's rows; ValueError where a coordinate is not finite.
+HullTree tree_of(const nb::object& xy) {
+  const auto rows = nb::cast<Rows>(xy);
+  {
+    nb::gil_scoped_release release;
+    const Distinct points(points_of(rows), rows.shape(0));
+    if (points.finite()) return HullTree(points);
+  }
+  return tree_of(nb::module_::import_("dynhull.arrays").attr("as_points")(xy));  // which says where
+}
+
 class Hull {
  public:
   Hull() = default;
-  explicit Hull(const Rows& rows) {
-    nb::gil_scoped_release release;
-    tree_ = HullTree(points_of(rows), rows.shape(0));
-  }
+  explicit Hull(HullTree tree) : tree_(std::move(tree)) {}
 
   std::size_t size() { return settled().size(); }
   std::size_t distinct() { return settled().distinct(); }
@@ -292,6 +300,38 @@ Point point_of(nb::handle pair) {
   return p;
 }
 
+// The methods of one point are called the most. Python calls these itself, without nanobind, which first looks for the
+// overload and the keywords: 20 ns.
+template <auto METHOD>
+PyObject* of_one_point(PyObject* self, PyObject* const* arguments, Py_ssize_t count) noexcept {
+  try {
+    if (count != 2) throw nb::type_error("a point is two arguments, x and y");
+    Hull& hull = nb::cast<Hull&>(nb::handle(self));
+    return nb::cast((hull.*METHOD)(arguments[0], arguments[1])).release().ptr();
+  } catch (nb::python_error& error) {
+    error.restore();
+  } catch (const std::bad_alloc&) {
+    PyErr_NoMemory();
+  } catch (const std::exception& error) {
+    PyErr_SetString(PyExc_TypeError, error.what());
+  }
+  return nullptr;
+}
+
+template <auto METHOD>
+PyMethodDef method_of_one_point(const char* name, const char* doc) {
+  const auto function = reinterpret_cast<void (*)()>(of_one_point<METHOD>);
+  return {name, reinterpret_cast<PyCFunction>(function), METH_FASTCALL, doc};
+}
+
+PyMethodDef METHODS_OF_ONE_POINT[] = {
+    method_of_one_point<&Hull::count>("count", "How many times the point is there. O(log n)."),
+    method_of_one_point<&Hull::insert>("insert", "Add a point. True where the hull changed. O(log² n)."),
+    method_of_one_point<&Hull::remove>(
+        "delete", "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n)."),
+    {}};
+PyType_Slot SLOTS[] = {{Py_tp_methods, METHODS_OF_ONE_POINT}, {}};
+
 }  // namespace
 }  // namespace dynhull
 
@@ -307,25 +347,16 @@ NB_MODULE(_kernel, module) {
     }
   });
 
-  nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
+  nb::class_<Hull>(module, "HullTree", nb::type_slots(SLOTS),
+                   "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
       .def(nb::init<>())
       .def(
-          "__init__",
-          [](Hull* hull, nb::object xy) {
-            if (xy.is_none())
-              new (hull) Hull();
-            else
-              new (hull) Hull(nb::cast<Rows>(xy));
-          },
+          "__init__", [](Hull* hull, nb::object xy) { new (hull) Hull(xy.is_none() ? HullTree() : tree_of(xy)); },
           "xy"_a.none())
       .def("__len__", &Hull::size)
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
       .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
       .def("clear", &Hull::clear, "Remove every point.")
-      .def("count", &Hull::count, "x"_a.none(), "y"_a.none(), "How many times the point is there. O(log n).")
-      .def("insert", &Hull::insert, "x"_a.none(), "y"_a.none(), "Add a point. True where the hull changed. O(log² n).")
-      .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
-           "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
       .def(
           "apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
           "Insert the rows with +1 and delete those with -1, as a set, together or one by one: the batch decides where "

@@ -21,6 +21,12 @@ class Building {
   // The whole, detached. O(n).
   Ref tree(bool threads = false) const { return subtree(0, parts_, threads); }
 
+  // Note in its leaf, once that is built, that a point is there more than once.
+  void mark_repeated(std::size_t point) const {
+    const std::size_t leaf = ((point + 1) * parts_ - 1) / count_;
+    nodes_.leaf(leaves_[leaf]).repeated |= bit(static_cast<unsigned>(point - start(leaf)));
+  }
+
  private:
   std::size_t start(std::size_t leaf) const { return count_ * leaf / parts_; }
 

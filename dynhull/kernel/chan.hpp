@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "chain.hpp"
-#include "columns.hpp"
+#include "sort.hpp"
 
 namespace dynhull {
 
@@ -123,7 +123,7 @@ class Chan {
   }
 
   Ring ring_of(Point* first, Point* last) {
-    sort_points(first, scratch_.data(), static_cast<std::size_t>(last - first));
+    sort_by_point(first, scratch_.data(), static_cast<std::size_t>(last - first));
     Chain upper(scratch_.data()), lower(first);
     for (const Point* p = last; p > first;) upper.push(*--p);
     for (const Point* p = first; p < last; ++p) lower.push(*p);

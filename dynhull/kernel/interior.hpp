@@ -2,6 +2,7 @@
 // x.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <iterator>
 #include <vector>

@@ -2,44 +2,71 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <utility>
-#include <vector>
 
-#include "leaf.hpp"
-#include "threads.hpp"
+#include "columns.hpp"
 
 namespace dynhull {
 
-// A row of a batch. What is sorted has its point in `p`, and equal points stay in the order in which they were.
+// A row of a batch.
 struct Row {
   Point p;
   std::int64_t row;
 };
 
-constexpr std::size_t SMALL_SORT = 32;       // below, insertion sort
-constexpr std::size_t ONE_PASS = 64 * LEAF;  // below, one counting pass instead of two
+inline Point point(Point p) { return p; }
+inline Point point(const Row& row) { return row.p; }
 
-// Insertion sort: linear for rows that are almost in order.
+// Linear for rows that are almost in order.
 template <class R>
 void insertion_sort(R* first, R* last) {
   for (R* next = first + (first < last); next < last; ++next) {
     const R row = *next;
     R* gap = next;
-    for (; gap > first && row.p < gap[-1].p; --gap) *gap = gap[-1];
+    for (; gap > first && point(row) < point(gap[-1]); --gap) *gap = gap[-1];
     *gap = row;
   }
 }
 
-// Scatter by a key below `buckets`, stably.
+// The least and the greatest coordinate of some rows.
+struct Range {
+  double least = INFINITE, greatest = -INFINITE;
+
+  template <double Point::* AXIS, class R>
+  static Range of(const R* rows, std::size_t count) {
+    Range range;
+    for (std::size_t i = 0; i < count; ++i) range.add(point(rows[i]).*AXIS);
+    return range;
+  }
+  void add(double value) {
+    least = std::min(least, value);
+    greatest = std::max(greatest, value);
+  }
+};
+
+// Sort by a key of two digits, stably.
 template <class R, class Key>
-void counting_pass(const R* rows, R* target, std::size_t count, std::size_t buckets, Key key) {
-  std::vector<std::uint32_t> next(buckets);
-  for (std::size_t i = 0; i < count; ++i) ++next[key(rows[i])];
-  std::uint32_t sum = 0;
-  for (std::uint32_t& start : next) sum += std::exchange(start, sum);
-  for (std::size_t i = 0; i < count; ++i) target[next[key(rows[i])]++] = rows[i];
+[[gnu::noinline]] void counting_sort(R* rows, R* scratch, std::size_t count, unsigned digit, Key key) {
+  constexpr unsigned MOST = 11;
+  std::array<std::uint32_t, 1 << MOST> low, high;  // how many have this digit, then where the next of them goes
+  const std::uint32_t digits = std::uint32_t{1} << digit;
+  std::fill_n(low.begin(), digits, 0);
+  std::fill_n(high.begin(), digits, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t k = key(rows[i]);
+    ++low[k % digits];
+    ++high[k / digits];
+  }
+  std::uint32_t low_sum = 0, high_sum = 0;
+  for (std::uint32_t i = 0; i < digits; ++i) {
+    low_sum += std::exchange(low[i], low_sum);
+    high_sum += std::exchange(high[i], high_sum);
+  }
+  for (std::size_t i = 0; i < count; ++i) scratch[low[key(rows[i]) % digits]++] = rows[i];
+  for (std::size_t i = 0; i < count; ++i) rows[high[key(scratch[i]) / digits]++] = scratch[i];
 }
 
 template <class R>
@@ -50,7 +77,7 @@ void sort_by_point(R* rows, R* scratch, std::size_t count);
 template <class R, class Key>
 bool sort_runs(R* rows, R* scratch, std::size_t count, Key key) {
   for (std::size_t i = 1; i < count; ++i) {
-    if (!(rows[i].p < rows[i - 1].p)) continue;
+    if (!(point(rows[i]) < point(rows[i - 1]))) continue;
     const std::uint32_t k = key(rows[i]);
     std::size_t from = i - 1;
     while (from > 0 && key(rows[from - 1]) == k) --from;
@@ -61,52 +88,36 @@ bool sort_runs(R* rows, R* scratch, std::size_t count, Key key) {
   return true;
 }
 
-// Stable sort by point. Counting passes over x, mapped affinely to more keys than there are rows, leave few runs of
-// equal keys; long ones (clusters, columns) are mapped again, or compared. O(n) on most inputs, O(n log n) on all.
-template <class R>
-void sort_by_point(R* rows, R* scratch, std::size_t count) {
-  if (count < SMALL_SORT) return insertion_sort(rows, rows + count);
-  const auto compare = [=] { std::stable_sort(rows, rows + count, [](const R& a, const R& b) { return a.p < b.p; }); };
-  double least = rows[0].p.x, greatest = least;
-  bool sorted = true;
-  for (std::size_t i = 1; i < count; ++i) {
-    least = std::min(least, rows[i].p.x);
-    greatest = std::max(greatest, rows[i].p.x);
-    sorted &= rows[i - 1].p <= rows[i].p;
-  }
-  if (sorted) return;
-  constexpr std::size_t DIGIT = 11;
-  const std::size_t keys = count < ONE_PASS ? std::bit_ceil(count) : std::size_t{1} << (2 * DIGIT);
-  const double scale = static_cast<double>(keys - 1) / (greatest - least);
-  if (!(scale > 0 && scale < INFINITE)) return compare();  // one column, or a width beyond every double
-  const auto key = [=](const R& row) {                     // monotone in x, whatever the rounding
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>((row.p.x - least) * scale));
-  };
-  if (count < ONE_PASS) {
-    counting_pass(rows, scratch, count, keys, key);
-    std::copy_n(scratch, count, rows);
-  } else {
-    constexpr std::uint32_t BUCKETS = 1u << DIGIT;
-    counting_pass(rows, scratch, count, BUCKETS, [=](const R& row) { return key(row) % BUCKETS; });
-    counting_pass(scratch, rows, count, BUCKETS, [=](const R& row) { return key(row) / BUCKETS; });
-  }
-  if (!sort_runs(rows, scratch, count, key)) compare();
+// Sort by one coordinate, and where that is equal by point. False where it is too unevenly spread.
+template <double Point::* AXIS, class R>
+bool sort_along(R* rows, R* scratch, std::size_t count, Range range) {
+  constexpr unsigned MOST = 11, SPARE = 6;
+  const unsigned digit = std::min<unsigned>((std::bit_width(count) + SPARE) / 2, MOST);
+  const Columns columns(range.least, range.greatest, 1u << (2 * digit));
+  if (!columns.usable()) return false;
+  const auto key = [columns](const R& row) { return columns(point(row).*AXIS); };
+  counting_sort(rows, scratch, count, digit, key);
+  return sort_runs(rows, scratch, count, key);
 }
 
-// The same by two threads: each sorts a half, then they merge the halves, one from the least to the middle, the other
-// from there. Returns which of the two places the result is in.
+// Stable sort by point. Two counting passes over x, mapped affinely to many more keys than there are rows, leave few
+// runs of equal keys; long ones (clusters, columns) are mapped again, or compared. O(n) on most inputs, O(n log n) on
+// all.
 template <class R>
-R* sort_in_two(R* rows, R* scratch, std::size_t count) {
-  const std::size_t half = count / 2;
-  R *const right = rows + half, *const end = rows + count;
-  both(true, [&] { sort_by_point(rows, scratch, half); }, [&] { sort_by_point(right, scratch + half, count - half); });
-  const auto less = [](const R& a, const R& b) { return a.p < b.p; };
-  R* const left_cut = rows + half / 2;
-  R* const right_cut = std::lower_bound(right, end, *left_cut, less);
-  both(
-      true, [&] { std::merge(rows, left_cut, right, right_cut, scratch, less); },
-      [&] { std::merge(left_cut, right, right_cut, end, scratch + (left_cut - rows) + (right_cut - right), less); });
-  return scratch;
+void sort_by_point(R* rows, R* scratch, std::size_t count) {
+  constexpr std::size_t SMALL = 24;
+  if (count < SMALL) return insertion_sort(rows, rows + count);
+  Range range;
+  bool sorted = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    range.add(point(rows[i]).x);
+    sorted &= i == 0 || point(rows[i - 1]) <= point(rows[i]);
+  }
+  if (sorted) return;
+  const bool done = range.least < range.greatest
+                        ? sort_along<&Point::x>(rows, scratch, count, range)
+                        : sort_along<&Point::y>(rows, scratch, count, Range::of<&Point::y>(rows, count));
+  if (!done) std::stable_sort(rows, rows + count, [](const R& a, const R& b) { return point(a) < point(b); });
 }
 
 }  // namespace dynhull

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "interior.hpp"
+#include "sort.hpp"
 #include "threads.hpp"
 
 namespace dynhull {
@@ -69,7 +70,7 @@ class StaticHull {
   // Put the points in columns, those below the line through the ends from left to right, then those above it from right
   // to left. Those on the line are no vertices.
   void place() {
-    constexpr std::size_t MOST_COLUMNS = 1024, A_COLUMN = 64;
+    constexpr std::size_t MOST_COLUMNS = 1024, A_COLUMN = 512;
     width_ = static_cast<unsigned>(std::min(std::bit_ceil(size() / A_COLUMN + 1), MOST_COLUMNS));
     const Columns columns(least_.x, greatest_.x, width_);
     const unsigned none = 2 * width_;
@@ -120,7 +121,7 @@ class StaticHull {
     chain.push(from);
     for (unsigned column = first; column < first + width_; ++column) {
       const std::span<Point> points(&memory_[starts_[column]], &memory_[end(column)]);
-      sort_points(points.data(), scratch.get(), points.size());
+      sort_by_point(points.data(), scratch.get(), points.size());
       if (first > 0) std::reverse(points.begin(), points.end());
       for (Point p : points) chain.push(p);
     }
@@ -164,10 +165,8 @@ inline std::optional<Interior> interior_of(const Point* points, std::size_t coun
 
 // O(n log n), and O(n) where few points are near the hull.
 inline StaticHull static_hull(const Point* points, std::size_t count, Means means = {}) {
-  constexpr std::size_t MANY = std::size_t{1} << 17, DISCARDED_FOR_ONE_PLACED = 16;  // in the same time
-  const auto threads = [&](std::size_t placed) {
-    return means.threads.value_or(placed >= MANY && several_processors());
-  };
+  constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // in the same time
+  const auto threads = [&](std::size_t placed) { return means.threads.value_or(two_threads_for(placed)); };
   const std::size_t half = count / 2;
   const StaticHull::Part first(points, half), second(points + half, count - half);
   const bool may_discard = means.discard.value_or(true);

@@ -7,7 +7,11 @@
 
 namespace dynhull {
 
-inline bool several_processors() { return std::thread::hardware_concurrency() > 1; }
+// Whether the work on so many points pays for a second thread.
+inline bool two_threads_for(std::size_t points) {
+  constexpr std::size_t MANY = std::size_t{1} << 17;
+  return points >= MANY && std::thread::hardware_concurrency() > 1;
+}
 
 // Run both, at the same time where asked to and possible.
 template <class First, class Second>

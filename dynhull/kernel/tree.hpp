@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "batch.hpp"
+#include "distinct.hpp"
 #include "sequence.hpp"
 
 namespace dynhull {
@@ -20,29 +21,14 @@ class HullTree {
   std::uint64_t changes = 0;
 
   HullTree() = default;
-  HullTree(const Point* points, std::size_t count) {
-    static_assert(sizeof(Bare) == sizeof(Point));
-    const Buffer<Bare> rows(count), scratch(count);
-    std::transform(points, points + count, rows.data(), [](Point p) { return Bare{p}; });
-    Bare* const sorted = sort(rows.data(), scratch.data(), count);
-    const auto same = [](Bare a, Bare b) { return a.p == b.p; };
-    const auto first_pair = std::adjacent_find(sorted, sorted + count, same) - sorted;
-    auto kept = static_cast<std::size_t>(first_pair);
-    std::vector<std::pair<Point, std::uint64_t>> repeated;
-    for (std::size_t i = kept, next; i < count; i = next) {
-      for (next = i + 1; next < count && same(sorted[next], sorted[i]); ++next) {
-      }
-      if (next - i > 1) repeated.emplace_back(sorted[i].p, next - i);
-      sorted[kept++] = sorted[i];
-    }
-    nodes_ = built(reinterpret_cast<const Point*>(sorted), kept);
-    size_ = count;
-    distinct_ = kept;
-    copies_.reserve(repeated.size());
-    for (const auto& [p, copies] : repeated) {  // in order: one finds its way where the one before it was
-      copies_.emplace(p, copies);
-      mark(find(nodes_, p), true);
-    }
+  HullTree(const Point* points, std::size_t count) : HullTree(Distinct(points, count)) {}
+  explicit HullTree(const Distinct& points) : size_(points.count()), distinct_(points.size()) {
+    const auto build = [&] { nodes_ = built(points.data(), points.size(), points.repeated()); };
+    const auto note_copies = [&] {
+      copies_.reserve(points.repeated().size());
+      for (const auto& [number, copies] : points.repeated()) copies_.emplace(points.data()[number], copies);
+    };
+    both(two_threads_for(size_), build, note_copies);
   }
 
   std::size_t size() const { return size_; }
@@ -140,10 +126,6 @@ class HullTree {
   std::size_t reserved_bytes() const { return nodes_.reserved_bytes(); }
 
  private:
-  struct Bare {
-    Point p;
-  };
-
   // True where the hull changed.
   bool apply(const Plan& plan, std::optional<bool> together) {
     if (plan.changes().empty()) return recount(plan), false;
@@ -166,25 +148,15 @@ class HullTree {
     return true;
   }
 
-  static Bare* sort(Bare* rows, Bare* scratch, std::size_t count) {
-    if (two_threads(count)) return sort_in_two(rows, scratch, count);
-    sort_by_point(rows, scratch, count);
-    return rows;
-  }
-
-  static Nodes built(const Point* points, std::size_t count) {
+  static Nodes built(const Point* points, std::size_t count, std::span<const Repeated> repeated = {}) {
     Nodes nodes;
     if (count == 0) return nodes;
     std::vector<Ref> refs(2 * leaves_for(count));
     nodes.reserve(leaves_for(count));
-    nodes.root = Building(nodes, points, count, refs.data()).tree(two_threads(count));
+    const Building building(nodes, points, count, refs.data());
+    nodes.root = building.tree(two_threads_for(count));
+    for (const Repeated& point : repeated) building.mark_repeated(point.number);
     return nodes;
-  }
-
-  // Whether the work on so many points pays for a second thread.
-  static bool two_threads(std::size_t count) {
-    constexpr std::size_t MANY = std::size_t{1} << 17;
-    return count >= MANY && several_processors();
   }
 
   // Note in its leaf whether a point is there more than once.

@@ -1,11 +1,8 @@
 """The fastest hull of points that stay."""
 
-from typing import Any
-
-import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Points, as_points
+from ..arrays import Points, as_pairs, as_points
 from ..implementation import kernel
 from .monotone_chain import monotone_chain
 
@@ -33,19 +30,7 @@ def convex_hull(xy: npt.ArrayLike) -> Points:
     """
     if kernel is None:
         return monotone_chain(xy)
-    # The kernel finds coordinates that are not finite while it works. Only then, or where the array is not plain, does
-    # the input go through the checks, which say what is wrong.
-    hull: Points | None = kernel.convex_hull(xy) if _is_plain(xy) else None
-    return kernel.convex_hull(as_points(xy)) if hull is None else hull
-
-
-def _is_plain(xy: Any) -> bool:
-    """Whether the kernel can read it where it is."""
-    return (
-        type(xy) is np.ndarray
-        and xy.dtype == np.float64
-        and xy.ndim == 2
-        and xy.shape[1] == 2
-        and xy.flags.c_contiguous
-        and xy.flags.aligned
-    )
+    # The kernel finds coordinates that are not finite while it works. The check says which.
+    pairs = as_pairs(xy)
+    hull: Points | None = kernel.convex_hull(pairs)
+    return kernel.convex_hull(as_points(pairs)) if hull is None else hull

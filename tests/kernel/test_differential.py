@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from inputs import cloud, point, points
 
-from dynhull import _kernel, predicates, tree
+from dynhull import DynamicHull, _kernel, predicates, tree
 
 
 def rows(pairs):
@@ -149,12 +149,19 @@ def test_a_window_that_moves(kind):
     both.agree()
 
 
-@pytest.mark.parametrize("kind", ["uniform", "grid", "columns"])
-def test_build_by_two_threads(kind):
-    rows = cloud(kind, 150_000, np.random.default_rng(3))
-    hull = _kernel.HullTree(rows)
+@pytest.mark.parametrize("n", [6_000, 150_000])  # by one thread, by two
+@pytest.mark.parametrize("kind", ["uniform", "grid", "columns", "clusters"])
+def test_build_from_many_points(kind, n):
+    rows = cloud(kind, n, np.random.default_rng(3))
+    rows[rows == 0] = -0.0
+    hull = DynamicHull(np.asfortranarray(rows))
     hull.check()
-    np.testing.assert_array_equal(hull.points(), rows[np.lexsort(rows.T[::-1])])
+    expected = rows[np.lexsort(rows.T[::-1])] + 0.0
+    assert hull.points().tobytes() == expected.tobytes()
+    assert hull.distinct == len(np.unique(rows, axis=0))
+    rows[n - 2, 1] = np.nan
+    with pytest.raises(ValueError, match=rf"^points row {n - 2} is \(.*, nan\): coordinates must be finite$"):
+        DynamicHull(rows)
 
 
 @pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])
