@@ -8,8 +8,8 @@ from .batch import Applied, Batch
 from .errors import RefusedError
 from .serial import SerialExecutor
 
-# Work on at most so many points is done at once, on the event loop: others wait a millisecond for it.
-SMALL = 64
+# Work on at most so many points, about, is done at once, on the event loop: a tenth of a millisecond.
+SMALL = 128
 
 
 @dataclass(slots=True)

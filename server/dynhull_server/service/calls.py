@@ -19,6 +19,8 @@ from .status import ANSWERED, DrainingError, StartingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
 Work = Callable[[Any, "Call"], Awaitable[Any]]
+# A message and how many bytes it had, or what is wrong with it.
+Received = tuple[Message, int] | Exception
 
 SUSPICIOUS = ("UNAUTHENTICATED", "PERMISSION_DENIED")
 
@@ -31,21 +33,28 @@ class Call:
     Attributes:
         access: what the caller may do.
         batches: how many batches the call has applied; None for calls that apply none or one.
+        message_bytes: the size of the last message that came.
     """
 
     def __init__(self, calls: "Calls", context: Context, access: Access) -> None:
         self.access = access
         self.batches: int | None = None
+        self.message_bytes = 0
         self.cutoff = calls.cutoff
         self._context = context
         self._max_message_bytes = calls.max_message_bytes
 
+    def take(self, received: Received) -> Any:
+        """The message, or raise what is wrong with it."""
+        if isinstance(received, Exception):
+            raise received
+        message, self.message_bytes = received
+        return message
+
     async def read(self) -> Any:
         """The next message, None after the last."""
-        message = await self._context.read()
-        if isinstance(message, Exception):
-            raise message
-        return None if message is grpc.aio.EOF else message
+        received = await self._context.read()
+        return None if received is grpc.aio.EOF else self.take(received)
 
     def serialize(self, message: Message) -> bytes:
         """The bytes of a message. Raises LimitExceededError where it is too large to be sent."""
@@ -123,8 +132,6 @@ class Calls:
             if self.draining:
                 raise DrainingError
             call = Call(self, context, self._authenticate(context))
-            if isinstance(request, Exception):
-                raise request
             return await work(request, call)
         except ANSWERED as error:
             status = rpc_status.to_status(error_status(error, None if call is None else call.batches))

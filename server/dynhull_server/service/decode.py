@@ -25,6 +25,7 @@ LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
 ONE_POINT = struct.Struct("<dd")
+PACKED, DOUBLE = np.dtype("<f8"), np.dtype(np.float64)
 NO_POINTS = np.empty((0, 2))
 MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
 LARGEST_SEQUENCE = 2**63 - 1
@@ -91,11 +92,6 @@ def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, i
     return request.prefix, request.page_token, min(request.page_size or DEFAULT_PAGE, LARGEST_PAGE)
 
 
-def batch_rows(batch: batch_pb2.Batch) -> int:
-    """How many points a batch names, about: by its size, for to look at the bytes is to copy them."""
-    return int(batch.ByteSize()) // BYTES_PER_POINT
-
-
 def decode_points(points: points_pb2.Points, field: str) -> Points:
     """An (n, 2) array of finite doubles without negative zeros."""
     packed, coordinates = points.packed, points.coordinates
@@ -111,8 +107,8 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
     if len(coordinates) % 2:
         problem = "two coordinates a point, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
-    values = np.frombuffer(packed, "<f8") if packed else coordinates
-    given: Points = np.asarray(values, np.float64).reshape(-1, 2)
+    values = np.frombuffer(packed, PACKED) if packed else coordinates
+    given: Points = np.asarray(values, DOUBLE).reshape(-1, 2)
     xy = plain_points(given)
     if xy is None:
         raise _bad_row(~np.isfinite(given).all(axis=1), field, given, "coordinates must be finite")

@@ -67,7 +67,7 @@ class HullService:
         with self._written(call, request.name) as hull:
             if not request.HasField("batch"):
                 raise decode.InvalidFieldError("batch", "", "a batch is required")
-            write = decode_write(request, decode.decode_producer(request.producer))
+            write = decode_write(request, call.message_bytes, decode.decode_producer(request.producer))
             try:
                 applied = await hull.apply(write)
             except Exception:

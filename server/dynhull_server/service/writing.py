@@ -18,12 +18,12 @@ MOST_ROWS = 65_536
 MOST_BATCHES = 1_024
 
 
-def decode_write(request: Any, producer: str) -> Write:
+def decode_write(request: Any, message_bytes: int, producer: str) -> Write:
     """The batch of a request, to be decoded when its turn comes."""
     batch = request.batch
     return Write(
         lambda: decode.decode_batch(batch),
-        decode.batch_rows(batch),
+        message_bytes // decode.BYTES_PER_POINT,  # about: to look at the points is to copy them
         producer,
         decode.decode_sequence(producer, request.sequence),
     )
@@ -103,6 +103,6 @@ class BatchStream:
             if message.sequence:
                 raise decode.InvalidFieldError("sequence", message.sequence, "there is no batch to number")
             return
-        write = decode_write(message, self._producer)
+        write = decode_write(message, self._call.message_bytes, self._producer)
         self._untold.append((write.sequence, time.perf_counter()))
         self._writer.write(write)
