@@ -44,9 +44,9 @@ class BatchStream:
         self._hull = hull
         self._producer = decode.decode_producer(first.producer)
         self._metrics = metrics
-        self._news = asyncio.Event()
+        self._news: asyncio.Future[None] | None = None  # while the caller waits for some
         self._room = asyncio.Event()
-        self._writer = hull.writer(self._news.set)
+        self._writer = hull.writer(self._notify)
         self._untold: deque[tuple[int, float]] = deque()
         self._failure: Exception | None = None
         self._take(first)
@@ -58,7 +58,7 @@ class BatchStream:
         """
         writer = self._writer
         reading = asyncio.create_task(self._read())
-        reading.add_done_callback(lambda _: self._news.set())
+        reading.add_done_callback(lambda _: self._notify())
         try:
             while True:
                 while writer.applied:
@@ -74,10 +74,14 @@ class BatchStream:
                     if self._failure is not None:
                         raise self._failure
                     return
-                self._news.clear()
-                await self._news.wait()
+                self._news = asyncio.get_running_loop().create_future()
+                await self._news
         finally:
             reading.cancel()
+
+    def _notify(self) -> None:
+        if self._news is not None and not self._news.done():
+            self._news.set_result(None)
 
     async def _read(self) -> None:
         """Take messages until the last, or until something is wrong with one."""
