@@ -8,8 +8,8 @@
 
 namespace dynhull {
 
-// From one place into another, in which negative zeros become positive. It stays in its bounds even where the points
-// change meanwhile.
+// From one place into another, in which negative zeros become positive. The result is in order even where another
+// thread changes the points meanwhile.
 class ColumnSort {
  public:
   ColumnSort(const Point* from, Point* to, std::size_t count, bool threads)
@@ -77,6 +77,19 @@ class ColumnSort {
     const auto middle = std::lower_bound(starts_.begin(), starts_.begin() + width_, half_) - starts_.begin();
     const auto cut = static_cast<unsigned>(middle);
     both(threads_, [&] { parts_[0].repeated = sort(0, cut); }, [&] { parts_[1].repeated = sort(cut, width_); });
+    if (in_order()) return;
+    Point* const end = to_ + starts_[width_];
+    std::sort(to_, end);
+    parts_[0].repeated = std::adjacent_find(to_, end) != end;
+  }
+
+  // Whether the columns are. Not where another thread has changed points between a look at their x and their copy.
+  bool in_order() const {
+    for (unsigned column = 1; column < width_; ++column) {
+      const std::size_t start = starts_[column];
+      if (0 < start && start < starts_[width_] && to_[start] < to_[start - 1]) return false;
+    }
+    return true;
   }
 
   // Sort each of the columns first..last. Whether some points are equal: those are in one column.

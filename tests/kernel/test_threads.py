@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from dynhull import _kernel
+from dynhull import DynamicHull, _kernel
 
 ROWS = 4000
 
@@ -120,3 +120,24 @@ def test_fork_during_batches():
         writer.join()
     tree.check()
     assert len(tree) == 1000
+
+
+def test_points_that_another_thread_changes_meanwhile():
+    """Which points the hull gets is anybody's guess, but it is whole."""
+    points = np.random.default_rng(0).random((200_000, 2))
+    orders = points.copy(), points[::-1].copy()
+    done = threading.Event()
+
+    def change():
+        while not done.is_set():
+            for order in orders:
+                points[:] = order
+
+    with ThreadPoolExecutor(1) as pool:
+        changing = pool.submit(change)
+        try:
+            for _ in range(8):
+                DynamicHull(points).check()
+        finally:
+            done.set()
+        changing.result()
