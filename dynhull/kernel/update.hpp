@@ -35,14 +35,24 @@ inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
 // One branch, which goes the same way almost always, where || makes two that each go either way.
 inline bool either(bool first, bool second) { return first + second != 0; }
 
+// From v up, the first node whose bridge reaches over the x from `left` to `right`, where the chain below it changed.
+// Every bridge with an end between them does, and so does one whose ends have the same x as they.
+inline Ref first_near(const Nodes& nodes, Ref v, Side side, double left, double right) {
+  for (; v != NONE; v = nodes.node(v).parent) {
+    const Edge& edge = nodes.bridge(v, side);
+    if (!either(right < edge.a.x, left > edge.b.x)) return v;
+  }
+  return NONE;
+}
+
 // Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
 //
 // `neighbours` are those of p on the chain, infinite where p is its end. With one of them between p and the bridge, the
 // chain turns before it gets there, and p lies inside the bridge's line.
 inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
-  for (; v != NONE; v = nodes.node(v).parent) {
+  const auto next = [&](Ref from) { return first_near(nodes, from, side, neighbours.a.x, neighbours.b.x); };
+  for (v = next(v); v != NONE; v = next(nodes.node(v).parent)) {
     Edge& edge = nodes.bridge(v, side);
-    if (either(neighbours.b<edge.a, neighbours.a> edge.b)) continue;
     const Node& node = nodes.node(v);
     const bool on_left = p < node.separator;
     const bool beyond = on_left ? p < edge.a : p > edge.b;
@@ -79,9 +89,10 @@ inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone, Edge 
 //
 // `neighbours` are those of p on the chain, infinite where p was its end.
 inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
-  for (; v != NONE; v = nodes.node(v).parent) {
+  const auto next = [&](Ref from) { return first_near(nodes, from, side, p.x, p.x); };
+  for (v = next(v); v != NONE; v = next(nodes.node(v).parent)) {
     Edge& edge = nodes.bridge(v, side);
-    if (either(p<edge.a, p> edge.b)) continue;
+    if (p < edge.a || p > edge.b) continue;
     if (p != edge.a && p != edge.b) return false;
     const Edge old = edge;
     edge = bridge_after(nodes, v, side, p, neighbours);
