@@ -100,8 +100,9 @@ inline Ref join(Nodes& nodes, Ref left, Ref right, Ref v) {
   return result;
 }
 
-// Cut a full leaf in two. The chain stays as it is, and its edge across the cut is the new node's bridge.
-inline void split(Nodes& nodes, Ref left) {
+// Cut a full leaf in two. The chain stays as it is, and its edge across the cut is the new node's bridge. Returns the
+// new leaf, to the right.
+inline Ref split(Nodes& nodes, Ref left) {
   const Ref right = nodes.take_leaf(), v = nodes.take_node();
   Leaf& low = nodes.leaf(left);
   Leaf& high = nodes.leaf(right);
@@ -128,6 +129,7 @@ inline void split(Nodes& nodes, Ref left) {
   nodes.link(v, 0, left);
   nodes.link(v, 1, right);
   rebalance(nodes, parent);
+  return right;
 }
 
 // Take an empty leaf out; its sibling takes their parent's place. Returns the node above, to rebalance from.

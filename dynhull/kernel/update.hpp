@@ -113,8 +113,9 @@ inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
     return 0b11;
   }
   if (nodes.leaf(place.leaf).size == LEAF) {
-    split(nodes, place.leaf);
-    place = find(nodes, p);
+    const Ref right = split(nodes, place.leaf);
+    const unsigned half = nodes.leaf(place.leaf).size;
+    if (place.entry > half) place = {right, place.entry - half, false};
   }
   Leaf& leaf = nodes.leaf(place.leaf);
   const unsigned on_leaf = leaf.add(place.entry, p);
