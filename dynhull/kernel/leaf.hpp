@@ -55,14 +55,16 @@ struct Leaf {
     for (unsigned i = 0; i < offsetof(Leaf, y); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
   }
 
-  // The first entry whose x is not less. A binary search without branches, over all LEAF.
-  unsigned find_x(double least) const {
-    unsigned from = 0;
-    for (unsigned rest = LEAF; rest > 0; rest /= 2) {
-      const unsigned half = (rest + 1) / 2;
-      from += half & -static_cast<unsigned>(x[from + half - 1] < least);
-    }
-    return from;
+  // The first entry whose x is not less, of all LEAF, without branches: halves, and in the end quarters, whose three
+  // comparisons do not wait for each other.
+  template <unsigned REST = LEAF>
+  unsigned find_x(double least, std::size_t from = 0) const {
+    constexpr unsigned PARTS = REST > 15 ? 2 : 4, PART = REST / PARTS + 1;
+    std::size_t parts = 0;
+    for (unsigned i = PART; i <= REST; i += PART) parts += x[from + i - 1] < least;
+    from += std::min<std::size_t>(parts * PART, REST - (PART - 1));
+    if constexpr (PART > 1) return find_x<PART - 1>(least, from);
+    return static_cast<unsigned>(from);
   }
   // The first entry that is not less than p, from the first whose x is not less: y decides between equal x.
   unsigned find_y(unsigned from, Point p) const {

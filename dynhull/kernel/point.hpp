@@ -13,12 +13,14 @@ struct Point {
 // The lexicographic order, without branches: & and | on purpose.
 inline bool operator==(Point p, Point q) { return (p.x == q.x) & (p.y == q.y); }
 inline bool operator<(Point p, Point q) {
-  if (p.x == q.x) [[unlikely]] return p.y < q.y;
+  if (p.x == q.x) [[unlikely]]
+    return p.y < q.y;
   return p.x < q.x;
 }
 inline bool operator>(Point p, Point q) { return q < p; }
 inline bool operator<=(Point p, Point q) {
-  if (p.x == q.x) [[unlikely]] return p.y <= q.y;
+  if (p.x == q.x) [[unlikely]]
+    return p.y <= q.y;
   return p.x < q.x;
 }
 inline bool operator>=(Point p, Point q) { return q <= p; }

@@ -40,7 +40,7 @@ inline bool either(bool first, bool second) { return first + second != 0; }
 inline Ref first_near(const Nodes& nodes, Ref v, Side side, double left, double right) {
   for (; v != NONE; v = nodes.node(v).parent) {
     const Edge& edge = nodes.bridge(v, side);
-    if (!either(right < edge.a.x, left > edge.b.x)) return v;
+    if (!either(right<edge.a.x, left> edge.b.x)) return v;
   }
   return NONE;
 }
