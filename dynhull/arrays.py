@@ -1,6 +1,7 @@
 """Arrays of points as they come in: converted when that is exact, refused with the first bad row when it is not."""
 
 import math
+import sys
 from collections.abc import Iterable
 from numbers import Number
 from typing import Any
@@ -188,6 +189,14 @@ def plain_points(xy: npt.NDArray[Any]) -> Points | None:
         return None
     copy = _copy(xy)
     return copy if np.isfinite(copy).all() else None
+
+
+def packed_points(packed: bytes) -> Points | None:
+    """The points whose coordinates are these little-endian doubles; None where one is not finite."""
+    if kernel is not None and sys.byteorder == "little":
+        points: Points | None = kernel.packed_points(packed)
+        return points
+    return plain_points(np.frombuffer(packed, "<f8").astype(np.float64, copy=False).reshape(-1, 2))
 
 
 def _finite(array: Points, name: str) -> Points:

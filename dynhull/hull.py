@@ -14,8 +14,6 @@ from .tree import HullTree
 
 T = TypeVar("T")
 
-INSERT, DELETE = np.array([1], np.int8), np.array([-1], np.int8)
-
 
 class MissingPointError(KeyError):
     """A delete names a point that is not there.
@@ -80,8 +78,7 @@ class DynamicHull:
 
     def insert_many(self, xy: npt.ArrayLike) -> int:
         """Add points as one batch. Returns how many. O(log² n) each, O((n + k) log k) for k >= n."""
-        points = as_points(xy)
-        return self._tree.apply(INSERT.repeat(len(points)), points, False)[0]
+        return self._apply(+1, xy, "raise")
 
     def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
         """Remove points as one batch. Returns how many were removed. O(log² n) each.
@@ -91,8 +88,7 @@ class DynamicHull:
             missing: for a point that is not there (often enough): "raise" raises KeyError, which names its row, before
                 anything changes; "ignore" passes over it.
         """
-        points = as_points(xy)
-        return self._apply(DELETE.repeat(len(points)), points, missing)
+        return self._apply(-1, xy, missing)
 
     def apply(self, ops: npt.ArrayLike, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
         """Apply inserts and deletes as one batch. Returns how many rows were applied. O(log² n) each.
@@ -105,21 +101,21 @@ class DynamicHull:
             xy: (k, 2) array-like.
             missing: as for `delete_many`.
         """
-        points = as_points(xy)
+        points = as_pairs(xy)
         return self._apply(as_operations(ops, len(points)), points, missing)
 
     def clear(self) -> None:
         """Remove every point."""
         self._tree.clear()
 
-    def _apply(self, ops: npt.NDArray[np.int8], points: Points, missing: str) -> int:
+    def _apply(self, ops: int | npt.NDArray[np.int8], xy: npt.ArrayLike, missing: str) -> int:
         if missing not in ("raise", "ignore"):
             raise ValueError(f'missing must be "raise" or "ignore", got {missing!r}')
-        applied, row = self._tree.apply(ops, points, missing == "ignore")
-        if row >= 0 and missing == "raise":
-            x, y = points[row].tolist()
-            raise MissingPointError((x, y), row)
-        return applied
+        try:
+            return self._tree.apply(ops, xy, missing == "ignore")
+        except KeyError as error:
+            x, y, row = error.args
+            raise MissingPointError((x, y), row) from None
 
     # What is there
 

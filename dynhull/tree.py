@@ -108,25 +108,31 @@ class HullTree:
         self.changes += changed
         return changed
 
-    def apply(self, ops: npt.NDArray[np.int8], xy: Points, ignore_missing: bool) -> tuple[int, int]:
+    def apply(self, ops: int | npt.NDArray[np.int8], xy: npt.ArrayLike, ignore_missing: bool) -> int:
         """Insert the rows with +1 and delete those with -1, as a set: the order of rows does not matter.
 
+        Args:
+            ops: a number a row, or one for all.
+            xy: (n, 2) array-like, checked by `as_points`.
+            ignore_missing: whether to pass over rows that delete what is not there.
+
         Returns:
-            How many rows were applied, and the first row that deletes a point which is not there, or -1. With such a
-            row nothing is applied, unless missing points are to be ignored.
+            How many rows were applied.
+
+        Raises:
+            KeyError: x, y and row of the first one that deletes what is not there; nothing has been applied.
         """
-        points = _tuples(xy)
+        points = _tuples(as_points(xy))
+        ops = np.broadcast_to(ops, len(points))
         net = Counter(p for p, op in zip(points, ops.tolist(), strict=True) if op > 0)
-        applied, first_missing = len(points), -1
+        applied = len(points)
         for row in np.flatnonzero(ops < 0).tolist():
             p = points[row]
             if net[p] + self._count(p) > 0:
                 net[p] -= 1
                 continue
-            if first_missing < 0:
-                first_missing = row
             if not ignore_missing:
-                return 0, first_missing
+                raise KeyError(*p, row)
             applied -= 1
         if self._distinct <= sum(1 for change in net.values() if change > 0):
             changed = self._rebuild(net)
@@ -138,7 +144,7 @@ class HullTree:
                 elif change < 0:
                     changed |= self._delete(p, -change)
         self.changes += changed
-        return applied, first_missing
+        return applied
 
     def _insert(self, p: Point, copies: int) -> bool:
         self._size += copies
@@ -169,11 +175,11 @@ class HullTree:
 
     def _delete(self, p: Point, copies: int) -> bool:
         if self._root is None:
-            raise KeyError(p)
+            raise KeyError(*p)
         path, leaf = self._path(p)
         i = bisect_left(leaf.points, p)
         if i == len(leaf.points) or leaf.points[i] != p:
-            raise KeyError(p)
+            raise KeyError(*p)
         self._size -= copies
         left_over = self._copies.pop(p, 1) - copies
         if left_over > 1:

@@ -3,6 +3,8 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 
+#include <cstring>
+
 #include "chains.hpp"
 #include "chan.hpp"
 #include "check.hpp"
@@ -16,7 +18,7 @@ namespace dynhull {
 namespace {
 
 using Rows = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-using Ops = nb::ndarray<const std::int8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+using OpRows = nb::ndarray<const std::int8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
 const Point* points_of(const Rows& rows) {
   static_assert(sizeof(Point) == 2 * sizeof(double));
@@ -60,6 +62,9 @@ double coordinate(nb::handle value, const char* name) {
   return nb::cast<double>(nb::module_::import_("dynhull.arrays").attr("as_coordinate")(value, name));
 }
 
+// What dynhull.arrays makes of points, or an error that says where one is wrong.
+nb::object as_points(const nb::object& xy) { return nb::module_::import_("dynhull.arrays").attr("as_points")(xy); }
+
 // The tree of an array's rows; ValueError where a coordinate is not finite.
 HullTree tree_of(const nb::object& xy) {
   const auto rows = nb::cast<Rows>(xy);
@@ -68,7 +73,7 @@ HullTree tree_of(const nb::object& xy) {
     const Distinct points(points_of(rows), rows.shape(0));
     if (points.finite()) return HullTree(points);
   }
-  return tree_of(nb::module_::import_("dynhull.arrays").attr("as_points")(xy));  // which says where
+  return tree_of(as_points(xy));
 }
 
 class Hull {
@@ -101,13 +106,11 @@ class Hull {
     return removal == HullTree::Removal::HULL_CHANGED;
   }
 
-  nb::tuple apply(const Ops& ops, const Rows& rows, bool ignore_missing, std::optional<bool> together) {
-    if (ops.shape(0) != rows.shape(0)) throw nb::value_error("ops and xy differ in length");
-    const Applied applied = [&] {
-      const Writing turn(turns_, rows.shape(0));
-      return tree_.apply(ops.data(), points_of(rows), rows.shape(0), ignore_missing, together);
-    }();
-    return nb::make_tuple(applied.rows, applied.first_missing);
+  std::int64_t apply_all(std::int8_t op, const nb::object& xy, bool ignore_missing, std::optional<bool> together) {
+    return apply({&op, 0}, ANY_NUMBER, xy, ignore_missing, together);
+  }
+  std::int64_t apply_each(const OpRows& ops, const nb::object& xy, bool ignore_missing, std::optional<bool> together) {
+    return apply({ops.data()}, ops.shape(0), xy, ignore_missing, together);
   }
 
   nb::object points() {
@@ -206,6 +209,31 @@ class Hull {
   }
 
  private:
+  static constexpr std::size_t ANY_NUMBER = std::numeric_limits<std::size_t>::max();
+
+  std::int64_t apply(Ops ops, std::size_t ops_count, const nb::object& xy, bool ignore_missing,
+                     std::optional<bool> together) {
+    Rows rows;
+    if (!nb::try_cast(xy, rows, false)) rows = nb::cast<Rows>(as_points(xy));
+    const std::size_t count = rows.shape(0);
+    if (ops_count != ANY_NUMBER && ops_count != count) throw nb::value_error("ops and xy differ in length");
+    const std::optional<Applied> applied = [&]() -> std::optional<Applied> {
+      const Writing turn(turns_, count);
+      try {
+        return tree_.apply(ops, points_of(rows), count, ignore_missing, together);
+      } catch (const NotFinite&) {
+        return {};
+      }
+    }();
+    if (!applied) return apply(ops, ops_count, as_points(xy), ignore_missing, together);
+    if (applied->first_missing >= 0 && !ignore_missing) {
+      const Point p = Plain()(points_of(rows)[applied->first_missing]);
+      PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y, applied->first_missing).ptr());
+      throw nb::python_error();
+    }
+    return applied->rows;
+  }
+
   // The tree for a moment under the GIL: to read, or to write.
   const HullTree& settled() {
     turns_.await_readable();
@@ -270,26 +298,36 @@ nb::tuple chan(const Rows& rows) {
   return nb::make_tuple(array_of(hull.vertices), rounds);
 }
 
-// What dynhull.arrays.as_points makes of an array; None where it has more to look at than doubles that may not be
-// finite. Copied first, checked then: with the GIL let go of, other threads may write to the original.
-nb::object plain_points(nb::handle xy) {
-  Rows rows;
-  if (!nb::try_cast(xy, rows, false)) return nb::none();
-  const std::size_t count = rows.shape(0);
+// The points as they are kept; None where a coordinate is not finite. `at` gives point i, which another thread may
+// write to meanwhile.
+template <class At>
+nb::object plain_copy(std::size_t count, At at) {
   const Output<double> output(2 * count);
-  Point strange = {0, 0};  // a finite number minus itself is 0, any other is NaN
+  Plain plain;
   {
     std::optional<nb::gil_scoped_release> release;
     if (count > FEW_ROWS) release.emplace();
     auto* const copies = reinterpret_cast<Point*>(output.data);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Point p = points_of(rows)[i], copy = {p.x + 0.0, p.y + 0.0};  // -0.0 is 0.0
-      copies[i] = copy;
-      strange.x += copy.x - copy.x;
-      strange.y += copy.y - copy.y;
-    }
+    for (std::size_t i = 0; i < count; ++i) copies[i] = plain(at(i));
   }
-  return strange == Point{0, 0} ? output.array({count, 2}) : nb::none();
+  return plain.finite() ? output.array({count, 2}) : nb::none();
+}
+
+// What dynhull.arrays.as_points makes of an array; None where it has more to look at than doubles that may not be
+// finite.
+nb::object plain_points(nb::handle xy) {
+  Rows rows;
+  if (!nb::try_cast(xy, rows, false)) return nb::none();
+  return plain_copy(rows.shape(0), [&](std::size_t i) { return points_of(rows)[i]; });
+}
+
+nb::object packed_points(const nb::bytes& packed) {
+  if (packed.size() % sizeof(Point) != 0) throw nb::value_error("a point is 16 bytes");
+  return plain_copy(packed.size() / sizeof(Point), [data = packed.c_str()](std::size_t i) {
+    Point p;
+    std::memcpy(&p, data + i * sizeof(Point), sizeof(Point));
+    return p;
+  });
 }
 
 Point point_of(nb::handle pair) {
@@ -357,10 +395,13 @@ NB_MODULE(_kernel, module) {
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
       .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
       .def("clear", &Hull::clear, "Remove every point.")
+      .def("apply", &Hull::apply_all, "op"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+           "Insert the rows, +1, or delete them, -1.")
       .def(
-          "apply", &Hull::apply, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+          "apply", &Hull::apply_each, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
           "Insert the rows with +1 and delete those with -1, as a set, together or one by one: the batch decides where "
-          "not told. Returns how many rows were applied, and the first row that deletes what is not there, or -1.")
+          "not told. Returns how many rows were applied. A row that deletes what is not there raises "
+          "KeyError(x, y, row), unless missing points are to be ignored.")
       .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
       .def("chain", &Hull::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
@@ -392,6 +433,8 @@ NB_MODULE(_kernel, module) {
       "a * b - c * d as the predicates' filters compute it: three roundings. For the test of the build's flags.");
   module.def("plain_points", &plain_points, "xy"_a,
              "A copy of an (n, 2) array of finite doubles without negative zeros; None of anything else.");
+  module.def("packed_points", &packed_points, "packed"_a,
+             "The points whose doubles these bytes are, without negative zeros; None where one is not finite.");
   module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
              "The static hull's vertices, counter-clockwise from the least; None where a coordinate is not finite. "
              "Whether to discard points by a sample's hull first, and to use two threads, the input decides where not "

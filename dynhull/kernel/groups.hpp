@@ -33,16 +33,29 @@ struct Group {
   std::uint32_t first = 0;  // of its rows; the next group's is the end
 };
 
+// What the rows of a batch do, +1 to insert and -1 to delete: a number each, or, a step of 0, one for all.
+struct Ops {
+  const std::int8_t* first;
+  std::size_t step = 1;
+
+  bool deletes(std::size_t row) const { return first[step * row] < 0; }
+};
+
+struct NotFinite {};  // thrown: a coordinate is not
+
 class Groups {
  public:
   std::int64_t rows_applied;
   std::int64_t first_missing = -1;  // the first row that deletes what is not there
   std::int64_t growth = 0;          // points more than before, with multiplicity
 
-  Groups(const std::int8_t* ops, const Point* points, std::size_t count)
+  Groups(Ops ops, const Point* points, std::size_t count)
       : rows_applied(static_cast<std::int64_t>(count)), rows_(few(count)), groups_(count + 1) {
     const Buffer<Row> scratch(count);
-    for (std::size_t i = 0; i < count; ++i) rows_[i] = {points[i], static_cast<std::int64_t>(2 * i + (ops[i] < 0))};
+    Plain plain;
+    for (std::size_t i = 0; i < count; ++i)
+      rows_[i] = {plain(points[i]), static_cast<std::int64_t>(2 * i + ops.deletes(i))};
+    if (!plain.finite()) throw NotFinite();
     sort_by_point(rows_.data(), scratch.data(), count);
     Group* next = groups_.data();
     for (std::size_t i = 0; i < count; ++i)

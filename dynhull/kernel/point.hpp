@@ -32,6 +32,22 @@ struct Edge {
   Point a, b;
 };
 
+// Makes points what trees hold: no zero is negative, so that equal points are the same; and sees whether all are
+// finite.
+class Plain {
+ public:
+  Point operator()(Point p) {
+    const Point plain = {p.x + 0.0, p.y + 0.0};
+    strange_.x += plain.x - plain.x;  // 0, or NaN where it is not finite
+    strange_.y += plain.y - plain.y;
+    return plain;
+  }
+  bool finite() const { return strange_ == Point{0, 0}; }
+
+ private:
+  Point strange_ = {0, 0};
+};
+
 // Both sides share all code: turned(side, orientation(a, b, p)) > 0 says that p lies outside the edge from a to b.
 enum Side : int { UPPER = 0, LOWER = 1 };
 constexpr Side SIDES[] = {UPPER, LOWER};

@@ -14,7 +14,7 @@ struct Applied {
   std::int64_t first_missing;
 };
 
-// Coordinates are finite and no zero is negative: callers see to it. Where an update throws (std::bad_alloc), nothing
+// Coordinates of single points are finite and no zero is negative: callers see to it. Where an update throws, nothing
 // has changed.
 class HullTree {
  public:
@@ -89,7 +89,8 @@ class HullTree {
 
   // Insert the rows with +1 and delete those with -1, as a set. With a row that deletes what is not there nothing is
   // applied, unless missing points are to be ignored. Together or one by one, the batch decides where not told.
-  Applied apply(const std::int8_t* ops, const Point* points, std::size_t count, bool ignore_missing,
+  // The points are copied before anything is made of them; throws NotFinite where one is not.
+  Applied apply(Ops ops, const Point* points, std::size_t count, bool ignore_missing,
                 std::optional<bool> together = {}) {
     Groups groups(ops, points, count);
     groups.descend(nodes_);

@@ -193,7 +193,7 @@ class Life {
     }
     const std::uint64_t changes = tree_.changes;
     Applied result{};
-    with_failures([&] { result = tree_.apply(ops.data(), points.data(), count, ignore); });
+    with_failures([&] { result = tree_.apply({ops.data()}, points.data(), count, ignore); });
     if (missing >= 0 && !ignore)
       applied = 0;
     else

@@ -33,11 +33,11 @@ def test_writers_and_readers():
         random = np.random.default_rng(number)
         mine = random.random((ROWS, 2)) + number
         for _ in range(10):
-            tree.apply(np.ones(ROWS, np.int8), mine, False)
+            tree.apply(+1, mine, False)
             tree.insert(*mine[0])
-            tree.apply(np.full(ROWS, -1, np.int8), mine, False)
+            tree.apply(-1, mine, False)
             tree.delete(*mine[0])
-        tree.apply(np.ones(100, np.int8), np.ascontiguousarray(mine[:100]), False)
+        tree.apply(+1, mine[:100], False)
 
     def read(number):
         random = np.random.default_rng(number)
@@ -77,7 +77,7 @@ def test_other_threads_run_during_a_batch():
     tree = _kernel.HullTree()
     counter.start()
     began = len(counted)
-    tree.apply(np.ones(len(rows), np.int8), rows, False)
+    tree.apply(+1, rows, False)
     done.set()
     counter.join()
     assert began == 0
@@ -91,13 +91,12 @@ def test_fork_during_batches():
     """Whenever the fork comes, the child's hull is whole, and both processes go on."""
     tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
     stop = threading.Event()
-    plus, minus = np.ones(ROWS, np.int8), np.full(ROWS, -1, np.int8)
     rows = np.random.default_rng(1).random((ROWS, 2))
 
     def write():
         while not stop.is_set():
-            tree.apply(plus, rows, False)
-            tree.apply(minus, rows, False)
+            tree.apply(+1, rows, False)
+            tree.apply(-1, rows, False)
 
     writer = threading.Thread(target=write)
     writer.start()
@@ -108,7 +107,7 @@ def test_fork_during_batches():
                 status = 1
                 try:
                     tree.check()
-                    tree.apply(plus, rows, False)
+                    tree.apply(+1, rows, False)
                     tree.insert(0.5, 0.5)
                     tree.check()
                     status = 0
@@ -122,10 +121,14 @@ def test_fork_during_batches():
     assert len(tree) == 1000
 
 
-def test_points_that_another_thread_changes_meanwhile():
-    """Which points the hull gets is anybody's guess, but it is whole."""
-    points = np.random.default_rng(0).random((200_000, 2))
-    orders = points.copy(), points[::-1].copy()
+@pytest.mark.parametrize("before", [0, 1000])
+def test_points_that_another_thread_changes_meanwhile(before):
+    """Which points the hull gets is anybody's guess, or that it refuses them; it is whole, and all or none are there."""
+    random = np.random.default_rng(0)
+    points, few = random.random((200_000, 2)), random.random((before, 2))
+    spoiled = points.copy()
+    spoiled[::1000] = np.nan
+    orders = points.copy(), points[::-1].copy(), spoiled
     done = threading.Event()
 
     def change():
@@ -137,7 +140,14 @@ def test_points_that_another_thread_changes_meanwhile():
         changing = pool.submit(change)
         try:
             for _ in range(8):
-                DynamicHull(points).check()
+                hull = DynamicHull(few)
+                try:
+                    added = hull.insert_many(points) if before else len(hull := DynamicHull(points))
+                except ValueError:
+                    added = 0
+                assert len(hull) == before + added
+                assert np.isfinite(hull.points()).all()
+                hull.check()
         finally:
             done.set()
         changing.result()

@@ -50,43 +50,24 @@ def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
     """
     inserted, to_delete = len(batch.inserts), len(batch.deletes)
     changes = hull.changes
-    if inserted + to_delete == 1:
-        deleted = _apply_one(hull, batch)
-    elif to_delete == 0:
-        deleted = 0
-        hull.insert_many(batch.inserts)
-    else:
-        deleted = _apply_many(hull, batch)
+    deleted = _apply(hull, batch)
     return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))
 
 
-def _apply_one(hull: DynamicHull, batch: Batch) -> int:
-    """One insert or one delete, what most messages of a live feed hold: without the cost of arrays."""
-    if len(batch.inserts):
-        x, y = batch.inserts[0].tolist()
-        hull.insert(x, y)
-        return 0
-    x, y = batch.deletes[0].tolist()
-    try:
-        hull.delete(x, y)
-    except MissingPointError as error:
-        if batch.count_missing:
-            return 0
-        raise PointMissingError("deletes", 0, error.point) from None
-    return 1
-
-
-def _apply_many(hull: DynamicHull, batch: Batch) -> int:
+def _apply(hull: DynamicHull, batch: Batch) -> int:
+    """Returns how many points were deleted."""
     inserts, deletes = batch.inserts, batch.deletes
     missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
     try:
+        if not len(deletes):
+            hull.insert_many(inserts)
+            return 0
         if not len(inserts):
             return hull.delete_many(deletes, missing)
         ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
         applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
     except MissingPointError as error:
-        if error.row is None:
-            raise
+        assert error.row is not None  # of a batch
         row = error.row - len(inserts)
         first_origin = len(deletes) - batch.moves
         if row < first_origin:

@@ -2,14 +2,13 @@
 
 import math
 import re
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.arrays import Points, plain_points
+from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.batch import Batch
@@ -24,8 +23,6 @@ DEFAULT_SAMPLE = 1000
 LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
-ONE_POINT = struct.Struct("<dd")
-PACKED, DOUBLE = np.dtype("<f8"), np.dtype(np.float64)
 NO_POINTS = np.empty((0, 2))
 MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
 LARGEST_SEQUENCE = 2**63 - 1
@@ -95,10 +92,6 @@ def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, i
 def decode_points(points: points_pb2.Points, field: str) -> Points:
     """An (n, 2) array of finite doubles without negative zeros."""
     packed, coordinates = points.packed, points.coordinates
-    if len(packed) == BYTES_PER_POINT and not coordinates:  # a live feed: numpy would take longer than all the rest
-        x, y = ONE_POINT.unpack(packed)
-        if math.isfinite(x) and math.isfinite(y):
-            return np.array(((x + 0.0, y + 0.0),))
     if packed and coordinates:
         raise InvalidFieldError(field, "packed and coordinates", "use one encoding or the other")
     if len(packed) % BYTES_PER_POINT:
@@ -107,10 +100,9 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
     if len(coordinates) % 2:
         problem = "two coordinates a point, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
-    values = np.frombuffer(packed, PACKED) if packed else coordinates
-    given: Points = np.asarray(values, DOUBLE).reshape(-1, 2)
-    xy = plain_points(given)
+    xy = packed_points(packed) if packed else plain_points(np.array(coordinates, float).reshape(-1, 2))
     if xy is None:
+        given = np.array(np.frombuffer(packed, "<f8") if packed else coordinates, float).reshape(-1, 2)
         raise _bad_row(~np.isfinite(given).all(axis=1), field, given, "coordinates must be finite")
     return xy
 
