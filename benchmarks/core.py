@@ -264,7 +264,7 @@ def crossover(n, make, random, rivals) -> Iterator[Row]:
 
 
 def call(n, make, random, rivals) -> Iterator[Row]:
-    """One insert called from Python: into a hull that was built at once, whose leaves are full alike, and a grown one."""
+    """One insert called from Python, into a hull that was built at once, whose leaves are alike, and a grown one."""
     points = make(n, random)
     rows = make(2000, random).tolist()
     grown = DynamicHull()

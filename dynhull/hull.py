@@ -60,7 +60,7 @@ class DynamicHull:
     _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
-        self._tree = self._tree_type(None if points is None else as_pairs(points))
+        self._tree = self._tree_type(points)
         self._measured: tuple[int, dict[str, Any]] = (0, {})
 
     # Updates

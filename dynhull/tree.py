@@ -48,8 +48,8 @@ class HullTree:
 
     LEAF = 64  # distinct points a leaf holds at most: measured, see benchmarks/tree.py
 
-    def __init__(self, xy: Points | None = None) -> None:
-        """Build from an (n, 2) array, ValueError where an entry is not finite. O(n log n)."""
+    def __init__(self, xy: npt.ArrayLike | None = None) -> None:
+        """Build from an (n, 2) array-like, checked by `as_points`. O(n log n)."""
         self._root: Tree | None = None
         self._copies: dict[Point, int] = {}  # how many, for the points that are there more than once
         self._size = 0

@@ -65,9 +65,14 @@ double coordinate(nb::handle value, const char* name) {
 // What dynhull.arrays makes of points, or an error that says where one is wrong.
 nb::object as_points(const nb::object& xy) { return nb::module_::import_("dynhull.arrays").attr("as_points")(xy); }
 
-// The tree of an array's rows; ValueError where a coordinate is not finite.
+// An array's rows as they are, of anything else what dynhull.arrays makes of it.
+Rows rows_of(const nb::object& xy) {
+  Rows rows;
+  return nb::try_cast(xy, rows, false) ? rows : nb::cast<Rows>(as_points(xy));
+}
+
 HullTree tree_of(const nb::object& xy) {
-  const auto rows = nb::cast<Rows>(xy);
+  const Rows rows = rows_of(xy);
   {
     nb::gil_scoped_release release;
     const Distinct points(points_of(rows), rows.shape(0));
@@ -213,8 +218,7 @@ class Hull {
 
   std::int64_t apply(Ops ops, std::size_t ops_count, const nb::object& xy, bool ignore_missing,
                      std::optional<bool> together) {
-    Rows rows;
-    if (!nb::try_cast(xy, rows, false)) rows = nb::cast<Rows>(as_points(xy));
+    const Rows rows = rows_of(xy);
     const std::size_t count = rows.shape(0);
     if (ops_count != ANY_NUMBER && ops_count != count) throw nb::value_error("ops and xy differ in length");
     const std::optional<Applied> applied = [&]() -> std::optional<Applied> {

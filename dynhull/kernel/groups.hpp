@@ -39,6 +39,7 @@ struct Ops {
   std::size_t step = 1;
 
   bool deletes(std::size_t row) const { return first[step * row] < 0; }
+  bool all_insert() const { return step == 0 && *first > 0; }
 };
 
 struct NotFinite {};  // thrown: a coordinate is not

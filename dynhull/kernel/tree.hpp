@@ -92,6 +92,7 @@ class HullTree {
   // The points are copied before anything is made of them; throws NotFinite where one is not.
   Applied apply(Ops ops, const Point* points, std::size_t count, bool ignore_missing,
                 std::optional<bool> together = {}) {
+    if (count > 0 && nodes_.root == NONE && ops.all_insert()) return fill(points, count);
     Groups groups(ops, points, count);
     groups.descend(nodes_);
     Plan plan(nodes_, copies_, groups);
@@ -127,6 +128,18 @@ class HullTree {
   std::size_t reserved_bytes() const { return nodes_.reserved_bytes(); }
 
  private:
+  // The first points of an empty tree.
+  Applied fill(const Point* points, std::size_t count) {
+    const Distinct distinct(points, count);
+    if (!distinct.finite()) throw NotFinite();
+    HullTree full(distinct);
+    full.changes = changes;
+    full.version_ = version_;
+    full.changed();
+    *this = std::move(full);
+    return {static_cast<std::int64_t>(count), -1};
+  }
+
   // True where the hull changed.
   bool apply(const Plan& plan, std::optional<bool> together) {
     if (plan.changes().empty()) return recount(plan), false;

@@ -123,7 +123,7 @@ def test_fork_during_batches():
 
 @pytest.mark.parametrize("before", [0, 1000])
 def test_points_that_another_thread_changes_meanwhile(before):
-    """Which points the hull gets is anybody's guess, or that it refuses them; it is whole, and all or none are there."""
+    """Which points the hull gets is anybody's guess, or whether it refuses them; all are there or none."""
     random = np.random.default_rng(0)
     points, few = random.random((200_000, 2)), random.random((before, 2))
     spoiled = points.copy()

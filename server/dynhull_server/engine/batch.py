@@ -1,7 +1,7 @@
 """A batch: inserts, deletes and moves that are applied all or none."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -67,8 +67,7 @@ def _apply(hull: DynamicHull, batch: Batch) -> int:
         ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
         applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
     except MissingPointError as error:
-        assert error.row is not None  # of a batch
-        row = error.row - len(inserts)
+        row = cast("int", error.row) - len(inserts)  # of a batch there is one
         first_origin = len(deletes) - batch.moves
         if row < first_origin:
             raise PointMissingError("deletes", row, error.point) from None
