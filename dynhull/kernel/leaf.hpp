@@ -16,7 +16,7 @@ namespace dynhull {
 
 constexpr unsigned LEAF = DYNHULL_LEAF;
 static_assert(4 <= LEAF && LEAF < 64);                  // a bit of a mask an entry, and one past the end
-constexpr unsigned FILL = LEAF * 25 / 32;               // entries of a leaf built in bulk: fuller ones split at once
+constexpr unsigned FILL = LEAF * 26 / 32;               // entries of a leaf built in bulk: fuller ones split at once
 constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);  // a leaf with fewer entries is merged with its neighbour
 constexpr unsigned MERGE_STEP = 4;                      // a try at every fourth size: its neighbour may be full
 constexpr std::uint32_t NONE = ~std::uint32_t{0};
