@@ -35,8 +35,8 @@ inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
 // One branch, which goes the same way almost always, where || makes two that each go either way.
 inline bool either(bool first, bool second) { return first + second != 0; }
 
-// From v up, the first node whose bridge reaches over the x from `left` to `right`, where the chain below it changed.
-// Every bridge with an end between them does, and so does one whose ends have the same x as they.
+// From v up, the first node whose bridge shares some x with the part from `left` to `right`, in which the chain below
+// has changed. The others stand.
 inline Ref first_near(const Nodes& nodes, Ref v, Side side, double left, double right) {
   for (; v != NONE; v = nodes.node(v).parent) {
     const Edge& edge = nodes.bridge(v, side);
