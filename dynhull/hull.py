@@ -114,6 +114,8 @@ class DynamicHull:
         try:
             return self._tree.apply(ops, xy, missing == "ignore")
         except KeyError as error:
+            if len(error.args) != 3:  # from within what was given as points
+                raise
             x, y, row = error.args
             raise MissingPointError((x, y), row) from None
 

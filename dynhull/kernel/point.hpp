@@ -10,8 +10,9 @@ struct Point {
   double x, y;
 };
 
-// The lexicographic order, without branches: & and | on purpose.
-inline bool operator==(Point p, Point q) { return (p.x == q.x) & (p.y == q.y); }
+inline bool operator==(Point p, Point q) { return (p.x == q.x) & (p.y == q.y); }  // & on purpose: no branch
+
+// The lexicographic order. The branch is foreseen, as few points of an input share their x.
 inline bool operator<(Point p, Point q) {
   if (p.x == q.x) [[unlikely]]
     return p.y < q.y;

@@ -108,6 +108,15 @@ def test_bad_operations(ops, error, message):
     assert len(hull) == 0
 
 
+@pytest.mark.parametrize("method", ["insert_many", "delete_many"])
+def test_errors_from_within_the_points(method):
+    """A KeyError of the caller's own is not taken for a missing point."""
+    hull = DynamicHull([[0, 0]])
+    with pytest.raises(KeyError, match=r"^'b'$"):
+        getattr(hull, method)({"a": (1, 1)}[name] for name in "ab")
+    assert len(hull) == 1
+
+
 def test_bad_directions():
     hull = DynamicHull([[0, 0]])
     with pytest.raises(ValueError, match=r"directions row 1 is \(0\.0, 0\.0\): no direction"):
