@@ -234,12 +234,17 @@ def build(n, make, random, rivals) -> Iterator[Row]:
         yield from rivals("static", rows, n)
 
 
+def grown(points) -> DynamicHull:
+    """A hull that got its points one by one."""
+    hull = DynamicHull()
+    for i in range(0, len(points), 256):
+        hull.insert_many(points[i : i + 256])
+    return hull
+
+
 def memory(n, make, random, rivals) -> Iterator[Row]:
     """Bytes a point after random inserts one by one."""
-    hull = DynamicHull()
-    rows = make(n, random)
-    for i in range(0, n, 256):
-        hull.insert_many(rows[i : i + 256])
+    hull = grown(make(n, random))
     used, reserved = hull._tree.memory
     yield "dynhull, used", used / hull.distinct
     yield "dynhull, reserved", reserved / hull.distinct
@@ -267,10 +272,7 @@ def call(n, make, random, rivals) -> Iterator[Row]:
     """One insert called from Python, into a hull that was built at once, whose leaves are alike, and a grown one."""
     points = make(n, random)
     rows = make(2000, random).tolist()
-    grown = DynamicHull()
-    for i in range(0, n, 256):
-        grown.insert_many(points[i : i + 256])
-    for name, hull in (("built at once", DynamicHull(points)), ("grown", grown)):
+    for name, hull in (("built at once", DynamicHull(points)), ("grown", grown(points))):
 
         def work(hull=hull):
             for x, y in rows:

@@ -112,7 +112,7 @@ class Hull {
   }
 
   std::int64_t apply_all(std::int8_t op, const nb::object& xy, bool ignore_missing, std::optional<bool> together) {
-    return apply({&op, 0}, ANY_NUMBER, xy, ignore_missing, together);
+    return apply({&op, 0}, 1, xy, ignore_missing, together);
   }
   std::int64_t apply_each(const OpRows& ops, const nb::object& xy, bool ignore_missing, std::optional<bool> together) {
     return apply({ops.data()}, ops.shape(0), xy, ignore_missing, together);
@@ -214,13 +214,11 @@ class Hull {
   }
 
  private:
-  static constexpr std::size_t ANY_NUMBER = std::numeric_limits<std::size_t>::max();
-
   std::int64_t apply(Ops ops, std::size_t ops_count, const nb::object& xy, bool ignore_missing,
                      std::optional<bool> together) {
     const Rows rows = rows_of(xy);
     const std::size_t count = rows.shape(0);
-    if (ops_count != ANY_NUMBER && ops_count != count) throw nb::value_error("ops and xy differ in length");
+    if (ops.step > 0 && ops_count != count) throw nb::value_error("ops and xy differ in length");
     const std::optional<Applied> applied = [&]() -> std::optional<Applied> {
       const Writing turn(turns_, count);
       try {

@@ -65,11 +65,9 @@ class ColumnSort {
 
   void place() {
     for_each_part([&](Part& part) {
-      for (std::size_t i = 0; i < part.count; ++i) {
-        const Point p = {part.points[i].x + 0.0, part.points[i].y + 0.0};
-        part.finite &= (p.x - p.x == 0) & (p.y - p.y == 0);
-        to_[part.next[part.columns[i]]++] = p;
-      }
+      Plain plain;
+      for (std::size_t i = 0; i < part.count; ++i) to_[part.next[part.columns[i]]++] = plain(part.points[i]);
+      part.finite = plain.finite();
     });
   }
 

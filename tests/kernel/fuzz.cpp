@@ -193,7 +193,10 @@ class Life {
     }
     const std::uint64_t changes = tree_.changes;
     Applied result{};
-    with_failures([&] { result = tree_.apply({ops.data()}, points.data(), count, ignore); });
+    const bool alike =
+        count > 0 && std::count(ops.begin(), ops.end(), ops[0]) == static_cast<std::ptrdiff_t>(ops.size());
+    const Ops given = {ops.data(), alike ? 0u : 1u};
+    with_failures([&] { result = tree_.apply(given, points.data(), count, ignore); });
     if (missing >= 0 && !ignore)
       applied = 0;
     else
