@@ -67,6 +67,17 @@ def let_go(page: Page, name: str) -> None:
     page.locator(".choices__list--multiple .choices__item", has_text=name).locator("button").click()
 
 
+def wait_for_hulls(page: Page, *names: str) -> None:
+    """Until the page knows of these hulls."""
+    page.wait_for_function(
+        """names => {
+            const known = Bokeh.documents[0]?.get_model_by_name("picker").tags ?? []
+            return names.every(name => known.includes(name))
+        }""",
+        arg=names,
+    )
+
+
 def wait_for_watchers(metrics: str, count: int) -> None:
     wait_until(lambda: scrape(metrics)["dynhull_watchers"] == count)
 
@@ -108,12 +119,29 @@ def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullCli
     client.create_hull("shown")
     with opened(browser, url, "shown") as page:
         row = page.get_by_role("row").filter(has_text=hull)
+        wait_for_hulls(page, "shown", hull)
         page.get_by_placeholder("Pick hulls").fill(hull)
         page.get_by_role("option", name=hull).click()
         wait_for_vertices(page, hull, SQUARE)
         expect(row).to_be_visible()
         let_go(page, hull)
         expect(row).to_be_hidden()
+
+
+def test_what_is_typed_stays_when_hulls_come(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    late = f"{hull}-late"
+    with opened(browser, url, hull) as page:
+        wait_for_hulls(page, hull)
+        field = page.get_by_placeholder("Pick hulls")
+        field.press_sequentially(late)
+        client.create_hull(late)
+        wait_for_hulls(page, hull, late)
+        expect(field).to_have_value(late)
+        expect(field).to_be_focused()
+        field.blur()
+        field.fill(late)
+        page.get_by_role("option", name=late).click()
+        expect(page.get_by_role("row").filter(has_text=late)).to_be_visible()
 
 
 def test_several_hulls_and_one_watch_each_for_all_viewers(browser: Browser) -> None:

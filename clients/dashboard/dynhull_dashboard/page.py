@@ -63,7 +63,6 @@ class Page:
             placeholder="Pick hulls",
             max_items=len(LOOKS),
             value=picked,
-            options=[*picked],
             stylesheets=[STYLE],
             sizing_mode="stretch_width",
         )
@@ -79,6 +78,7 @@ class Page:
         self._verify.on_click(self._verify_now)
         self._pick(picked)
         self._tick()
+        self._picker.options = [*self._picker.tags]
         document.title = "dynhull"
         document.template = TEMPLATE
         document.template_variables.update(address=hub.address, with_metrics=hub.metrics is not None)
@@ -128,11 +128,11 @@ class Page:
     def _tell(self) -> None:
         """Words, figures and time lines."""
         server = self._hub.server
-        options: list[str | tuple[str, str]] = [*sorted({*server.hulls, *self._picker.value})]
-        if options != self._picker.options:
-            self._picker.options = options
+        hulls = sorted({*server.hulls, *self._picker.value})
+        if hulls != self._picker.tags:
+            self._picker.tags = hulls  # the page makes options of them when nobody is picking
         if self._untouched and server.hulls:
-            self._picker.value = server.largest()
+            self._picker.update(options=[*hulls], value=server.largest())
         self._table.text = cards.table(
             ((shown.feed, shown.look) for shown in self._shown.values()), connected=server.trouble is None
         )
