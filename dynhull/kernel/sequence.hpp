@@ -8,6 +8,8 @@ namespace dynhull {
 // True where the hull changed. Needs room in nodes for the plan's extra leaves.
 inline bool apply_in_order(Nodes& nodes, std::span<const Change> changes) {
   constexpr std::size_t LOOKAHEAD = 8;  // changes whose leaf is on its way from memory
+  constexpr unsigned SHARED = 4;        // how high the subtrees are that several changes share, were there one a leaf
+  Overhead overhead(nodes, SHARED + static_cast<unsigned>(std::bit_width(nodes.leaf_count() / (changes.size() + 1))));
   bool changed = false;
   for (std::size_t i = 0; i < changes.size(); ++i) {
     const std::size_t ahead = i + LOOKAHEAD;
@@ -15,7 +17,8 @@ inline bool apply_in_order(Nodes& nodes, std::span<const Change> changes) {
       nodes.leaf(changes[ahead].leaf).fetch();
     const Change& change = changes[i];
     const Place place = place_of(nodes, change);
-    changed |= (change.insert ? insert_point(nodes, place, change.p) : remove_point(nodes, place, change.p)) != 0;
+    changed |= (change.insert ? insert_point(nodes, place, change.p, overhead)
+                              : remove_point(nodes, place, change.p, overhead)) != 0;
   }
   return changed;
 }

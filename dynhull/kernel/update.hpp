@@ -1,6 +1,7 @@
 // Updates one by one, on the tree at nodes.root: repair the leaf, then climb while the hull changes.
 #pragma once
 
+#include "overhead.hpp"
 #include "shape.hpp"
 
 namespace dynhull {
@@ -35,22 +36,50 @@ inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
 // One branch, which goes the same way almost always, where || makes two that each go either way.
 inline bool either(bool first, bool second) { return first + second != 0; }
 
-// From v up, the first node whose bridge shares some x with the part from `left` to `right`, in which the chain below
-// has changed. The others stand.
-inline Ref first_near(const Nodes& nodes, Ref v, Side side, double left, double right) {
-  for (; v != NONE; v = nodes.node(v).parent) {
-    const Edge& edge = nodes.bridge(v, side);
-    if (!either(right<edge.a.x, left> edge.b.x)) return v;
+// The way up from a chain that has changed around p, past bridges that share no x with what has changed: they stand.
+template <class Over>
+class Climb {
+ public:
+  Climb(const Nodes& nodes, Point p, Side side, Over& overhead)
+      : nodes_(nodes), side_(side), overhead_(overhead), known_(overhead.over(p)) {}
+
+  // From v up, the first node whose bridge shares some x with the part from `left` to `right`, or NONE.
+  Ref first_near(Ref v, double left, double right) {
+    v = first_near(v, known_, left, right);
+    if (v != known_ || v == NONE) return v;
+    if (overhead_.clear(side_, left, right)) return NONE;
+    known_ = NONE;
+    return first_near(v, NONE, left, right);
   }
-  return NONE;
-}
+
+  // The bridge of the last node has.
+  void changed() {
+    if (known_ == NONE) overhead_.forget();
+  }
+
+ private:
+  Ref first_near(Ref v, Ref end, double left, double right) const {
+    for (; v != end; v = nodes_.node(v).parent) {
+      const Edge& edge = nodes_.bridge(v, side_);
+      if (!either(right<edge.a.x, left> edge.b.x)) return v;
+    }
+    return end;
+  }
+
+  const Nodes& nodes_;
+  Side side_;
+  Over& overhead_;
+  Ref known_;  // the first node that the overhead knows of; NONE from there on
+};
 
 // Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
 //
 // `neighbours` are those of p on the chain, infinite where p is its end. With one of them between p and the bridge, the
 // chain turns before it gets there, and p lies inside the bridge's line.
-inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
-  const auto next = [&](Ref from) { return first_near(nodes, from, side, neighbours.a.x, neighbours.b.x); };
+template <class Over>
+bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& overhead) {
+  Climb climb(nodes, p, side, overhead);
+  const auto next = [&](Ref from) { return climb.first_near(from, neighbours.a.x, neighbours.b.x); };
   for (v = next(v); v != NONE; v = next(nodes.node(v).parent)) {
     Edge& edge = nodes.bridge(v, side);
     const Node& node = nodes.node(v);
@@ -58,6 +87,7 @@ inline bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours
     const bool beyond = on_left ? p < edge.a : p > edge.b;
     const int turn = turned(side, orientation(edge.a, edge.b, p));
     if (turn > 0 || (turn == 0 && beyond)) {
+      climb.changed();
       if (on_left) {
         neighbours.b = tangent_to_right(Cursor(nodes, node.child[1], side), p, side);
         edge = {p, neighbours.b};
@@ -88,12 +118,15 @@ inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone, Edge 
 // Repair the bridges from v up for p, gone from the chain below, as far as p was on it. True where to the root.
 //
 // `neighbours` are those of p on the chain, infinite where p was its end.
-inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours) {
-  const auto next = [&](Ref from) { return first_near(nodes, from, side, p.x, p.x); };
+template <class Over>
+bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& overhead) {
+  Climb climb(nodes, p, side, overhead);
+  const auto next = [&](Ref from) { return climb.first_near(from, p.x, p.x); };
   for (v = next(v); v != NONE; v = next(nodes.node(v).parent)) {
     Edge& edge = nodes.bridge(v, side);
     if (p < edge.a || p > edge.b) continue;
     if (p != edge.a && p != edge.b) return false;
+    climb.changed();
     const Edge old = edge;
     edge = bridge_after(nodes, v, side, p, neighbours);
     if (p == old.a)
@@ -105,8 +138,9 @@ inline bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbou
 }
 
 // Insert a point that is not there. Returns the sides, as bits, on which the hull changed.
-// Needs room for one more leaf and node.
-inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
+// Needs room for one more leaf and node. `overhead` is of the same batch, or NoOverhead.
+template <class Over>
+unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead) {
   if (place.leaf == NONE) {
     nodes.replace(NONE, NONE, nodes.take_leaf());
     nodes.leaf(nodes.root).assign(&p, 1);
@@ -114,6 +148,7 @@ inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
   }
   if (nodes.leaf(place.leaf).size == LEAF) {
     const Ref right = split(nodes, place.leaf);
+    overhead.forget();
     const unsigned half = nodes.leaf(place.leaf).size;
     if (place.entry > half) place = {right, place.entry - half, false};
   }
@@ -121,25 +156,32 @@ inline unsigned insert_point(Nodes& nodes, Place place, Point p) {
   const unsigned on_leaf = leaf.add(place.entry, p);
   unsigned changed = 0;
   for (Side side : SIDES)
-    if (on_leaf & (1u << side) && climb_added(nodes, leaf.parent, p, side, leaf.neighbours(side, place.entry)))
+    if (on_leaf & (1u << side) &&
+        climb_added(nodes, leaf.parent, p, side, leaf.neighbours(side, place.entry), overhead))
       changed |= 1u << side;
   return changed;
 }
 
 // Remove a point that is there. Returns the sides, as bits, on which the hull changed.
-inline unsigned remove_point(Nodes& nodes, Place place, Point p) {
+template <class Over>
+unsigned remove_point(Nodes& nodes, Place place, Point p, Over&& overhead) {
   Leaf& leaf = nodes.leaf(place.leaf);
   const Edge neighbours[] = {leaf.neighbours(UPPER, place.entry), leaf.neighbours(LOWER, place.entry)};
   const unsigned on_leaf = leaf.remove(place.entry);
   const bool empty = leaf.size == 0;
+  if (empty) overhead.forget();
   const Ref above = empty ? drop(nodes, place.leaf) : leaf.parent;
   unsigned changed = 0;
   for (Side side : SIDES)
-    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side, neighbours[side])) changed |= 1u << side;
+    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side, neighbours[side], overhead))
+      changed |= 1u << side;
   if (empty)
     rebalance(nodes, above);
   else if (leaf.size < LOW && leaf.size % MERGE_STEP == 1)
     merge(nodes, place.leaf);
+  else
+    return changed;
+  overhead.forget();
   return changed;
 }
 

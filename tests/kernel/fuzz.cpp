@@ -196,7 +196,9 @@ class Life {
     const bool alike =
         count > 0 && std::count(ops.begin(), ops.end(), ops[0]) == static_cast<std::ptrdiff_t>(ops.size());
     const Ops given = {ops.data(), alike ? 0u : 1u};
-    with_failures([&] { result = tree_.apply(given, points.data(), count, ignore); });
+    const std::optional<bool> ways[] = {{}, false, true};
+    const std::optional<bool> together = ways[below(std::size(ways))];
+    with_failures([&] { result = tree_.apply(given, points.data(), count, ignore, together); });
     if (missing >= 0 && !ignore)
       applied = 0;
     else
