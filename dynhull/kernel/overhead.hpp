@@ -8,8 +8,9 @@ namespace dynhull {
 // Of a single update.
 struct NoOverhead {
   Ref over(Point) { return NONE; }
-  bool clear(Side, double, double) const { return false; }
+  bool clear(Side, double, double) { return false; }
   void forget() {}
+  void earn() {}
 };
 
 class Overhead {
@@ -19,6 +20,8 @@ class Overhead {
 
   // The lowest of them over p, or NONE. No p may lie before an earlier one. O(1) amortized where updates are dense.
   Ref over(Point p) {
+    if (credit_ == 0) return NONE;
+    --credit_;
     while (steps_ > 0 && p >= path_[steps_ - 1].end) --steps_;
     if (steps_ == 0) path_[steps_++] = {NONE, nodes_.root, HIGHEST, {-INFINITE, -INFINITE}, {INFINITE, INFINITE}};
     for (; nodes_.height(here().tree) >= height_; ++steps_) path_[steps_] = below(here(), p);
@@ -26,9 +29,12 @@ class Overhead {
   }
 
   // Whether none of their bridges over the last p shares some x with the part from `left` to `right` of the chain.
-  bool clear(Side side, double left, double right) const {
-    return here().left[side] < left && right < here().right[side];
+  bool clear(Side side, double left, double right) {
+    const bool is_clear = here().left[side] < left && right < here().right[side];
+    if (is_clear) earn();
+    return is_clear;
   }
+  void earn() { credit_ = std::min(credit_ + 4, 64u); }
 
   // Their links or bridges have changed.
   void forget() { steps_ = 0; }
@@ -62,6 +68,7 @@ class Overhead {
 
   const Nodes& nodes_;
   unsigned height_;
+  unsigned credit_ = 0;
   std::size_t steps_ = 0;
   Step path_[MOST];
 };

@@ -46,7 +46,11 @@ class Climb {
   // From v up, the first node whose bridge shares some x with the part from `left` to `right`, or NONE.
   Ref first_near(Ref v, double left, double right) {
     v = first_near(v, known_, left, right);
-    if (v != known_ || v == NONE) return v;
+    if (v != known_) return v;
+    if (v == NONE) {
+      if (stood_) overhead_.earn();
+      return NONE;
+    }
     if (overhead_.clear(side_, left, right)) return NONE;
     known_ = NONE;
     return first_near(v, NONE, left, right);
@@ -54,6 +58,7 @@ class Climb {
 
   // The bridge of the last node has.
   void changed() {
+    stood_ = false;
     if (known_ == NONE) overhead_.forget();
   }
 
@@ -70,6 +75,7 @@ class Climb {
   Side side_;
   Over& overhead_;
   Ref known_;  // the first node that the overhead knows of; NONE from there on
+  bool stood_ = true;
 };
 
 // Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
