@@ -2,8 +2,8 @@
 // sorted.
 #pragma once
 
+#include "buffer.hpp"
 #include "sort.hpp"
-#include "store.hpp"
 #include "threads.hpp"
 
 namespace dynhull {

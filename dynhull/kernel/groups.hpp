@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "buffer.hpp"
 #include "sort.hpp"
 #include "update.hpp"
 

@@ -1,0 +1,83 @@
+// Memory for plain records.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <new>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+namespace dynhull {
+
+#ifdef DYNHULL_FAIL_ALLOCATIONS
+bool allocation_fails();  // the fuzzer's
+#else
+constexpr bool allocation_fails() { return false; }
+#endif
+
+namespace memory {
+
+constexpr std::size_t PAGE = 4096;
+
+inline std::size_t whole_pages(std::size_t bytes) { return bytes > PAGE ? (bytes + PAGE - 1) / PAGE * PAGE : bytes; }
+
+#ifdef __linux__
+constexpr std::size_t HUGE_PAGE = std::size_t{1} << 21;
+
+// Below this, the C library's heap; above, whole pages of our own, aligned so that huge pages fit.
+inline bool mapped(std::size_t bytes) { return bytes >= 2 * HUGE_PAGE; }
+
+inline void* map_aligned(std::size_t bytes) {
+  const std::size_t span = bytes + HUGE_PAGE;
+  void* region = mmap(nullptr, span, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (region == MAP_FAILED) throw std::bad_alloc();
+  char* start = static_cast<char*>(region);
+  const std::size_t before = (HUGE_PAGE - reinterpret_cast<std::uintptr_t>(start) % HUGE_PAGE) % HUGE_PAGE;
+  if (before > 0) munmap(start, before);
+  munmap(start + before + bytes, span - before - bytes);
+  madvise(start + before, bytes, MADV_HUGEPAGE);
+  return start + before;
+}
+#endif
+
+// Both sizes are multiples of a page where they are mapped.
+inline void* resize(void* old, std::size_t old_bytes, std::size_t bytes) {
+  if (allocation_fails()) throw std::bad_alloc();
+#ifdef __linux__
+  if (mapped(bytes)) {
+    if (mapped(old_bytes) && mremap(old, old_bytes, bytes, 0) != MAP_FAILED) return old;
+    void* fresh = map_aligned(bytes);
+    if (mapped(old_bytes)) {
+      if (mremap(old, old_bytes, bytes, MREMAP_MAYMOVE | MREMAP_FIXED, fresh) == MAP_FAILED) {
+        munmap(fresh, bytes);
+        throw std::bad_alloc();
+      }
+    } else {
+      std::copy_n(static_cast<const char*>(old), old_bytes, static_cast<char*>(fresh));
+      std::free(old);
+    }
+    return fresh;
+  }
+#endif
+  void* fresh = std::realloc(old, bytes);
+  if (fresh == nullptr) throw std::bad_alloc();
+  return fresh;
+}
+
+inline void release(void* data, [[maybe_unused]] std::size_t bytes) {
+#ifdef __linux__
+  if (mapped(bytes)) {
+    munmap(data, bytes);
+    return;
+  }
+#endif
+  std::free(data);
+}
+
+}  // namespace memory
+
+}  // namespace dynhull
