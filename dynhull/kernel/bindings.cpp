@@ -9,6 +9,7 @@
 #include "chan.hpp"
 #include "check.hpp"
 #include "lock.hpp"
+#include "one_point.hpp"
 #include "static_hull.hpp"
 
 namespace nb = nanobind;
@@ -340,37 +341,11 @@ Point point_of(nb::handle pair) {
   return p;
 }
 
-// The methods of one point are called the most. Python calls these itself, without nanobind, which first looks for the
-// overload and the keywords: 20 ns.
-template <auto METHOD>
-PyObject* of_one_point(PyObject* self, PyObject* const* arguments, Py_ssize_t count) noexcept {
-  try {
-    if (count != 2) throw nb::type_error("a point is two arguments, x and y");
-    Hull& hull = nb::cast<Hull&>(nb::handle(self));
-    return nb::cast((hull.*METHOD)(arguments[0], arguments[1])).release().ptr();
-  } catch (nb::python_error& error) {
-    error.restore();
-  } catch (const std::bad_alloc&) {
-    PyErr_NoMemory();
-  } catch (const std::exception& error) {
-    PyErr_SetString(PyExc_TypeError, error.what());
-  }
-  return nullptr;
+void take_over(nb::handle dynamic_hull) {
+  OnePoint<&Hull::count>::replace(dynamic_hull, "count");
+  OnePoint<&Hull::insert>::replace(dynamic_hull, "insert");
+  OnePoint<&Hull::remove>::replace(dynamic_hull, "delete");
 }
-
-template <auto METHOD>
-PyMethodDef method_of_one_point(const char* name, const char* doc) {
-  const auto function = reinterpret_cast<void (*)()>(of_one_point<METHOD>);
-  return {name, reinterpret_cast<PyCFunction>(function), METH_FASTCALL, doc};
-}
-
-PyMethodDef METHODS_OF_ONE_POINT[] = {
-    method_of_one_point<&Hull::count>("count", "How many times the point is there. O(log n)."),
-    method_of_one_point<&Hull::insert>("insert", "Add a point. True where the hull changed. O(log² n)."),
-    method_of_one_point<&Hull::remove>(
-        "delete", "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n)."),
-    {}};
-PyType_Slot SLOTS[] = {{Py_tp_methods, METHODS_OF_ONE_POINT}, {}};
 
 }  // namespace
 }  // namespace dynhull
@@ -387,8 +362,7 @@ NB_MODULE(_kernel, module) {
     }
   });
 
-  nb::class_<Hull>(module, "HullTree", nb::type_slots(SLOTS),
-                   "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
+  nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull.tree.HullTree.")
       .def(nb::init<>())
       .def(
           "__init__", [](Hull* hull, nb::object xy) { new (hull) Hull(xy.is_none() ? HullTree() : tree_of(xy)); },
@@ -396,6 +370,10 @@ NB_MODULE(_kernel, module) {
       .def("__len__", &Hull::size)
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
       .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
+      .def("count", &Hull::count, "x"_a.none(), "y"_a.none(), "How many times the point is there. O(log n).")
+      .def("insert", &Hull::insert, "x"_a.none(), "y"_a.none(), "Add a point. True where the hull changed. O(log² n).")
+      .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
+           "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
       .def("clear", &Hull::clear, "Remove every point.")
       .def("apply", &Hull::apply_all, "op"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
            "Insert the rows, +1, or delete them, -1.")
@@ -445,6 +423,7 @@ NB_MODULE(_kernel, module) {
              "The same by Chan's algorithm, and its rounds: guess, groups, steps, closed. O(n log h).");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");
 
+  module.def("take_over", &take_over, "dynamic_hull"_a, "Put methods of the kernel's in the place of the class's own.");
   module.def("_before_fork", &Turns::before_fork);
   module.def("_after_fork_in_parent", &Turns::after_fork_in_parent);
   module.def("_after_fork_in_child", &Turns::after_fork_in_child);

@@ -2,6 +2,7 @@
 
 from decimal import Decimal
 from fractions import Fraction
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -90,6 +91,30 @@ def test_good_coordinates():
     hull.insert(np.float32(0.5), np.int64(3))
     hull.insert(Fraction(1, 4), True)
     assert hull.points().tolist() == [[0.25, 1.0], [0.5, 3.0]]
+
+
+def test_methods_of_one_point_by_name_and_in_subclasses():
+    class Noted(DynamicHull):
+        __slots__ = ("notes",)
+
+        def insert(self, x, y):
+            self.notes = [x, y]
+            return super().insert(y=y, x=x)
+
+    hull = Noted()
+    assert hull.insert(1, 2)
+    assert hull.notes == [1, 2]
+    assert (hull.count(x=1, y=2), hull.count(2, 1), hull.delete(1, y=2), len(hull)) == (1, 0, True, 0)
+    assert [*signature(DynamicHull.insert).parameters] == ["self", "x", "y"]
+
+
+@pytest.mark.parametrize("arguments", [(), (1,), (1, 2, 3)])
+@pytest.mark.parametrize("method", ["insert", "delete", "count"])
+def test_wrong_number_of_arguments(method, arguments):
+    hull = DynamicHull([[0, 0]])
+    with pytest.raises(TypeError, match=rf"{method}\(\)"):
+        getattr(hull, method)(*arguments)
+    assert len(hull) == 1
 
 
 @pytest.mark.parametrize(
