@@ -18,7 +18,8 @@ class Overhead {
   // The nodes of this height or more.
   Overhead(const Nodes& nodes, unsigned height) : nodes_(nodes), height_(height) {}
 
-  // The lowest of them over p, or NONE. No p may lie before an earlier one. O(1) amortized where updates are dense.
+  // The lowest of them over p, or NONE: also where to ask did not pay of late. No p may lie before an earlier one. O(1)
+  // amortized where updates are dense.
   Ref over(Point p) {
     if (credit_ == 0) return NONE;
     --credit_;
@@ -34,6 +35,7 @@ class Overhead {
     if (is_clear) earn();
     return is_clear;
   }
+  // A climb has been spared, or would have been. It pays for a few questions.
   void earn() { credit_ = std::min(credit_ + 4, 64u); }
 
   // Their links or bridges have changed.

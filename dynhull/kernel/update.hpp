@@ -56,8 +56,8 @@ class Climb {
     return first_near(v, NONE, left, right);
   }
 
-  // The bridge of the last node has.
-  void changed() {
+  // The bridge of the last node has to change.
+  void changes() {
     stood_ = false;
     if (known_ == NONE) overhead_.forget();
   }
@@ -93,7 +93,7 @@ bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over&
     const bool beyond = on_left ? p < edge.a : p > edge.b;
     const int turn = turned(side, orientation(edge.a, edge.b, p));
     if (turn > 0 || (turn == 0 && beyond)) {
-      climb.changed();
+      climb.changes();
       if (on_left) {
         neighbours.b = tangent_to_right(Cursor(nodes, node.child[1], side), p, side);
         edge = {p, neighbours.b};
@@ -132,7 +132,7 @@ bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Ove
     Edge& edge = nodes.bridge(v, side);
     if (p < edge.a || p > edge.b) continue;
     if (p != edge.a && p != edge.b) return false;
-    climb.changed();
+    climb.changes();
     const Edge old = edge;
     edge = bridge_after(nodes, v, side, p, neighbours);
     if (p == old.a)
