@@ -31,11 +31,13 @@ class Store {
   Record& operator[](std::uint32_t i) { return data_[i]; }
   const Record& operator[](std::uint32_t i) const { return data_[i]; }
 
-  // Room for `extra` more records: take() will not throw that many times. Grows by an eighth at least.
+  // Room for `extra` more records: take() will not throw that many times. Grows by an eighth at least; while it is
+  // small, to half as much again as is needed, because memory that moves costs more than memory that is not touched.
   void reserve(std::size_t extra) {
     const std::size_t needed = used_ + extra;
     if (needed <= capacity_ + freed_) return;
     std::size_t capacity = std::max<std::size_t>({needed - freed_, std::size_t{capacity_} + capacity_ / 8, 2});
+    if (capacity < SMALL) capacity += capacity / 2;
     if (capacity >= NOWHERE / 2) throw std::bad_alloc();
     capacity = memory::whole_pages(capacity * sizeof(Record)) / sizeof(Record);
     data_ = static_cast<Record*>(memory::resize(data_, bytes(), whole_pages(capacity)));
@@ -69,6 +71,7 @@ class Store {
 
  private:
   static constexpr std::uint32_t NOWHERE = ~std::uint32_t{0};
+  static constexpr std::size_t SMALL = (std::size_t{1} << 20) / sizeof(Record);
 
   static std::size_t whole_pages(std::size_t capacity) { return memory::whole_pages(capacity * sizeof(Record)); }
   std::size_t bytes() const { return whole_pages(capacity_); }
