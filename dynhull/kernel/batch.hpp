@@ -73,8 +73,7 @@ class Commit {
         if (!insert && i + LOOKAHEAD < count_) nodes_.leaf(changes_[i + LOOKAHEAD].leaf).fetch();
         if (change.insert != insert) continue;
         const Place place = place_of(nodes_, change);
-        const unsigned changed = insert ? insert_point(nodes_, place, change.p, NoOverhead())
-                                        : remove_point(nodes_, place, change.p, NoOverhead());
+        const unsigned changed = insert ? insert_point(nodes_, place, change.p) : remove_point(nodes_, place, change.p);
         for (Side side : SIDES)
           if (changed & (1u << side)) propose(found, side, from, i);
       }

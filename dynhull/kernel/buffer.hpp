@@ -32,8 +32,7 @@ class Spares {
   }
 
  private:
-  static constexpr std::size_t MOST = std::size_t{1} << 22;
-  static bool worth_keeping(std::size_t bytes) { return memory::PAGE <= bytes && bytes < MOST; }
+  static bool worth_keeping(std::size_t bytes) { return memory::PAGE <= bytes && bytes < memory::LARGE; }
 
   Spares() = default;
   static Spares& of_this_thread() {

@@ -23,13 +23,16 @@ namespace memory {
 
 constexpr std::size_t PAGE = 4096;
 
+// Memory of this size or more comes from the system, where that can move it, and goes back there at once.
+constexpr std::size_t LARGE = std::size_t{1} << 22;
+
 inline std::size_t whole_pages(std::size_t bytes) { return bytes > PAGE ? (bytes + PAGE - 1) / PAGE * PAGE : bytes; }
 
 #ifdef __linux__
 constexpr std::size_t HUGE_PAGE = std::size_t{1} << 21;
 
-// Below this, the C library's heap; above, whole pages of our own, aligned so that huge pages fit.
-inline bool mapped(std::size_t bytes) { return bytes >= 2 * HUGE_PAGE; }
+// Below, the C library's heap; otherwise whole pages of our own, aligned so that huge pages fit.
+inline bool mapped(std::size_t bytes) { return bytes >= LARGE; }
 
 inline void* map_aligned(std::size_t bytes) {
   const std::size_t span = bytes + HUGE_PAGE;

@@ -64,7 +64,7 @@ class HullTree {
     }
     ++size_;
     ++distinct_;
-    return insert_point(nodes_, place, p, NoOverhead()) != 0 && changed();
+    return insert_point(nodes_, place, p) != 0 && changed();
   }
 
   enum class Removal { MISSING, HULL_STANDS, HULL_CHANGED };
@@ -82,7 +82,7 @@ class HullTree {
       return Removal::HULL_STANDS;
     }
     --distinct_;
-    if (remove_point(nodes_, place, p, NoOverhead()) == 0) return Removal::HULL_STANDS;
+    if (remove_point(nodes_, place, p) == 0) return Removal::HULL_STANDS;
     changed();
     return Removal::HULL_CHANGED;
   }

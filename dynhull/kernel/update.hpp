@@ -144,9 +144,9 @@ bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Ove
 }
 
 // Insert a point that is not there. Returns the sides, as bits, on which the hull changed.
-// Needs room for one more leaf and node. `overhead` is of the same batch, or NoOverhead.
-template <class Over>
-unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead) {
+// Needs room for one more leaf and node. `overhead` is that of a batch in order.
+template <class Over = NoOverhead>
+unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead = Over()) {
   if (place.leaf == NONE) {
     nodes.replace(NONE, NONE, nodes.take_leaf());
     nodes.leaf(nodes.root).assign(&p, 1);
@@ -169,8 +169,8 @@ unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead) {
 }
 
 // Remove a point that is there. Returns the sides, as bits, on which the hull changed.
-template <class Over>
-unsigned remove_point(Nodes& nodes, Place place, Point p, Over&& overhead) {
+template <class Over = NoOverhead>
+unsigned remove_point(Nodes& nodes, Place place, Point p, Over&& overhead = Over()) {
   Leaf& leaf = nodes.leaf(place.leaf);
   const Edge neighbours[] = {leaf.neighbours(UPPER, place.entry), leaf.neighbours(LOWER, place.entry)};
   const unsigned on_leaf = leaf.remove(place.entry);
