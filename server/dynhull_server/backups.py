@@ -14,10 +14,10 @@ import typer
 from dynhull.arrays import Points
 
 from .engine.stored import read_hull
-from .journal import copies
-from .journal.errors import JournalError
-from .journal.folder import DATABASE
 from .progress import progress_bar
+from .storage.sqlite import copies
+from .storage.sqlite.errors import JournalError
+from .storage.sqlite.folder import DATABASE
 
 DATA = Path("dynhull-data")
 ROWS_A_STEP = 100_000

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from . import logs
+from .app import Server
 from .flags import with_settings
-from .journal.errors import JournalError
 from .progress import progress_bar
-from .service.server import Server
 from .settings import Settings
+from .storage.sqlite.errors import JournalError
 
 SIGNALS = signal.SIGTERM, signal.SIGINT
 

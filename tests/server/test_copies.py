@@ -7,7 +7,7 @@ import pytest
 from server_process import COMMAND, PATIENCE, server_process
 
 from dynhull_client import HullClient
-from dynhull_server.journal.folder import DATABASE
+from dynhull_server.storage.sqlite.folder import DATABASE
 
 
 def run(*command):

@@ -7,12 +7,17 @@ import threading
 import numpy as np
 import pytest
 
-from dynhull_server.journal.copies import back_up
-from dynhull_server.journal.errors import JournalDamagedError, JournalError, JournalFormatError, JournalLockedError
-from dynhull_server.journal.folder import DATABASE
-from dynhull_server.journal.journal import Durability, Journal
-from dynhull_server.journal.records import Record
-from dynhull_server.journal.snapshots import CHUNK_POINTS
+from dynhull_server.storage.sqlite.copies import back_up
+from dynhull_server.storage.sqlite.errors import (
+    JournalDamagedError,
+    JournalError,
+    JournalFormatError,
+    JournalLockedError,
+)
+from dynhull_server.storage.sqlite.folder import DATABASE
+from dynhull_server.storage.sqlite.journal import Durability, Journal
+from dynhull_server.storage.sqlite.records import Record
+from dynhull_server.storage.sqlite.snapshots import CHUNK_POINTS
 
 NOTHING = np.empty((0, 2))
 

@@ -13,13 +13,13 @@ from server_process import server_process
 
 from dynhull import DynamicHull
 from dynhull_client import HullClient
-from dynhull_server.engine.batch import Batch
 from dynhull_server.engine.hulls import Engine
-from dynhull_server.engine.limits import Limits
 from dynhull_server.engine.live_hull import Config, LiveHull
 from dynhull_server.engine.scrub import scrub
 from dynhull_server.engine.verification import LARGE, Verification
 from dynhull_server.engine.writer import Write
+from dynhull_server.state.batch import Batch
+from dynhull_server.state.limits import Limits
 
 LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, history_bytes=10**6)
 NONE = np.empty((0, 2))

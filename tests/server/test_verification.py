@@ -8,7 +8,7 @@ import pytest
 from dynhull_proto.v1 import points_pb2
 from dynhull_server.engine.live_hull import Counts
 from dynhull_server.engine.verification import verify
-from dynhull_server.service.encode import encode_verification
+from dynhull_server.rpc.encode import encode_verification
 
 POINTS = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4], [1, 1]])
 VERTICES = POINTS[:4]

@@ -18,7 +18,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.engine.difference import difference
 from dynhull_server.engine.live_hull import Counts
 from dynhull_server.engine.views import Change as EngineChange
-from dynhull_server.service.encode import encode_event
+from dynhull_server.rpc.encode import encode_event
 
 COUNTS = Counts(2, 0, 0)
 

@@ -9,9 +9,9 @@ from datetime import UTC, datetime
 
 from sortedcontainers import SortedDict
 
-from ..journal.journal import HullRow, Journal
-from .errors import HullExistsError, HullNotFoundError, LimitExceededError, StorageError
-from .limits import Limits
+from ..state.errors import HullExistsError, HullNotFoundError, LimitExceededError, StorageError
+from ..state.limits import Limits
+from ..storage.sqlite.journal import HullRow, Journal
 from .live_hull import Birth, Config, LiveHull
 from .storage import HullStore
 

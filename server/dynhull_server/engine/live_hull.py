@@ -11,11 +11,8 @@ from typing import TypeVar
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from ..journal.errors import JournalError
-from ..journal.records import Record
-from .batch import Applied, apply_batch
-from .difference import Differences
-from .errors import (
+from ..state.batch import Applied, apply_batch
+from ..state.errors import (
     HullEmptyError,
     HullNotFoundError,
     HullReplacedError,
@@ -23,10 +20,13 @@ from .errors import (
     RevisionForgottenError,
     StorageError,
 )
-from .history import History
-from .limits import Limits
-from .producers import Producers
-from .sample import sample
+from ..state.history import History
+from ..state.limits import Limits
+from ..state.producers import Producers
+from ..state.sample import sample
+from ..storage.sqlite.errors import JournalError
+from ..storage.sqlite.records import Record
+from .difference import Differences
 from .serial import SerialExecutor
 from .storage import HullStore, Restored, storage_error
 from .verification import Verification, verify

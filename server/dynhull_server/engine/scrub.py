@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 
-from .errors import HullNotFoundError
+from ..state.errors import HullNotFoundError
 from .hulls import Engine
 from .live_hull import LiveHull
 from .verification import Verification

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 
-from .errors import HullNotFoundError, StorageError
+from ..state.errors import HullNotFoundError, StorageError
 from .hulls import Engine
 
 PAUSE = 1.0  # seconds between two looks

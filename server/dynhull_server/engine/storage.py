@@ -10,11 +10,11 @@ import numpy as np
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from ..journal.errors import JournalError, JournalFullError
-from ..journal.journal import NEWEST, HullRow, Journal
-from ..journal.records import Record
-from ..journal.recovery import Recovered
-from .errors import StorageError, StorageFullError
+from ..state.errors import StorageError, StorageFullError
+from ..storage.sqlite.errors import JournalError, JournalFullError
+from ..storage.sqlite.journal import NEWEST, HullRow, Journal
+from ..storage.sqlite.records import Record
+from ..storage.sqlite.recovery import Recovered
 
 # Batches are replayed together up to so many points: as a set, which is many times faster.
 REPLAYED_TOGETHER = 65_536

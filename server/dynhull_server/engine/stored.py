@@ -5,8 +5,8 @@ from pathlib import Path
 
 from dynhull.arrays import Points
 
-from ..journal import copies
-from ..journal.errors import JournalError
+from ..storage.sqlite import copies
+from ..storage.sqlite.errors import JournalError
 from .storage import replayed
 
 

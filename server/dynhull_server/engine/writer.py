@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .batch import Applied, Batch
-from .errors import RefusedError
+from ..state.batch import Applied, Batch
+from ..state.errors import RefusedError
 from .serial import SerialExecutor
 
 # Work on at most so many points, about, is done at once, on the event loop: a tenth of a millisecond.

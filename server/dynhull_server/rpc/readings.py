@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points
 
-from ..engine.errors import HullUnsuitableError
+from ..state.errors import HullUnsuitableError
 
 
 @dataclass(frozen=True, slots=True)

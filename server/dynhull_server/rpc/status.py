@@ -8,7 +8,7 @@ from google.rpc import code_pb2 as code
 from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFailure, QuotaFailure, ResourceInfo
 from google.rpc.status_pb2 import Status
 
-from ..engine.errors import (
+from ..state.errors import (
     HullEmptyError,
     HullExistsError,
     HullNotFoundError,

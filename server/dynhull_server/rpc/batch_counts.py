@@ -7,7 +7,7 @@ from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.utils import INF, floatToGoString
 
-from ..engine.batch import Applied
+from ..state.batch import Applied
 
 
 class BatchCounts:

@@ -12,7 +12,7 @@ import grpc
 from google.protobuf.message import Message
 from grpc_status import rpc_status
 
-from ..engine.errors import LimitExceededError
+from ..state.errors import LimitExceededError
 from .access import Access
 from .metrics import Metrics
 from .status import ANSWERED, DrainingError, StartingError, error_status

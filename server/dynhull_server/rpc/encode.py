@@ -8,10 +8,10 @@ from dynhull import measure
 from dynhull.arrays import Points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
-from ..engine.batch import Applied
 from ..engine.live_hull import Counts, LiveHull
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
+from ..state.batch import Applied
 
 
 def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.Points:

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..engine.errors import RefusedError
+from ..state.errors import RefusedError
 
 log = logging.getLogger(__name__)
 

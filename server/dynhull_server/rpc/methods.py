@@ -11,7 +11,7 @@ from google.protobuf.message_factory import GetMessageClass
 
 from dynhull_proto.v1 import hull_service_pb2
 
-from ..engine.errors import LimitExceededError
+from ..state.errors import LimitExceededError
 from .calls import Call, Calls, Received, Work
 from .hull_service import HullService
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
-from ..engine.batch import Batch
 from ..engine.live_hull import Config
+from ..state.batch import Batch
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")

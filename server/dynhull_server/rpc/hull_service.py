@@ -9,11 +9,11 @@ import numpy as np
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ..engine.errors import HullEmptyError
 from ..engine.hulls import Engine
 from ..engine.live_hull import Config, LiveHull
 from ..engine.views import SketchView, VerticesView, View
 from ..engine.watch import watch
+from ..state.errors import HullEmptyError
 from . import answers, decode, encode
 from .calls import Call
 from .metrics import Metrics

@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from typing import Any
 
-from ..engine.batch import Applied
 from ..engine.live_hull import LiveHull
 from ..engine.writer import Write
+from ..state.batch import Applied
 from . import decode
 from .calls import Call
 from .metrics import Metrics

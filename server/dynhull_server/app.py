@@ -9,19 +9,19 @@ from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 from prometheus_client import start_http_server
 
-from ..engine.hulls import Engine
-from ..engine.limits import Limits
-from ..engine.live_hull import LiveHull
-from ..engine.scrub import scrub
-from ..engine.snapshots import keep_snapshots
-from ..engine.verification import Verification
-from ..journal.journal import Journal
-from ..settings import Settings
-from .access import EVERYTHING, Access, TokenFile
-from .calls import Calls, Context
-from .hull_service import HullService
-from .methods import DESCRIPTOR, method_handlers
-from .metrics import Metrics, StateCollector
+from .engine.hulls import Engine
+from .engine.live_hull import LiveHull
+from .engine.scrub import scrub
+from .engine.snapshots import keep_snapshots
+from .engine.verification import Verification
+from .rpc.access import EVERYTHING, Access, TokenFile
+from .rpc.calls import Calls, Context
+from .rpc.hull_service import HullService
+from .rpc.methods import DESCRIPTOR, method_handlers
+from .rpc.metrics import Metrics, StateCollector
+from .settings import Settings
+from .state.limits import Limits
+from .storage.sqlite.journal import Journal
 
 SERVICE = DESCRIPTOR.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm.
