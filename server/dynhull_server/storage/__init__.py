@@ -1,0 +1,1 @@
+"""Where hulls are kept: the port, and its implementations in memory and on SQLite."""

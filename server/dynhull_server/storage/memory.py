@@ -1,0 +1,130 @@
+"""A storage in memory: for servers that keep nothing, and as the simplest one that fulfils the port."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dynhull.arrays import Points
+
+from ..state.records import Append, Change, Create, Delete, HullRow, Kept, Record
+from .port import NEWEST, Contents, DamagedError, Progress, Step
+
+KEPT_SNAPSHOTS = 2
+
+
+@dataclass(slots=True)
+class _Snapshot:
+    """A step that is a whole snapshot."""
+
+    number: int
+    revision: int
+    points: Points
+    producers: dict[str, int]
+
+
+@dataclass(slots=True)
+class _Hull:
+    row: HullRow
+    records: list[Record] = field(default_factory=list)
+    snapshots: list[_Snapshot] = field(default_factory=list)
+
+
+class MemoryStorage:
+    """Hulls in memory.
+
+    Args:
+        forgets: keep the hulls' rows only, no batches: then nothing can be read back.
+    """
+
+    immediate = True
+
+    def __init__(self, *, forgets: bool = False) -> None:
+        self._forgets = forgets
+        self._hulls: dict[int, _Hull] = {}
+        self._next_number = 1
+
+    def open(self, progress: Progress) -> Contents:
+        """What is there."""
+        progress(0, len(self._hulls))
+        rows = sorted((hull.row for hull in self._hulls.values()), key=lambda row: row.name)
+        return Contents(rows, self._next_number, [])
+
+    def commit(self, changes: Sequence[Change | Step]) -> None:
+        """Keep the changes."""
+        for change in changes:
+            match change:
+                case Append():
+                    if not self._forgets:
+                        self._append(change)
+                case Create():
+                    self._hulls[change.row.number] = _Hull(change.row)
+                    self._next_number = max(self._next_number, change.row.number + 1)
+                case Delete():
+                    del self._hulls[change.number]
+                case _Snapshot():
+                    self._take(change)
+
+    def settle(self) -> None:
+        """Every commit is kept: there is nothing to decide."""
+
+    def row(self, number: int) -> HullRow | None:
+        """The hull of that number, None where there is none."""
+        hull = self._hulls.get(number)
+        return None if hull is None else hull.row
+
+    def read(self, number: int, until: int = NEWEST) -> Kept:
+        """A hull as it was at a revision. DamagedError where its batches were not kept."""
+        hull = self._hulls[number]
+        if self._forgets:
+            raise DamagedError(f"the batches of {hull.row.name} were not kept")
+        newest_first = sorted(hull.snapshots, key=lambda each: -each.revision)
+        base = next((each for each in newest_first if each.revision <= until), None)
+        if base is None:
+            base = _Snapshot(number, 0, np.empty((0, 2)), {})
+        records = [record for record in hull.records if base.revision < record.revision <= until]
+        return Kept(base.revision, base.points, dict(base.producers), records)
+
+    def oldest(self, number: int) -> int:
+        """The oldest revision that `read` can go back to."""
+        hull = self._hulls[number]
+        if self._forgets:
+            return NEWEST
+        return hull.snapshots[0].revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
+
+    def snapshot(
+        self, number: int, revision: int, points: Points, producers: Mapping[str, int]
+    ) -> Iterator[Step]:
+        """One step."""
+        if not self._forgets:
+            yield _Snapshot(number, revision, points, dict(producers))
+
+    def sweep(self) -> Iterator[Step]:
+        """Nothing is left behind."""
+        return iter(())
+
+    def sync(self) -> None:
+        """There is nothing more durable."""
+
+    def checkpoint(self) -> None:
+        """There is nothing to keep."""
+
+    def bytes_used(self) -> int:
+        """None on the disk."""
+        return 0
+
+    def close(self) -> None:
+        """Nobody else waits for it."""
+
+    def _append(self, change: Append) -> None:
+        hull = self._hulls[change.number]
+        hull.records += change.records
+
+    def _take(self, snapshot: _Snapshot) -> None:
+        hull = self._hulls.get(snapshot.number)
+        if hull is None:  # deleted meanwhile
+            return
+        hull.snapshots = [*hull.snapshots, snapshot][-KEPT_SNAPSHOTS:]
+        if len(hull.snapshots) == KEPT_SNAPSHOTS:
+            oldest = hull.snapshots[0].revision
+            hull.records = [record for record in hull.records if record.revision > oldest]
