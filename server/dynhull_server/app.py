@@ -2,17 +2,21 @@
 
 import asyncio
 import logging
+import os
+import sys
 from collections.abc import Callable
+from functools import partial
 
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 from prometheus_client import start_http_server
 
-from .engine.hulls import Engine
+from .engine.engine import Engine
 from .engine.live_hull import LiveHull
-from .engine.scrub import scrub
-from .engine.snapshots import keep_snapshots
+from .engine.scrub import Scrub
+from .engine.supervisor import Supervisor
+from .engine.threads import Machine
 from .engine.verification import Verification
 from .rpc.access import EVERYTHING, Access, TokenFile
 from .rpc.calls import Calls, Context
@@ -21,7 +25,9 @@ from .rpc.methods import DESCRIPTOR, method_handlers
 from .rpc.metrics import Metrics, StateCollector
 from .settings import Settings
 from .state.limits import Limits
-from .storage.sqlite.journal import Journal
+from .storage.memory import MemoryStorage
+from .storage.port import Storage
+from .storage.sqlite.writer import Durability
 
 SERVICE = DESCRIPTOR.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm.
@@ -38,6 +44,10 @@ KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
 # A message of so many bytes beyond the limit is read, to be refused with details.
 REFUSED_BYTES = 64 * 2**20
 
+# Seconds between syncs where commits are not durable by themselves: with the sync itself, less than the tenth of a
+# second after which an acknowledged batch survives a power failure.
+SYNC_SECONDS = 0.05
+
 log = logging.getLogger(__name__)
 
 
@@ -51,10 +61,16 @@ class Server:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        journal = None if settings.in_memory else Journal(settings.data, settings.durability)
-        self._engine = Engine(
-            Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes), journal
+        self._machine = machine = Machine()
+        self._supervisor = Supervisor(machine.clock, self._well_or_not, _end_process)
+        limits = Limits(
+            max_hulls=settings.max_hulls,
+            max_points=settings.max_points,
+            max_producers=settings.max_producers,
+            max_producers_per_caller=settings.max_producers_per_caller,
+            history_bytes=settings.history_bytes,
         )
+        self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
         self._metrics = Metrics()
         authenticate = _anonymous if settings.tokens is None else _bearer(TokenFile(settings.tokens))
         self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, settings.max_streams)
@@ -70,9 +86,10 @@ class Server:
                 ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
             ]
         )
-        self._scrub: asyncio.Task[None] | None = None
-        self._snapshots: asyncio.Task[None] | None = None
+        self._telling: asyncio.Task[None] | None = None
         self._stop_metrics: Callable[[], None] = lambda: None
+        self._serving = False
+        self._well = True
         self.address = ""
         self.metrics_address = ""
 
@@ -101,37 +118,48 @@ class Server:
         await self._health.set("", NOT_SERVING)
         await self._health.set(SERVICE, NOT_SERVING)
         await self._server.start()
-        for note in await self._engine.restore(progress):
+        for note in await self._engine.start(progress):
             log.warning("lost", extra={"what": note})
         self._calls.ready()
-        for name in ("", SERVICE, SCRUB):
-            await self._health.set(name, SERVING)
+        await self._health.set(SCRUB, SERVING)
+        self._serving = True
+        self._well_or_not(None)
         if not self._settings.in_memory:
-            self._snapshots = asyncio.create_task(keep_snapshots(self._engine, self._settings.snapshot_points))
+            interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
+            self._engine.keep_house(self._settings.snapshot_points, interval)
         if self._settings.scrub_cpu:
-            self._scrub = asyncio.create_task(
-                scrub(
-                    self._engine,
-                    self._settings.scrub_cpu,
-                    self._settings.scrub_pause,
-                    self._compared,
-                    self._metrics.scrub_round,
-                )
-            )
+            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared)
+            self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
         log.info("serving", extra={"address": self.address})
 
     async def drain(self) -> None:
         """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
         log.info("draining")
         await self._health.enter_graceful_shutdown()
-        for task in (self._scrub, self._snapshots):
-            if task is not None:
-                task.cancel()
+        self._serving = False
+        await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_WORDS)
         self._stop_metrics()
-        self._engine.close()
+        await self._engine.close()
         log.info("stopped")
+
+    async def _scrub(self, scrub: Scrub) -> None:
+        await scrub.round()
+        self._metrics.scrub_round()
+
+    def _well_or_not(self, reason: str | None) -> None:
+        """Tell health checks. Only the last word counts, and words come one after the other."""
+        self._well = reason is None
+        if self._telling is None or self._telling.done():
+            self._telling = asyncio.get_running_loop().create_task(self._tell_health())
+
+    async def _tell_health(self) -> None:
+        told = None
+        while self._serving and told is not self._well:
+            told = self._well
+            for name in ("", SERVICE):
+                await self._health.set(name, SERVING if told else NOT_SERVING)
 
     def _listen(self) -> int:
         address = f"{self._settings.host}:{self._settings.port}"
@@ -173,6 +201,20 @@ class Server:
                 "a hull differs from Chan's algorithm", extra={"hull": hull.name, "difference": outcome.difference}
             )
             asyncio.get_running_loop().create_task(self._health.set(SCRUB, NOT_SERVING))
+
+
+def _storage(settings: Settings) -> Storage:
+    if settings.in_memory:
+        return MemoryStorage(forgets=True)
+    from .storage.sqlite.storage import SQLiteStorage
+
+    return SQLiteStorage(settings.data, settings.durability)
+
+
+def _end_process(reason: str) -> None:
+    """What is acknowledged is kept. The rest cannot be relied on: whoever runs the server starts it again."""
+    print(f"the server ends: {reason}", file=sys.stderr, flush=True)  # noqa: T201  # logging may be what is broken
+    os._exit(os.EX_SOFTWARE)
 
 
 def _anonymous(_: Context) -> Access:

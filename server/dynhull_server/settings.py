@@ -45,6 +45,9 @@ class Settings(BaseSettings):
     max_hulls: int = Field(100_000, ge=1, description="How many hulls there may be.")
     max_points: int = Field(100_000_000, ge=1, description="How many points a hull may have.")
     max_producers: int = Field(10_000, ge=1, description="How many numbering writers a hull may have in a day.")
+    max_producers_per_caller: int = Field(
+        1_000, ge=1, description="How many of those one token may name, or without tokens one address."
+    )
     max_streams: int = Field(10_000, ge=1, description="How many streaming calls there may be at a time.")
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds a watcher may take for one event.")
     history_bytes: int = Field(4 * 2**20, ge=0, description="Memory a hull may take for watches that resume.")

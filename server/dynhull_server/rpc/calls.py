@@ -32,12 +32,14 @@ class Call:
 
     Attributes:
         access: what the caller may do.
+        owner: who answers for the producers it names.
         batches: how many batches the call has applied; None for calls that apply none or one.
         message_bytes: the size of the last message that came.
     """
 
     def __init__(self, calls: "Calls", context: Context, access: Access) -> None:
         self.access = access
+        self.owner = ""
         self.batches: int | None = None
         self.message_bytes = 0
         self.cutoff = calls.cutoff

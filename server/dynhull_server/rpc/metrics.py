@@ -13,7 +13,7 @@ from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from ..engine.hulls import Engine
+from ..engine.engine import Engine
 from .batch_counts import BatchCounts
 
 # Seconds; from a small batch applied at once to one that fills a message.

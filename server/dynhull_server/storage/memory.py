@@ -92,9 +92,7 @@ class MemoryStorage:
             return NEWEST
         return hull.snapshots[0].revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
 
-    def snapshot(
-        self, number: int, revision: int, points: Points, producers: Mapping[str, int]
-    ) -> Iterator[Step]:
+    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
         """One step."""
         if not self._forgets:
             yield _Snapshot(number, revision, points, dict(producers))

@@ -1,7 +1,7 @@
 """The port: what the engine asks of a storage, whatever is behind it.
 
-Calls block until they are done. One thread commits; reads come from any thread, at any time. A storage starts no threads
-of its own: the engine calls `sync` and `checkpoint`, and carries out the steps of `snapshot` and `sweep`.
+Calls block until they are done. One thread commits; reads come from any thread, at any time. A storage starts no
+threads of its own: the engine calls `sync` and `checkpoint`, and carries out the steps of `snapshot` and `sweep`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -109,9 +109,7 @@ class Storage(Protocol):
     def oldest(self, number: int) -> int:
         """The oldest revision of a hull that `read` can go back to."""
 
-    def snapshot(
-        self, number: int, revision: int, points: Points, producers: Mapping[str, int]
-    ) -> Iterator["Step"]:
+    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator["Step"]:
         """Write a snapshot, then drop what it makes superfluous: each step is to be committed before the next is taken.
 
         A snapshot counts from its last writing step on. Steps are small, so that other commits need not wait for them.
