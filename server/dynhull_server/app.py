@@ -178,7 +178,7 @@ class Server:
         if self._settings.metrics_port is None:
             return
         registry = self._metrics.registry
-        registry.register(StateCollector(self._engine, self._metrics, asyncio.get_running_loop()))
+        registry.register(StateCollector(self._engine, self._metrics, self._supervisor, asyncio.get_running_loop()))
         host, port = self._settings.metrics_host, self._settings.metrics_port
         try:
             server, thread = start_http_server(port, host, registry)

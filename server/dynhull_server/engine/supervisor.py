@@ -89,6 +89,10 @@ class Supervisor:
         log.critical("background work has died: the server ends", extra={"work": name}, exc_info=error)
         self._fatal(f"{name}: {_words(error)}")
 
+    def failing_seconds(self, health: Health) -> float:
+        """For how long some work has been failing; 0 while it succeeds."""
+        return 0.0 if health.failing_since is None else self._clock.monotonic() - health.failing_since
+
     async def stop(self) -> None:
         """End the periodic work."""
         for task in self._tasks:
