@@ -78,6 +78,8 @@ class Trip:
                 request.error = error
                 if stream is not None:
                     stream.stopped = True
+                if self.torn:  # what comes after would run on a part of a batch
+                    return
 
     def changes(self) -> list[Change]:
         """What has to be kept."""
