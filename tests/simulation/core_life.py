@@ -216,7 +216,7 @@ class CoreServer:
         await self._ask(DeleteHull(Answer(), name))
 
     async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
-        birth = self._birth() if create and name not in self.core.hulls else None
+        birth = self._birth() if create else None
         applied: Applied = await self._ask(WriteBatch(Answer(), name, write, birth, rows=write.rows))
         return applied
 

@@ -194,7 +194,7 @@ class Engine:
 
         With `create`, a hull that is not there is made for it.
         """
-        birth = self._birth() if create and not self.has(name) else None
+        birth = self._birth() if create else None
         applied: Applied = await self.ask(WriteBatch(Waiter(), name, write, birth, rows=write.rows))
         return applied
 
