@@ -215,6 +215,12 @@ class CoreServer:
     async def delete(self, name: str) -> None:
         await self._ask(DeleteHull(Answer(), name))
 
+    async def delete_at_once(self, name: str, times: int) -> None:
+        requests = [DeleteHull(Answer(), name) for _ in range(times)]
+        for request in requests:
+            self.dispatch(request)
+        await Wait(lambda: all(request.to.told for request in requests))
+
     async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
         birth = self._birth() if create else None
         applied: Applied = await self._ask(WriteBatch(Answer(), name, write, birth, rows=write.rows))
@@ -253,12 +259,13 @@ class CoreServer:
             self._now += DAY
             self.dispatch(Tick(self._now))
             return
+        asked = self.model.ask(op["name"])
         try:
             hull = self.core.get(op["name"])
             read = ReadHull(Answer(), hull, lambda state: (state.hull.points(), state.producers()))
             counts, (points, producers) = await self._ask(read)
         except (RefusedError, StoppingError) as error:
-            client.refused(self.model.ask(op["name"]), error, (HullNotFoundError,))
+            client.refused(asked, error, (HullNotFoundError,))
             return
         for step in self._storage.snapshot(hull.row.number, counts.revision, points, producers):
             failed: list[Exception | None] = []

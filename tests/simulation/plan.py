@@ -19,8 +19,28 @@ Operation = dict[str, Any]
 NAMES = ("a", "b", "c")
 
 # What can be asked for, and how often.
-CORE = {"write": 40, "stream": 14, "read": 12, "delete": 10, "create": 8, "recall": 5, "snapshot": 5, "last": 4, "day": 1}
-SHELL = {"write": 34, "stream": 14, "read": 10, "delete": 9, "create": 8, "recall": 12, "last": 3, "watch": 6, "rest": 8}
+CORE = {
+    "write": 40,
+    "stream": 14,
+    "read": 12,
+    "delete": 10,
+    "create": 8,
+    "recall": 5,
+    "snapshot": 5,
+    "last": 4,
+    "day": 1,
+}
+SHELL = {
+    "write": 34,
+    "stream": 14,
+    "read": 10,
+    "delete": 9,
+    "create": 8,
+    "recall": 12,
+    "last": 3,
+    "watch": 6,
+    "rest": 8,
+}
 
 # How a commit fails: surely not done; done or not though it raised; and not decided before it is settled.
 COMMIT_FAULTS = ("nothing", "full", "lost", "ghost", "memory", "ghost memory", "later lost", "later ghost")

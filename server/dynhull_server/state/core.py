@@ -175,22 +175,25 @@ class Core:
         if queue is None:
             queue = self._queues[name] = _Queue(name)
         queue.waiting.append(request)
-        if self._stopping:
-            self._refuse_waiting(queue, StoppingError(), effects)
-        elif queue.ill is not None:
+        if queue.ill is not None:
             self._refuse_waiting(queue, _ill(queue.ill), effects)
-        if queue.trip is None:
-            self._start(queue, effects)
+        self._go_on(queue, effects)
 
     def _gone(self, event: Gone, _: list[Effect]) -> None:
         event.what.leave()
 
-    def _start(self, queue: _Queue, effects: list[Effect]) -> None:
-        """Begin a trip with what waits, if there is anything."""
-        requests, rows = self._take(queue)
-        if not requests:
-            self._rest(queue)
-            return
+    def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
+        """Begin trips with what waits, until one of them takes time."""
+        while queue.trip is None:
+            if self._stopping:
+                self._refuse_waiting(queue, StoppingError(), effects)
+            requests, rows = self._take(queue)
+            if not requests:
+                self._rest(queue)
+                return
+            self._start(queue, requests, rows, effects)
+
+    def _start(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
         number, refusal = 0, None
         if queue.hull is None:
             number, refusal = self._next_number, self._no_more_hulls()
@@ -229,11 +232,13 @@ class Core:
 
     def _computed(self, event: Computed, effects: list[Effect]) -> None:
         trip = event.ticket
-        self._ran(self._queues[trip.name], trip, effects)
+        queue = self._queues[trip.name]
+        self._ran(queue, trip, effects)
+        self._go_on(queue, effects)
 
     def _ran(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         if trip.torn:
-            self._failed(Failed(trip, MemoryError("a batch was applied in part"), unknown=False), effects)
+            self._fail(queue, trip, MemoryError("a batch was applied in part"), effects)
             return
         changes = trip.changes()
         if changes:
@@ -242,10 +247,9 @@ class Core:
             self._end(queue, trip, effects)
 
     def _end(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
-        """The trip is over: tell its callers, and begin the next one."""
+        """The trip is over: tell its callers."""
         effects.append(Told([request for request in trip.requests if not request.abandoned]))
         self._over(queue, trip)
-        self._go_on(queue, effects)
 
     def _over(self, queue: _Queue, trip: Trip) -> None:
         queue.trip = None
@@ -255,20 +259,17 @@ class Core:
         if trip.before is None:
             self._creating -= 1
 
-    def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
-        if self._stopping:
-            self._refuse_waiting(queue, StoppingError(), effects)
-        self._start(queue, effects)
-
     def _rest(self, queue: _Queue) -> None:
         """Forget the queue of a name without a hull."""
-        if queue.hull is None and queue.trip is None and not queue.waiting:
-            self._queues.pop(queue.name, None)
+        if queue.hull is None:
+            del self._queues[queue.name]
 
     # Commits
 
     def _committed(self, event: Committed, effects: list[Effect]) -> None:
-        self._keep(self._queues[event.ticket.name], event.ticket, effects)
+        queue = self._queues[event.ticket.name]
+        self._keep(queue, event.ticket, effects)
+        self._go_on(queue, effects)
 
     def _keep(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The changes of the trip are there: everybody may see them."""
@@ -288,12 +289,18 @@ class Core:
 
     def _failed(self, event: Failed, effects: list[Effect]) -> None:
         trip = event.ticket
-        trip.failure, trip.unknown = event.error, event.unknown
         queue = self._queues[trip.name]
         if event.unknown:
+            trip.failure, trip.unknown = event.error, True
             self._examine(trip, effects)
             return
-        self._refuse_changes(trip, _not_stored(event.error), effects)
+        self._fail(queue, trip, event.error, effects)
+        self._go_on(queue, effects)
+
+    def _fail(self, queue: _Queue, trip: Trip, error: Exception, effects: list[Effect]) -> None:
+        """Nothing of the trip is kept."""
+        trip.failure = error
+        self._refuse_changes(trip, _not_stored(error), effects)
         if trip.before is not None and trip.has_records:
             self._examine(trip, effects)  # the batches are in its state
         else:
@@ -324,7 +331,6 @@ class Core:
             request.result = request.error = None
         self._over(queue, trip)
         queue.waiting[:0] = reads
-        self._go_on(queue, effects)
 
     # What the storage has
 
@@ -335,28 +341,33 @@ class Core:
         load = partial(HullState, self._limits, row.max_points, now=self._now)
         effects.append(Examine(trip, row.number, trip.unknown, load))
 
+    def _under_way(self, trip: Trip) -> _Queue | None:
+        """The queue of a trip; None where the server is stopping, and did not wait for it."""
+        queue = self._queues.get(trip.name)
+        return queue if queue is not None and queue.trip is trip else None
+
     def _examined(self, event: Examined, effects: list[Effect]) -> None:
         trip, found = event.ticket, event.state
-        queue = self._queues[trip.name]
-        if queue.trip is not trip:  # the server is stopping, and does not wait
+        queue = self._under_way(trip)
+        if queue is None:
             return
         if trip.unknown and trip.landed(found):
             self._keep(queue, trip, effects)
-            return
-        if trip.before is not None:
-            if found is None:
-                self._not_examined(NotExamined(trip, LookupError("the storage does not know the hull")), effects)
-                return
-            trip.before.state = found
-        assert trip.failure is not None  # or it would not have been examined
-        if trip.unknown:
-            self._refuse_changes(trip, _not_stored(trip.failure), effects)
-        self._again(queue, trip, effects)
+        elif trip.before is not None and found is None:
+            self._not_examined(NotExamined(trip, LookupError("the storage does not know the hull")), effects)
+        else:
+            if trip.before is not None and found is not None:
+                trip.before.state = found
+            assert trip.failure is not None  # or it would not have been examined
+            if trip.unknown:
+                self._refuse_changes(trip, _not_stored(trip.failure), effects)
+            self._again(queue, trip, effects)
+        self._go_on(queue, effects)
 
     def _not_examined(self, event: NotExamined, effects: list[Effect]) -> None:
         trip = event.ticket
-        queue = self._queues[trip.name]
-        if queue.trip is not trip:
+        queue = self._under_way(trip)
+        if queue is None:
             return
         queue.ill = event.error
         if trip.unknown:
@@ -372,7 +383,7 @@ class Core:
         queue.pause = min(2 * queue.pause, LONGEST_PAUSE)
 
     def _retried(self, event: Retried, effects: list[Effect]) -> None:
-        if self._queues[event.ticket.name].trip is event.ticket:
+        if self._under_way(event.ticket) is not None:
             self._examine(event.ticket, effects)
 
     def _refuse_waiting(self, queue: _Queue, error: Exception, effects: list[Effect]) -> None:
@@ -398,13 +409,12 @@ class Core:
         for queue in list(self._queues.values()):
             if queue.ill is not None and queue.trip is not None:
                 self._abandon(queue, queue.trip, effects)
-            else:
-                self._refuse_waiting(queue, StoppingError(), effects)
+            # What waits for a trip is refused after it: the answers of a stream come in their order.
 
     def _abandon(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The next start will find out what became of the trip."""
         self._over(queue, trip)
-        self._refuse_waiting(queue, StoppingError(), effects)
+        self._go_on(queue, effects)
 
 
 def _not_stored(error: Exception) -> NotStoredError:
