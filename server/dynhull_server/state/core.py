@@ -100,10 +100,12 @@ class Core:
         limits: on the state.
         next_number: greater than the number of every hull there has ever been.
         now: seconds on a clock that never goes back.
+        immediate: whether a Commit is done when it is carried out, and cannot fail: then nothing is said of it.
     """
 
-    def __init__(self, limits: Limits, next_number: int = 1, now: float = 0.0) -> None:
+    def __init__(self, limits: Limits, next_number: int = 1, now: float = 0.0, *, immediate: bool = False) -> None:
         self._limits = limits
+        self._immediate = immediate
         self._next_number = next_number
         self._now = now
         self._queues: dict[str, _Queue] = {}
@@ -174,13 +176,30 @@ class Core:
         queue = self._queues.get(name)
         if queue is None:
             queue = self._queues[name] = _Queue(name)
+        if queue.trip is None and not self._stopping and not request.abandoned:
+            if type(request) is ReadHull and request.rows <= SMALL:
+                self._read(queue, request)
+                effects.append(Told([request]))
+            else:
+                self._begin(queue, [request], request.rows, effects)
+            return
         queue.waiting.append(request)
         if self._stopping:
             self._refuse_waiting(queue, StoppingError(), effects)
         elif queue.ill is not None:
             self._refuse_waiting(queue, _ill(queue.ill), effects)
-        if queue.trip is None:
-            self._start(queue, effects)
+
+    def _read(self, queue: _Queue, request: ReadHull) -> None:
+        """A small read of a hull that nothing is done to needs no trip."""
+        hull = queue.hull
+        if hull is None or hull is not request.hull:
+            request.error = HullNotFoundError(queue.name)
+            self._rest(queue)
+            return
+        try:
+            request.result = hull.counts, request.function(hull.state)
+        except Exception as error:  # whatever it is, it belongs to the caller
+            request.error = error
 
     def _gone(self, event: Gone, _: list[Effect]) -> None:
         event.what.leave()
@@ -188,15 +207,19 @@ class Core:
     def _start(self, queue: _Queue, effects: list[Effect]) -> None:
         """Begin a trip with what waits, if there is anything."""
         requests, rows = self._take(queue)
-        if not requests:
+        if requests:
+            self._begin(queue, requests, rows, effects)
+        else:
             self._rest(queue)
-            return
+
+    def _begin(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
+        hull = queue.hull
         number, refusal = 0, None
-        if queue.hull is None:
+        if hull is None:
             number, refusal = self._next_number, self._no_more_hulls()
             self._next_number += 1
             self._creating += 1
-        trip = queue.trip = Trip(queue.name, queue.hull, requests, number, refusal, self._limits, self._now)
+        trip = queue.trip = Trip(queue.name, hull, requests, number, refusal, self._limits, self._now)
         self._trips += 1
         if rows > SMALL:
             effects.append(Compute(trip))
@@ -236,16 +259,20 @@ class Core:
             self._failed(Failed(trip, MemoryError("a batch was applied in part"), unknown=False), effects)
             return
         changes = trip.changes()
-        if changes:
-            effects.append(Commit(trip, changes))
-        else:
+        if not changes:
             self._end(queue, trip, effects)
+            return
+        effects.append(Commit(trip, changes))
+        if self._immediate:
+            self._keep(queue, trip, effects)
 
     def _end(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The trip is over: tell its callers, and begin the next one."""
-        effects.append(Told([request for request in trip.requests if not request.abandoned]))
+        requests = trip.requests
+        effects.append(Told(requests if len(requests) == 1 and not requests[0].abandoned else _present(requests)))
         self._over(queue, trip)
-        self._go_on(queue, effects)
+        if queue.waiting or queue.hull is None:
+            self._go_on(queue, effects)
 
     def _over(self, queue: _Queue, trip: Trip) -> None:
         queue.trip = None
@@ -405,6 +432,10 @@ class Core:
         """The next start will find out what became of the trip."""
         self._over(queue, trip)
         self._refuse_waiting(queue, StoppingError(), effects)
+
+
+def _present(requests: list[Request]) -> list[Request]:
+    return [request for request in requests if not request.abandoned]
 
 
 def _not_stored(error: Exception) -> NotStoredError:
