@@ -194,7 +194,7 @@ class Engine:
 
         With `create`, a hull that is not there is made for it.
         """
-        birth = self._birth() if create and not self.has(name) else None
+        birth = self._birth() if create else None
         applied: Applied = await self.ask(WriteBatch(Waiter(), name, write, birth, rows=write.rows))
         return applied
 
@@ -308,10 +308,20 @@ class Engine:
         self._turns.submit(trip.run).add_done_callback(ran)
 
     def _examine(self, effect: Examine) -> None:
+        """Decide what the storage has of the hull, in the committing thread, then read it in another."""
+        if not effect.settle:
+            self._read_for(effect)
+            return
+
+        def settled(error: Exception | None, _: bool) -> None:
+            event = None if error is None else NotExamined(effect.ticket, error)
+            self._from_thread(partial(self._read_for, effect) if event is None else partial(self.dispatch, event))
+
+        self._commits.settle(settled)
+
+    def _read_for(self, effect: Examine) -> None:
         def examined() -> Event:
             try:
-                if effect.settle:
-                    self._storage.settle()
                 if self._storage.row(effect.number) is None:
                     return Examined(effect.ticket, None)
                 return Examined(effect.ticket, effect.load(self._storage.read(effect.number)))

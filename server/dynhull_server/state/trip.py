@@ -77,6 +77,8 @@ class Trip:
                 request.error = error
                 if type(request) is WriteBatch and request.stream is not None:
                     request.stream.stopped = True
+                if self.torn:  # what comes after would run on a part of a batch
+                    return
 
     def changes(self) -> list[Change]:
         """What has to be kept."""
