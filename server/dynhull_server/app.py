@@ -25,9 +25,10 @@ from .rpc.methods import DESCRIPTOR, method_handlers
 from .rpc.metrics import Metrics, StateCollector
 from .settings import Settings
 from .state.limits import Limits
+from .storage.durability import Durability
 from .storage.memory import MemoryStorage
 from .storage.port import Storage
-from .storage.sqlite.writer import Durability
+from .storage.sqlite.storage import SQLiteStorage
 
 SERVICE = DESCRIPTOR.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm.
@@ -101,7 +102,7 @@ class Server:
 
         Raises:
             RuntimeError: the address is taken or is none of this machine's.
-            JournalError: the stored data cannot be used.
+            StorageError: the stored data cannot be used.
         """
         service = HullService(
             self._engine,
@@ -206,8 +207,6 @@ class Server:
 def _storage(settings: Settings) -> Storage:
     if settings.in_memory:
         return MemoryStorage(forgets=True)
-    from .storage.sqlite.storage import SQLiteStorage
-
     return SQLiteStorage(settings.data, settings.durability)
 
 

@@ -112,7 +112,7 @@ class CoreServer:
         self._limits = limits
         self._storage = storage
         contents = storage.open(lambda *_: None)
-        self.core = Core(limits, contents.next_number)
+        self.core = Core(limits, contents.next_number, immediate=storage.immediate)
         for row in contents.hulls:
             kept = storage.read(row.number)
             self.core.restore(row, HullState(limits, row.max_points, kept, now=0.0), len(kept.records))
@@ -156,7 +156,7 @@ class CoreServer:
             case Compute():
                 self._computing.append(effect.ticket)
             case Examine():
-                self._examining.append(effect)
+                self._settle(effect)
             case Retry():
                 self._pauses.append(effect.ticket)
             case Moved():
@@ -165,7 +165,6 @@ class CoreServer:
     def _commit(self, trip: Trip, changes: list[Any]) -> None:
         if self._storage.immediate:
             self._storage.commit(changes)
-            self._events.append(Committed(trip))
             return
 
         def done(error: Exception | None, unknown: bool) -> None:
@@ -179,12 +178,23 @@ class CoreServer:
         trip.run()
         self._news.append(partial(self.dispatch, Computed(trip)))
 
+    def _settle(self, effect: Examine) -> None:
+        if not effect.settle:
+            self._examining.append(effect)
+            return
+
+        def settled(error: Exception | None, _: bool) -> None:
+            if error is None:
+                self._news.append(partial(self._examining.append, effect))
+            else:
+                self._news.append(partial(self.dispatch, NotExamined(effect.ticket, error)))
+
+        self._commits.settle(settled)
+
     def _examine(self) -> None:
         effect = self._examining.popleft()
         event: Event
         try:
-            if effect.settle:
-                self._storage.settle()
             row = self._storage.row(effect.number)
             event = Examined(effect.ticket, effect.load(self._storage.read(effect.number)) if row else None)
         except Exception as error:

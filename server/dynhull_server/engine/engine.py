@@ -96,7 +96,7 @@ class Engine:
         self._turns, self.reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
         self.disk = threads.pool("disk", DISK_THREADS)
         contents: Contents = await self.run(self.disk, partial(self._storage.open, progress))
-        self._core = Core(self._limits, contents.next_number, clock.monotonic())
+        self._core = Core(self._limits, contents.next_number, clock.monotonic(), immediate=self._storage.immediate)
         progress(0, len(contents.hulls))
         for done, row in enumerate(contents.hulls, start=1):
             kept = await self.run(self.disk, partial(self._storage.read, row.number))
@@ -211,14 +211,17 @@ class Engine:
 
     def dispatch(self, event: Event) -> None:
         """Hand an event to the core, and carry out what it asks for."""
-        self._events.append(event)
         if self._stepping:
+            self._events.append(event)
             return
         self._stepping = True
         try:
-            while self._events:
-                for effect in self._core.step(self._events.popleft()):
+            while True:
+                for effect in self._core.step(event):
                     self._carry_out(effect)
+                if not self._events:
+                    return
+                event = self._events.popleft()
         except Exception as error:  # the core's own fault: nothing that it holds can be relied on any more
             self._supervisor.died("core", error)
             raise
@@ -290,7 +293,6 @@ class Engine:
     def _commit(self, trip: Trip, changes: list[Any]) -> None:
         if self._storage.immediate:
             self._storage.commit(changes)
-            self._events.append(Committed(trip))
             return
 
         def done(error: Exception | None, unknown: bool) -> None:
@@ -306,10 +308,20 @@ class Engine:
         self._turns.submit(trip.run).add_done_callback(ran)
 
     def _examine(self, effect: Examine) -> None:
+        """Decide what the storage has of the hull, in the committing thread, then read it in another."""
+        if not effect.settle:
+            self._read_for(effect)
+            return
+
+        def settled(error: Exception | None, _: bool) -> None:
+            event = None if error is None else NotExamined(effect.ticket, error)
+            self._from_thread(partial(self._read_for, effect) if event is None else partial(self.dispatch, event))
+
+        self._commits.settle(settled)
+
+    def _read_for(self, effect: Examine) -> None:
         def examined() -> Event:
             try:
-                if effect.settle:
-                    self._storage.settle()
                 if self._storage.row(effect.number) is None:
                     return Examined(effect.ticket, None)
                 return Examined(effect.ticket, effect.load(self._storage.read(effect.number)))

@@ -1,6 +1,6 @@
 """Group commit: one thread commits, and whatever arrives while a commit is under way shares the next."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..state.records import Change
@@ -13,12 +13,16 @@ Done = Callable[[Exception | None, bool], None]
 
 @dataclass(slots=True)
 class _Waiting:
-    changes: list[Change] | list[Step]
+    """Changes to commit; without any, somebody who wants earlier commits to be decided."""
+
+    changes: Sequence[Change | Step]
     done: Done
 
 
 class GroupCommit:
     """Commits changes in the order they come; those of one `submit` together.
+
+    After a commit with an unknown outcome nothing is committed until it has been decided.
 
     Args:
         storage: where to.
@@ -36,12 +40,17 @@ class GroupCommit:
     ) -> None:
         self._storage = storage
         self._report = report
+        self._undecided = False
         self._inbox: Inbox[_Waiting] = threads.inbox()
         self._thread = threads.spawn("commits", self._run, died)
 
-    def submit(self, changes: list[Change] | list[Step], done: Done) -> None:
+    def submit(self, changes: Sequence[Change | Step], done: Done) -> None:
         """Commit the changes, then call `done`, in the committing thread."""
         self._inbox.put(_Waiting(changes, done))
+
+    def settle(self, done: Done) -> None:
+        """Decide what became of earlier commits, then call `done`, in the committing thread."""
+        self._inbox.put(_Waiting((), done))
 
     def close(self) -> None:
         """Commit what waits, and stop. Blocks."""
@@ -50,9 +59,30 @@ class GroupCommit:
 
     def _run(self) -> None:
         while group := self._inbox.take():
-            self._commit(group)
+            if self._decided(group):
+                self._commit([each for each in group if each.changes])
+                for each in group:
+                    if not each.changes:
+                        each.done(None, False)
+
+    def _decided(self, group: list[_Waiting]) -> bool:
+        """Whether nothing of earlier commits is unknown; otherwise the group has been refused."""
+        if not self._undecided:
+            return True
+        try:
+            self._storage.settle()
+        except Exception as error:
+            refusal = NotCommittedError(f"an earlier commit failed, and the disk cannot be read yet: {error}")
+            for each in group:
+                each.done(refusal, False)
+            self._report(error)
+            return False
+        self._undecided = False
+        return True
 
     def _commit(self, group: list[_Waiting]) -> None:
+        if not group:
+            return
         try:
             self._storage.commit([change for each in group for change in each.changes])
         except NotCommittedError as error:
@@ -60,9 +90,9 @@ class GroupCommit:
                 group[0].done(error, False)
                 self._report(error)
             else:  # one too large for the disk must not take the small ones with it
-                for each in group:
-                    self._commit([each])
+                self._commit_apart(group)
         except Exception as error:  # a MemoryError, too: whatever it is, the changes may be there
+            self._undecided = True
             for each in group:
                 each.done(error, True)
             self._report(error)
@@ -70,3 +100,8 @@ class GroupCommit:
             for each in group:
                 each.done(None, False)
             self._report(None)
+
+    def _commit_apart(self, group: list[_Waiting]) -> None:
+        for each in group:
+            if self._decided([each]):
+                self._commit([each])

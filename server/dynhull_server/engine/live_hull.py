@@ -97,7 +97,8 @@ class LiveHull:
     async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
         """What `function`, which looks at about `rows` points, says of the hull in its turn."""
         while True:
-            await self.reached(min_revision)
+            if self._hull.counts.revision < min_revision:
+                await self.reached(min_revision)
             counts, result = await self._engine.ask(ReadHull(Waiter(), self._hull, function, rows=rows))
             if counts.revision >= min_revision:
                 return counts, result

@@ -100,10 +100,12 @@ class Core:
         limits: on the state.
         next_number: greater than the number of every hull there has ever been.
         now: seconds on a clock that never goes back.
+        immediate: whether a Commit is done when it is carried out, and cannot fail: then nothing is said of it.
     """
 
-    def __init__(self, limits: Limits, next_number: int = 1, now: float = 0.0) -> None:
+    def __init__(self, limits: Limits, next_number: int = 1, now: float = 0.0, *, immediate: bool = False) -> None:
         self._limits = limits
+        self._immediate = immediate
         self._next_number = next_number
         self._now = now
         self._queues: dict[str, _Queue] = {}
@@ -174,32 +176,52 @@ class Core:
         queue = self._queues.get(name)
         if queue is None:
             queue = self._queues[name] = _Queue(name)
+        if queue.trip is None and not self._stopping and not request.abandoned:
+            if type(request) is ReadHull and request.rows <= SMALL:
+                self._read(queue, request)
+                effects.append(Told([request]))
+            else:
+                self._begin(queue, [request], request.rows, effects)
+                self._go_on(queue, effects)
+            return
         queue.waiting.append(request)
         if queue.ill is not None:
             self._refuse_waiting(queue, _ill(queue.ill), effects)
         self._go_on(queue, effects)
+
+    def _read(self, queue: _Queue, request: ReadHull) -> None:
+        """A small read of a hull that nothing is done to needs no trip."""
+        hull = queue.hull
+        if hull is None or hull is not request.hull:
+            request.error = HullNotFoundError(queue.name)
+            self._rest(queue)
+            return
+        try:
+            request.result = hull.counts, request.function(hull.state)
+        except Exception as error:  # whatever it is, it belongs to the caller
+            request.error = error
 
     def _gone(self, event: Gone, _: list[Effect]) -> None:
         event.what.leave()
 
     def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
         """Begin trips with what waits, until one of them takes time."""
-        while queue.trip is None:
+        while queue.trip is None and queue.waiting:
             if self._stopping:
                 self._refuse_waiting(queue, StoppingError(), effects)
             requests, rows = self._take(queue)
-            if not requests:
-                self._rest(queue)
-                return
-            self._start(queue, requests, rows, effects)
+            if requests:
+                self._begin(queue, requests, rows, effects)
+        self._rest(queue)
 
-    def _start(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
+    def _begin(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
+        hull = queue.hull
         number, refusal = 0, None
-        if queue.hull is None:
+        if hull is None:
             number, refusal = self._next_number, self._no_more_hulls()
             self._next_number += 1
             self._creating += 1
-        trip = queue.trip = Trip(queue.name, queue.hull, requests, number, refusal, self._limits, self._now)
+        trip = queue.trip = Trip(queue.name, hull, requests, number, refusal, self._limits, self._now)
         self._trips += 1
         if rows > SMALL:
             effects.append(Compute(trip))
@@ -241,14 +263,17 @@ class Core:
             self._fail(queue, trip, MemoryError("a batch was applied in part"), effects)
             return
         changes = trip.changes()
-        if changes:
-            effects.append(Commit(trip, changes))
-        else:
+        if not changes:
             self._end(queue, trip, effects)
+            return
+        effects.append(Commit(trip, changes))
+        if self._immediate:
+            self._keep(queue, trip, effects)
 
     def _end(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The trip is over: tell its callers."""
-        effects.append(Told([request for request in trip.requests if not request.abandoned]))
+        requests = trip.requests
+        effects.append(Told(requests if len(requests) == 1 and not requests[0].abandoned else _present(requests)))
         self._over(queue, trip)
 
     def _over(self, queue: _Queue, trip: Trip) -> None:
@@ -261,7 +286,7 @@ class Core:
 
     def _rest(self, queue: _Queue) -> None:
         """Forget the queue of a name without a hull."""
-        if queue.hull is None:
+        if queue.hull is None and queue.trip is None:
             del self._queues[queue.name]
 
     # Commits
@@ -415,6 +440,10 @@ class Core:
         """The next start will find out what became of the trip."""
         self._over(queue, trip)
         self._go_on(queue, effects)
+
+
+def _present(requests: list[Request]) -> list[Request]:
+    return [request for request in requests if not request.abandoned]
 
 
 def _not_stored(error: Exception) -> NotStoredError:

@@ -68,24 +68,25 @@ class Trip:
     def run(self) -> None:
         """Do what is requested; results and errors are put into the requests."""
         for request in self.requests:
-            stream = request.stream if type(request) is WriteBatch else None
-            if stream is not None and stream.stopped:
-                request.abandoned = True
-                continue
             try:
-                request.result = self._do(request)
+                if type(request) is WriteBatch:
+                    self._write(request)
+                else:
+                    request.result = self._do(request)
             except Exception as error:  # whatever it is, it belongs to the caller
                 request.error = error
-                if stream is not None:
-                    stream.stopped = True
+                if type(request) is WriteBatch and request.stream is not None:
+                    request.stream.stopped = True
                 if self.torn:  # what comes after would run on a part of a batch
                     return
 
     def changes(self) -> list[Change]:
         """What has to be kept."""
         before, after = self.before, self.after
+        if after is before:
+            return [Append(after.row.number, self._records)] if self._records and after is not None else []
         changes: list[Change] = []
-        if after is not None and after is not before:
+        if after is not None:
             changes.append(Create(after.row))
         if self._records and after is not None:
             changes.append(Append(after.row.number, self._records))
@@ -111,8 +112,6 @@ class Trip:
 
     def _do(self, request: Request) -> object:
         match request:
-            case WriteBatch():
-                return self._write(request)
             case ReadHull():
                 return self._read(request)
             case CreateHull():
@@ -129,22 +128,31 @@ class Trip:
                 return None
         raise AssertionError(f"no request: {request}")
 
-    def _write(self, request: WriteBatch) -> object:
-        hull, stream = self.after, request.stream
-        if stream is not None and stream.hull is not None and stream.hull is not hull:
-            raise HullNotFoundError(self.name)
-        if hull is None:
-            if request.birth is None:
-                raise HullNotFoundError(self.name)
-            hull = self._new_hull(request)
-        applied, record = hull.state.apply(request.write, self._now)
+    def _write(self, request: WriteBatch) -> None:
+        stream = request.stream
+        if stream is not None and stream.stopped:
+            request.abandoned = True
+            return
+        hull = self.after
+        if hull is None or (stream is not None and stream.hull is not hull):
+            hull = self._hull_for(request)
+        request.result, record = hull.state.apply(request.write, self._now)
         self.after = hull
         if stream is not None:
             stream.hull = hull
         if record is not None:
             self._records.append(record)
             self.unsaved += len(record.inserts) + len(record.deletes)
-        return applied
+
+    def _hull_for(self, request: WriteBatch) -> Hull:
+        """The hull to write to, a new one where there is none."""
+        if request.stream is not None and request.stream.hull not in (None, self.after):
+            raise HullNotFoundError(self.name)
+        if self.after is not None:
+            return self.after
+        if request.birth is None:
+            raise HullNotFoundError(self.name)
+        return self._new_hull(request)
 
     def _read(self, request: ReadHull) -> object:
         hull = self.after

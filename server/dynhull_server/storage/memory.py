@@ -56,7 +56,7 @@ class MemoryStorage:
             match change:
                 case Append():
                     if not self._forgets:
-                        self._append(change)
+                        self._hulls[change.number].records += change.records
                 case Create():
                     self._hulls[change.row.number] = _Hull(change.row)
                     self._next_number = max(self._next_number, change.row.number + 1)
@@ -113,10 +113,6 @@ class MemoryStorage:
 
     def close(self) -> None:
         """Nobody else waits for it."""
-
-    def _append(self, change: Append) -> None:
-        hull = self._hulls[change.number]
-        hull.records += change.records
 
     def _take(self, snapshot: _Snapshot) -> None:
         hull = self._hulls.get(snapshot.number)
