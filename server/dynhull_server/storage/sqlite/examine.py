@@ -173,7 +173,9 @@ class _Examination:
             return None
         totals, self._findings.both_totals = read_totals(self._connection)
         if totals is None:
-            self._findings.fatal.append("both copies of the totals are damaged, so that missing batches would go unseen")
+            self._findings.fatal.append(
+                "both copies of the totals are damaged, so that missing batches would go unseen"
+            )
         elif not self._findings.both_totals:
             self._findings.notes.append("one of the two copies of the totals was damaged: made anew from the other")
         return totals

@@ -145,7 +145,5 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
 def _batches(connection: sqlite3.Connection, hull: HullRows, ids: "array[int]") -> Iterable[Iterable[Record]]:
     for first, last, stored, payload in rows_by_id(connection, "first, last, checksum, payload", "batches", ids):
         if checksum(payload, hull.row.number, first, last) != stored:
-            raise DamagedError(
-                f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup"
-            )
+            raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
         yield decode(payload, first)
