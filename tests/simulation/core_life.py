@@ -292,6 +292,14 @@ class CoreServer:
         self._clients.append(actor)
         self.schedule.actor(client.producer, actor.ready, actor.act)
 
+    def turn(self) -> bool:
+        """One turn."""
+        return self.schedule.turn()
+
+    def rest(self) -> None:
+        """Let everybody finish."""
+        self.schedule.rest()
+
     def waiting(self) -> list[str]:
         """Who has not been answered, and what has not ended."""
         waiting = [actor.client.producer for actor in self._clients if actor.waiting]
@@ -322,7 +330,7 @@ class CoreServer:
         """Begin nothing more; then nothing may be left under way."""
         self.model.stopping = True
         self.dispatch(Stopping())
-        self.schedule.rest()
+        self.rest()
 
 
 def compare(core: Core, model: Model) -> None:
