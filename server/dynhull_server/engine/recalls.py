@@ -15,6 +15,8 @@ from ..state.records import Kept
 from ..storage.port import Storage, StorageError
 
 Answer = Points | RefusedError
+# How reading fails where the machine has run out of something.
+UNREADABLE = (StorageError, OSError, MemoryError)
 
 
 class Recalls:
@@ -57,7 +59,7 @@ class Recalls:
             try:
                 answers = await self._run(partial(self._recall, hull, sorted(wanted)))
             except Exception as error:
-                refusal = NotStoredError(str(error)) if isinstance(error, StorageError) else error
+                refusal = NotStoredError(str(error)) if isinstance(error, UNREADABLE) else error
                 answers = dict.fromkeys(wanted, refusal)
             except BaseException:
                 for future in wanted.values():
