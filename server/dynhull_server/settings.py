@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, TomlConfigSettingsSource
 
-from .storage.sqlite.writer import Durability
+from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"
 
