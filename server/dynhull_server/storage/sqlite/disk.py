@@ -55,6 +55,4 @@ class Disk:
     def connect(self, database: Path, access: Access) -> sqlite3.Connection:
         """A connection to a database, for any thread, one at a time."""
         address = f"{database.absolute().as_uri()}?{access.value}"
-        return sqlite3.connect(
-            address, uri=True, isolation_level=None, check_same_thread=False, timeout=30
-        )
+        return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=30)
