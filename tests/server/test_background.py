@@ -68,19 +68,16 @@ def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Pat
 
 
 def test_the_process_ends_with_its_committing_thread(tmp_path: Path) -> None:
-    faults = tmp_path / "faults"
-    faults.mkdir()
-    wrap = [sys.executable, FAULTY, str(faults)]
-    with pytest.raises(AssertionError, match="background work has died"):  # so server_process finds it at the end
-        with (
-            server_process("--data", str(tmp_path / "data"), wrap=wrap) as server,
-            HullClient(server.address) as client,
-        ):
-            client.create_hull("a")
-            (faults / "thread").touch()
-            with pytest.raises(DynhullError):
-                client.apply("a", insert=[[1, 2]], timeout=PATIENCE)
-            assert server.process.wait(PATIENCE) == os.EX_SOFTWARE
+    died = "background work has died"
+    with (
+        faulty_server(tmp_path, complaints=died, code=os.EX_SOFTWARE) as (server, faults),
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("a")
+        (faults / "thread").touch()
+        with pytest.raises(DynhullError):
+            client.apply("a", insert=[[1, 2]], timeout=PATIENCE)
+        server.process.wait(PATIENCE)
 
 
 def test_an_outcome_is_unknown_until_the_disk_can_be_read(tmp_path: Path) -> None:

@@ -368,7 +368,7 @@ class Torture:
         resource.prlimit(pid, resource.RLIMIT_NOFILE, before)
 
     def _copy(self) -> None:
-        """A backup of the running server, and a restore of the folder of a killed one: both are served, and are right."""
+        """A backup of the running server, and a restore of a killed one's folder: both are served, and are right."""
         acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
         with tempfile.TemporaryDirectory() as folder:
             copied = Server(Path(folder))
