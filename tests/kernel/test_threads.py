@@ -4,9 +4,11 @@ import os
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from itertools import cycle
 
 import numpy as np
 import pytest
+from inputs import cloud
 
 from dynhull import DynamicHull, _kernel
 
@@ -59,6 +61,37 @@ def test_writers_and_readers():
     tree.check()
     expected = [before] + [np.random.default_rng(n).random((ROWS, 2))[:100] + n for n in range(1, 5)]
     np.testing.assert_array_equal(tree.points(), _kernel.HullTree(np.concatenate(expected)).points())
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_query_sees_no_half_of_an_update():
+    """Many points come and go as one batch: every answer belongs to the hull with them or to the hull without."""
+    random = np.random.default_rng(0)
+    circle, far = cloud("circle", 1000, random), 3 * cloud("circle", 300, random)
+    queries = 5 * random.random((100, 2)) - 2.5
+    hull = DynamicHull(circle)
+
+    def ask(hull):
+        lines = hull.intersect_lines(queries[:-1], queries[1:])
+        return [answer.tobytes() for answer in (hull.distance(queries), lines, hull.count_many(far))]
+
+    allowed = list(map(set, zip(ask(hull), ask(DynamicHull(np.concatenate([circle, far]))), strict=True)))
+    done = threading.Event()
+
+    def change():
+        for update in cycle([hull.insert_many, hull.delete_many]):
+            if done.is_set():
+                return
+            update(far)
+
+    with ThreadPoolExecutor(1) as pool:
+        changing = pool.submit(change)
+        try:
+            for _ in range(150):
+                assert all(answer in known for answer, known in zip(ask(hull), allowed, strict=True))
+        finally:
+            done.set()
+        changing.result()
 
 
 def test_other_threads_run_during_a_batch():
