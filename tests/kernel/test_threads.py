@@ -3,6 +3,7 @@
 import os
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from itertools import cycle
 
@@ -20,6 +21,15 @@ def impatient():
     """Switch threads at every chance."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+@pytest.fixture
+def polite():
+    """Never take the interpreter from a thread: it has to let go of it."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000)
     yield
     sys.setswitchinterval(interval)
 
@@ -87,7 +97,7 @@ def test_a_query_sees_no_half_of_an_update():
     with ThreadPoolExecutor(1) as pool:
         changing = pool.submit(change)
         try:
-            for _ in range(150):
+            for _ in range(50):
                 assert all(answer in known for answer, known in zip(ask(hull), allowed, strict=True))
         finally:
             done.set()
@@ -115,6 +125,35 @@ def test_other_threads_run_during_a_batch():
     counter.join()
     assert began == 0
     assert counted[0] > 1000
+
+
+@pytest.mark.usefixtures("polite")
+@pytest.mark.parametrize("method", ["locate", "support", "tangents", "distance", "intersect_lines", "count_many"])
+def test_other_threads_run_during_queries(method):
+    random = np.random.default_rng(0)
+    tree = _kernel.HullTree(cloud("circle", 1000, random))
+    rows = random.random((2, 20_000, 2))
+    steps = []
+    done = threading.Event()
+
+    def count():
+        while not done.is_set():
+            steps.append(None)
+            time.sleep(0)  # lets go
+
+    counter = threading.Thread(target=count)
+    counter.start()
+    try:
+        before = len(steps)
+        for _ in range(100):  # the system may be slow to run the other
+            getattr(tree, method)(*rows[: 2 if method == "intersect_lines" else 1])
+            if len(steps) > before:
+                break
+        else:
+            pytest.fail("the counter stood still")
+    finally:
+        done.set()
+        counter.join()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")
