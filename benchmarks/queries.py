@@ -143,6 +143,21 @@ def many() -> Iterator[Case]:
         crossings,
         lines,
     )
+    # Where pairs of doubles overflow: exact signs for every row.
+    huge, block = 2.0**600, 8192
+    large, judge = DynamicHull(huge * vertices), HullTree(huge * vertices)
+    far, starts, ends = (huge * rows[:block] for rows in (outside, p, q))
+    kind = f"the same times 2^600, {block:,} rows: "
+    yield Case(
+        kind + "distance", "reference in Python", lambda: large.distance(far), lambda: judge.distance(far), block
+    )
+    yield Case(
+        kind + "crossings",
+        "reference in Python",
+        lambda: large.intersect_lines(starts, ends),
+        lambda: judge.intersect_lines(starts, ends),
+        block,
+    )
 
 
 def pairs() -> Iterator[Case]:
