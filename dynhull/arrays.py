@@ -76,14 +76,17 @@ def refuse_masked(values: Any, name: str) -> None:
     entries = [values]
     for _ in range(MOST_AXES):
         kinds = set(map(type, entries))
+        if kinds <= {float, int} or "numpy.ma" not in sys.modules:
+            return
         if any(issubclass(kind, np.ma.MaskedArray) for kind in kinds):
             raise ValueError(
                 f"{name} must not be or hold a masked array: give np.ma.compress_rows(...), which leaves out the rows "
                 "with hidden entries, or the array's .filled(value)"
             )
-        if not any(issubclass(kind, list | tuple) for kind in kinds):
+        lists = tuple(kind for kind in kinds if issubclass(kind, (list, tuple)))
+        if not lists:
             return
-        entries = list(chain.from_iterable(entry for entry in entries if isinstance(entry, list | tuple)))
+        entries = list(chain.from_iterable(entry for entry in entries if type(entry) in lists))
 
 
 def as_tuples(points: Points) -> list[tuple[float, float]]:
