@@ -17,7 +17,7 @@ from ..convex import Cloud, Convex
 from ..hull import DynamicHull
 from ..static import convex_hull
 from .core import core
-from .difference import Difference, OutOfScaleError, Walk, walk
+from .difference import Difference, Numbers, NumbersError, Walk, walk
 from .expand import expand
 from .polygons import certainly_apart, certainly_touching, distance_of_polygons, polygons_intersect
 from .vectors import scale, unit
@@ -74,9 +74,11 @@ def intersect(a: Shape, b: Shape) -> bool:
 def contact(a: Shape, b: Shape) -> Contact:
     """How two sets lie to each other: distance and closest points, or depth of the overlap and the way out of it.
 
-    Whether they intersect is decided as by `intersect`. Distance and depth: within 1e-12 of the sets' size for
-    polytopes, balls and their sums; within 1e-6 of it for shapes with other curves (a ball scaled unevenly). All this
-    for sets and gaps of a size from 1e-150 to 1e150: beyond, squares leave the range of doubles.
+    Whether they intersect is decided as by `intersect`. Distance and depth, at every size from the smallest doubles to
+    the largest: for points, segments, polygons, polyhedra and live hulls within 1e-12 of the extent of the two sets
+    together, wherever they lie; moved, turned, scaled, rounded and added up, within 1e-12 of their largest coordinate;
+    with other curves (a ball scaled unevenly) within 1e-6 of it. Below 1e-300, also within the smallest double; inf
+    beyond the largest. Where floats cannot keep that, the same steps are done in fractions, some thirty times slower.
     Between unions, all pairs of pieces are looked at: the closest two are told, or the two that overlap most, whose
     depth is a lower bound of the unions'.
 
@@ -109,34 +111,38 @@ def _pieces(shape: Shape) -> Sequence[Convex]:
 
 
 def _intersect(a: Convex, b: Convex) -> bool:
-    return _to_scale(a, b, _are_touching)
+    return _in_numbers_that_do(a, b, _are_touching)
 
 
 def _contact(a: Convex, b: Convex) -> Contact:
-    return _to_scale(a, b, _in_contact)
+    return _in_numbers_that_do(a, b, _in_contact)
 
 
-def _to_scale(a: Convex, b: Convex, find: Callable[[Convex, Convex, Difference, float, float], T]) -> T:
-    """What is found from the difference of the sets' cores and the radius around each, on a scale that fits."""
+def _in_numbers_that_do(a: Convex, b: Convex, find: Callable[[Convex, Convex, Difference, float, float], T]) -> T:
+    """What is found from the difference of the sets' cores and the radius around each, in numbers that do."""
     if a.dimension != b.dimension or a.dimension not in (2, 3):
         raise ValueError(f"shapes must both be of dimension 2 or 3, got {a.dimension} and {b.dimension}")
     (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
-    exponent = None
+    numbers = Numbers()
     while True:
         try:
-            return find(a, b, Difference(inner_a, inner_b, exponent), radius_a, radius_b)
-        except OutOfScaleError as error:
-            exponent = error.exponent
+            return find(a, b, Difference(inner_a, inner_b, numbers), radius_a, radius_b)
+        except NumbersError as error:
+            numbers = error.numbers
 
 
 def _are_touching(a: Convex, b: Convex, difference: Difference, radius_a: float, radius_b: float) -> bool:
     radius = radius_a + radius_b
     seen = walk(difference, enough=radius)
+    if not (seen.sure or _are_polygons(a, b)):
+        difference.doubt()
     return _meet(a, b, seen, radius / difference.scale)
 
 
 def _in_contact(a: Convex, b: Convex, difference: Difference, radius_a: float, radius_b: float) -> Contact:
     seen = walk(difference, enough=inf)
+    if not seen.sure:
+        difference.doubt()
     iterations, points = seen.iterations, seen.points
     radius = (radius_a + radius_b) / difference.scale
     if seen.distance > 0:
@@ -158,15 +164,15 @@ def _in_contact(a: Convex, b: Convex, difference: Difference, radius_a: float, r
 
 def _meet(a: Convex, b: Convex, seen: Walk, radius: float) -> bool:
     """Whether the sets intersect, from the walk through their cores and the radius to scale: exact for polygons."""
-    if not (_is_polygon(a) and _is_polygon(b)):
+    if not _are_polygons(a, b):
         return seen.distance <= radius
     if certainly_apart(seen):
         return False
     return certainly_touching(seen) or polygons_intersect(_corners(a), _corners(b))
 
 
-def _is_polygon(shape: Convex) -> bool:
-    return isinstance(shape, Cloud | DynamicHull) and shape.dimension == 2
+def _are_polygons(a: Convex, b: Convex) -> bool:
+    return all(isinstance(shape, Cloud | DynamicHull) and shape.dimension == 2 for shape in (a, b))
 
 
 def _corners(shape: Convex) -> Points:

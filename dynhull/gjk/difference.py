@@ -1,10 +1,13 @@
 """GJK's walk through the difference of two sets, towards the origin."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import frexp, inf
+from typing import cast
 
 from ..convex import Cloud, Convex
 from ..hull import DynamicHull
+from .core import is_polytope
 from .simplex import foot, nearest
 from .vectors import ORIGIN, Vector, combine, dot, length, scale, subtract
 
@@ -19,16 +22,33 @@ LARGEST = 2.0**200
 LEAST_EXPONENT, GREATEST_EXPONENT = -1000, 1000
 
 
-class OutOfScaleError(Exception):
-    """A corner is far larger than those that the scale was chosen by.
+# Relative to the same size: how far a walk in floats may end from the nearest point.
+SURE = 2.0**-46
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """What corners are computed in.
 
     Attributes:
-        exponent: of the scale that fits it.
+        exponent: of the power of two that has the length one; None before the first corner that is not zero.
+        rational: whether in fractions rather than floats, which takes some thirty times as long.
     """
 
-    def __init__(self, exponent: int) -> None:
-        super().__init__(exponent)
-        self.exponent = exponent
+    exponent: int | None = None
+    rational: bool = False
+
+
+class NumbersError(Exception):
+    """The numbers did not do; all has to be done again in others.
+
+    Attributes:
+        numbers: the others.
+    """
+
+    def __init__(self, numbers: Numbers) -> None:
+        super().__init__(numbers)
+        self.numbers = numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +75,8 @@ class Walk:
         nearest: that point, to the difference's scale; zero where the origin is inside, up to rounding.
         distance: its length.
         points: of the two sets; their difference is `nearest`.
+        iterations: each of them one corner.
+        sure: whether `nearest` is in the difference and nothing nearer is, up to rounding; or the distance is enough.
     """
 
     simplex: list[Corner]
@@ -63,59 +85,63 @@ class Walk:
     distance: float
     points: tuple[Vector, Vector]
     iterations: int
+    sure: bool
 
 
 class Difference:
-    """The set of all p - q, p of a and q of b, scaled by a power of two: squares of its corners are in range.
+    """The set of all p - q, p of a and q of b, scaled by a power of two: squares of its corners are in range."""
 
-    Args:
-        a: a shape.
-        b: another one.
-        exponent: of the power of two that has the length one; None to take that of the first corner that is not zero.
-    """
+    __slots__ = ("_a", "_b", "_exact", "_numbers", "_polytopes", "dimension")
 
-    __slots__ = ("_a", "_b", "_exact", "_exponent", "dimension")
-
-    def __init__(self, a: Convex, b: Convex, exponent: int | None = None) -> None:
+    def __init__(self, a: Convex, b: Convex, numbers: Numbers) -> None:
         self._a = a
         self._b = b
-        self._exponent = exponent
+        self._numbers = numbers
         self._exact = isinstance(a, Cloud | DynamicHull) and isinstance(b, Cloud | DynamicHull)
+        self._polytopes = is_polytope(a) and is_polytope(b)
         self.dimension = a.dimension
 
     @property
     def scale(self) -> float:
         """What a length of one is, a power of two."""
-        return 2.0 ** (self._exponent or 0)
+        return 2.0 ** (self._numbers.exponent or 0)
+
+    def doubt(self) -> None:
+        """Have all done again in fractions, unless it is, or the sets are curved: those are only approached."""
+        if self._polytopes and not self._numbers.rational:
+            raise NumbersError(replace(self._numbers, rational=True))
 
     def farthest(self, direction: Vector) -> Corner:
         """The farthest corner in a direction, which is not zero.
 
         Raises:
-            OutOfScaleError: it is beyond the scale; all has to be done again on the error's scale.
+            NumbersError: it is far larger than those that the scale was chosen by.
         """
         # Of a length near one: its negation, its square and its products with coordinates are all in range.
         size = max(map(abs, direction))
-        d = [x / size for x in direction[: self.dimension]]
+        d = [float(x / size) for x in direction[: self.dimension]]
         p, q = self._point(self._a, d), self._point(self._b, [-x for x in d])
         w = self._scaled(p, q)
         rounding = length(w) if self._exact else length(w) + (length(p) + length(q)) / self.scale
         return Corner(w, p, q, rounding)
 
     def _scaled(self, p: Vector, q: Vector) -> Vector:
-        """The way from q to p, rounded once. Sets the scale where there is none yet."""
+        """The way from q to p, in floats rounded once. Sets the scale where there is none yet."""
         w = subtract(p, q)
         halves = 1.0
         if max(map(abs, w)) == inf:
             halves = 2.0
             w = subtract(scale(0.5, p), scale(0.5, q))
         largest = max(map(abs, w))
-        if self._exponent is None and largest > 0:
-            self._exponent = _exponent(largest)
+        if self._numbers.exponent is None and largest > 0:
+            self._numbers = replace(self._numbers, exponent=_exponent(largest))
         factor = halves / self.scale
         if largest * factor > LARGEST:
-            raise OutOfScaleError(_exponent(largest))
-        return scale(factor, w)
+            raise NumbersError(replace(self._numbers, exponent=_exponent(largest)))
+        if not self._numbers.rational:
+            return scale(factor, w)
+        x, y, z = ((Fraction(s) - Fraction(t)) / Fraction(self.scale) for s, t in zip(p, q, strict=True))
+        return cast("Vector", (x, y, z))
 
     def _point(self, shape: Convex, direction: list[float]) -> Vector:
         x, y, *others = shape.support([direction])[0].tolist()
@@ -138,7 +164,7 @@ def walk(difference: Difference, enough: float) -> Walk:
     weights: tuple[float, ...] = (1.0,)
     v = last.w
     size = last.rounding
-    iterations = 0
+    iterations, far = 0, False
     while iterations < MOST_ITERATIONS:
         if length(v) <= TOUCHING * size:
             v = ORIGIN
@@ -147,6 +173,7 @@ def walk(difference: Difference, enough: float) -> Walk:
         iterations += 1
         size = max(size, last.rounding)
         if dot(v, last.w) > (enough / difference.scale + TOUCHING * size) * length(v):
+            far = True
             break
         if dot(v, v) - dot(v, last.w) <= GAIN * dot(v, v) or any(last.w == corner.w for corner in simplex):
             break
@@ -161,4 +188,7 @@ def walk(difference: Difference, enough: float) -> Walk:
         simplex, weights, v = [corners[i] for i in kept], closer, u
     on_a = combine(weights, [corner.p for corner in simplex])
     on_b = combine(weights, [corner.q for corner in simplex])
-    return Walk(simplex, last, v, length(v), (on_a, on_b), iterations)
+    off = length(subtract(combine(weights, [corner.w for corner in simplex]), v))
+    gain = dot(v, v) - dot(v, last.w)
+    sure = far or (off <= SURE * size and gain <= SURE * size * length(v))
+    return Walk(simplex, last, v, length(v), (on_a, on_b), iterations, sure)
