@@ -66,10 +66,16 @@ double coordinate(nb::handle value, const char* name) {
 // What dynhull.arrays makes of points, or an error that says where one is wrong.
 nb::object as_points(const nb::object& xy) { return nb::module_::import_("dynhull.arrays").attr("as_points")(xy); }
 
+// Whether this is numpy's array and no subclass of it: a masked array's rows may be missing.
+bool is_plain_array(const nb::object& xy) {
+  static const nb::handle type = nb::module_::import_("numpy").attr("ndarray").release();
+  return xy.type().is(type);
+}
+
 // An array's rows as they are, of anything else what dynhull.arrays makes of it.
 Rows rows_of(const nb::object& xy) {
   Rows rows;
-  return nb::try_cast(xy, rows, false) ? rows : nb::cast<Rows>(as_points(xy));
+  return is_plain_array(xy) && nb::try_cast(xy, rows, false) ? rows : nb::cast<Rows>(as_points(xy));
 }
 
 HullTree tree_of(const nb::object& xy) {
