@@ -1,7 +1,7 @@
 """How long writes wait for large reads and for watchers that resume: `python benchmarks/turns.py`.
 
-One writer sends single points, one after the other, to a hull of 3,000 vertices while large questions are asked about it,
-and to another hull while watchers resume from revisions that only the disk remembers. The longest wait counts.
+One writer sends single points, one after the other, to a hull of 3,000 vertices while large questions are asked about
+it, and to another hull while watchers resume from revisions that only the disk remembers. The longest wait counts.
 """
 
 import argparse

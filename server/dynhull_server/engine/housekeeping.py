@@ -45,12 +45,18 @@ class Housekeeping:
 
         A hull is due once its batches since the last one hold as many points as it does itself, and at least so many.
         """
+        failure: Exception | None = None
         for hull in self._engine:
-            if hull.unsaved >= max(least_points, hull.counts.points):
-                try:
-                    await self._snapshot(hull)
-                except HullNotFoundError:
-                    continue
+            if hull.unsaved < max(least_points, hull.counts.points):
+                continue
+            try:
+                await self._snapshot(hull)
+            except HullNotFoundError:
+                continue
+            except Exception as error:  # the others get theirs all the same
+                failure = failure or error
+        if failure is not None:
+            raise failure
 
     async def _snapshot(self, hull: "LiveHull") -> None:
         unsaved = hull.unsaved

@@ -184,8 +184,14 @@ class LiveHull:
         except RevisionForgottenError as error:
             if revision > error.newest:
                 raise
+            remembered = error.oldest
+        else:
+            return vertices
+        try:
             return await self._recalls.vertices(self._hull, revision)
-        return vertices
+        except RevisionForgottenError as error:
+            oldest = min(remembered, error.oldest)
+            raise RevisionForgottenError(revision, oldest, error.newest) from None
 
     async def reached(self, revision: int) -> None:
         """Wait until the hull has this revision or a later one."""

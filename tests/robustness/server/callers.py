@@ -4,8 +4,8 @@
 
 Batches are single points, each another one on a parabola, so the count of a point says whether its batch is there.
 
-* Of the hulls that nobody deletes: an acknowledged batch is there once, over every kill; a refused one is not; one whose
-  caller went away is there once or not at all, and stays as it was seen.
+* Of the hulls that nobody deletes: an acknowledged batch is there once, over every kill; a refused one is not; one
+  whose caller went away is there once or not at all, and stays as it was seen.
 * Of the hulls that are created and deleted all the time: at the end each can be created, written, read and deleted.
 * Others write to another hull meanwhile: every one of their batches is acknowledged.
 """
@@ -35,6 +35,8 @@ STEADY = "steady"
 CALLERS = 24
 PATIENCE = 30.0  # seconds, for anything that must happen
 LONGEST_STAY = 0.02  # seconds until a caller goes away
+# Otherwise a channel to a new server waits for the pause that one to the killed server has begun.
+OWN = [("grpc.use_local_subchannel_pool", 1)]
 STREAMED = 4  # batches of a stream
 # What says that nothing was applied.
 REFUSED = {
@@ -108,11 +110,11 @@ class Callers:
     async def run(self, calls: int, kills: int) -> None:
         for life in range(kills + 1):
             self._server.start()
-            async with grpc.aio.insecure_channel(f"127.0.0.1:{self._server.port}") as channel:
+            async with grpc.aio.insecure_channel(f"127.0.0.1:{self._server.port}", OWN) as channel:
                 stub = HullServiceStub(channel)
                 await self._check(stub)
                 end = calls * (life + 1) // (kills + 1)
-                steady = asyncio.create_task(self._write_steadily(stub, life))
+                steady = asyncio.create_task(self._write_steadily(stub))
                 async with asyncio.TaskGroup() as group:
                     for _ in range(CALLERS):
                         group.create_task(self._call_until(stub, end))
@@ -197,7 +199,7 @@ class Callers:
         finally:
             call.cancel()
 
-    async def _write_steadily(self, stub: HullServiceStub, life: int) -> None:
+    async def _write_steadily(self, stub: HullServiceStub) -> None:
         while True:
             number = self._model.new(STEADY)
             await stub.Apply(pb.ApplyRequest(name=STEADY, batch=batch_of(number)), timeout=PATIENCE)

@@ -92,6 +92,9 @@ def examine(connection: sqlite3.Connection, version: int, progress: Progress) ->
     """
     findings = Findings()
     try:
+        if found(connection)[2] != SCHEMAS[version]:
+            findings.fatal.append("the tables are not those of this format")
+            return findings
         _check_structure(connection, version, findings)
         _Examination(connection, version, findings, progress).run()
     except sqlite3.Error as error:
@@ -99,24 +102,21 @@ def examine(connection: sqlite3.Connection, version: int, progress: Progress) ->
     return findings
 
 
-def load(connection: sqlite3.Connection) -> Ledger:
+def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
     """Where everything lies, of a database that was whole when it was opened.
 
     Raises:
         DamagedError: it is not whole any more.
     """
     findings = Findings()
-    _Examination(connection, FORMAT, findings, lambda *_: None, contents=False).run()
+    _Examination(connection, version, findings, lambda *_: None, contents=False).run()
     if findings.fatal:
         raise DamagedError("; ".join(findings.fatal))
     return findings.ledger
 
 
 def _check_structure(connection: sqlite3.Connection, version: int, findings: Findings) -> None:
-    """Whether every page has one use, and every table is the one that was made. SQLite looks at pages and cells."""
-    *_, tables = found(connection)
-    if tables != SCHEMAS[version]:
-        findings.fatal.append("the tables are not those of this format")
+    """Whether every page has one use, and is in order: SQLite looks at pages and cells."""
     settings = {"page_size": PAGE_BYTES, "auto_vacuum": 0, "encoding": "UTF-8"}
     for name, expected in settings.items():
         if connection.execute(f"PRAGMA {name}").fetchone() != (expected,):
@@ -309,7 +309,7 @@ class _Examination:
         hull.snapshots += scanned.snapshots.values()
         hull.snapshots.sort(key=lambda snapshot: snapshot.revision)
         for snapshot in lost:
-            text = f"the snapshot at revision {snapshot.revision} is damaged, and was dropped"
+            text = f"the snapshot at revision {snapshot.revision} is damaged, and is left out"
             self._findings.blame(hull, text, fatal=False)
             self._findings.repairs.append(DropSnapshot(hull.row.number, snapshot))
         return max((snapshot.revision for snapshot in hull.snapshots if snapshot not in lost), default=0)

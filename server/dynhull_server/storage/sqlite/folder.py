@@ -2,19 +2,20 @@
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from pathlib import Path
 
 from ..port import DamagedError, FormatError, LockedError
 from .disk import Access, Disk
 from .examine import format_of
 from .log import check_log
-from .totals import STOPPED, Totals, read_totals
+from .totals import Totals, read_totals
 
 DATABASE = "dynhull.db"
 LOCK = "dynhull.lock"
 # A copy has this name until it is whole.
 UNFINISHED = "unfinished.db"
+UNFINISHED_WORDS = "is a copy that was not finished: remove it, and copy again"
 
 CACHE_KILOBYTES = 2000
 
@@ -48,6 +49,19 @@ class Folder:
         with lock:
             yield
 
+    @contextmanager
+    def alone(self) -> Iterator[bool]:
+        """Whether no server works on it; none begins before the end of the block."""
+        file = self.path / LOCK
+        try:
+            lock: AbstractContextManager[object] | None = (
+                self.disk.lock(file) if self.disk.size(file) is not None else nullcontext()
+            )
+        except OSError:  # it cannot be written to: no server can work on it
+            lock = nullcontext()
+        with lock or nullcontext():
+            yield lock is not None
+
     def connect(self, access: Access) -> sqlite3.Connection:
         """A connection, which does not believe what the database's header says about caches."""
         connection = self.disk.connect(self.database, access)
@@ -67,7 +81,7 @@ class Folder:
             DamagedError: acknowledged batches are lost.
         """
         if self.disk.size(self.path / UNFINISHED) is not None:
-            raise FormatError(f"{self.path} is a copy that was not finished: remove it, and copy again")
+            raise FormatError(f"{self.path} {UNFINISHED_WORDS}")
         own = self._own_totals()
         note = check_log(self.disk, self.log, own)
         return [] if note is None else [note]

@@ -108,8 +108,12 @@ class SQLiteStorage:
                 self._begin_log_anew()
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
                 self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
-            except sqlite3.Error as error:
+            except sqlite3.OperationalError as error:
                 raise StorageError(f"{self._folder.database} cannot be opened: {error}") from error
+            except sqlite3.Error as error:
+                raise DamagedError(
+                    f"{self._folder.database} is no readable database ({error}): restore a backup"
+                ) from error
             self._open = stack.pop_all()
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         return Contents(rows, self._ledger.totals.next_number, notes + [self._word(note) for note in findings.notes])
