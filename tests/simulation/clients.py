@@ -267,12 +267,13 @@ class Client:
     async def recall(self, op: Operation) -> None:
         """Resume from something seen before, or from a revision in between."""
         name = op["name"]
+        if not self.seen.get(name):
+            await self.read(name)
         seen = self.seen.get(name)
         if not seen:
-            await self.read(name)
             return
         uid, revision, _ = seen[-1 - op["back"] % len(seen)]
-        revision = max(0, revision - op["back"] % 2)
+        revision = max(0, revision - op["back"])
         asked = self.model.ask(name)
         try:
             vertices = await self.server.recall(name, uid, revision)

@@ -66,7 +66,7 @@ def random_plan(seed: int, layer: str) -> Plan:
             "max_points": draw.choice((3, 100, 100, 100)),
             "max_producers": draw.choice((1, 10, 10)),
             "max_producers_per_caller": draw.choice((1, 10, 10)),
-            "history_bytes": draw.choice((0, 700, 1_000_000)),
+            "history_bytes": draw.choice((0, 0, 700, 1_000_000)),
         },
         "lives": [_life(draw, names, layer) for _ in range(draw.choice((1, 1, 2, 3)))],
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
