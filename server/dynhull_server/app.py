@@ -2,11 +2,12 @@
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable
+from functools import partial
 
 import grpc
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
-from grpc_reflection.v1alpha import reflection
+from grpc_health.v1 import health_pb2
 from prometheus_client import start_http_server
 
 from .engine.hulls import Engine
@@ -14,11 +15,13 @@ from .engine.live_hull import LiveHull
 from .engine.scrub import scrub
 from .engine.snapshots import keep_snapshots
 from .engine.verification import Verification
-from .rpc.access import EVERYTHING, Access, TokenFile
+from .rpc.access import ANYBODY, Caller, TokenFile
 from .rpc.calls import Calls, Context
+from .rpc.health import Health
 from .rpc.hull_service import HullService
-from .rpc.methods import DESCRIPTOR, method_handlers
+from .rpc.methods import DESCRIPTOR, health_handlers, hull_handlers, reflection_handlers
 from .rpc.metrics import Metrics, StateCollector
+from .rpc.places import Places
 from .settings import Settings
 from .state.limits import Limits
 from .storage.sqlite.journal import Journal
@@ -34,6 +37,8 @@ NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 LAST_WORDS = 1.0
 # Milliseconds between signs of life on a quiet connection, and until one without an answer is given up.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
+# Milliseconds until a connection must be one of HTTP/2.
+HANDSHAKE_TIMEOUT = 10_000
 
 # A message of so many bytes beyond the limit is read, to be refused with details.
 REFUSED_BYTES = 64 * 2**20
@@ -56,9 +61,13 @@ class Server:
             Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes), journal
         )
         self._metrics = Metrics()
-        authenticate = _anonymous if settings.tokens is None else _bearer(TokenFile(settings.tokens))
-        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, settings.max_streams)
-        self._health = health.aio.HealthServicer()
+        self._tokens = None if settings.tokens is None else TokenFile(settings.tokens)
+        authenticate = _anonymous if self._tokens is None else _bearer(self._tokens)
+        streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
+        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams)
+        self._health = Health(
+            Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
+        )
         self._server = grpc.aio.server(
             options=[
                 # gRPC's own refusal of a message has no details. So ours comes first, but for the very largest.
@@ -68,10 +77,14 @@ class Server:
                 ("grpc.so_reuseport", 0),
                 ("grpc.keepalive_time_ms", KEEPALIVE),
                 ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
+                ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
+                ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
+                ("grpc.max_allowed_incoming_connections", settings.max_connections),
             ]
         )
         self._scrub: asyncio.Task[None] | None = None
         self._snapshots: asyncio.Task[None] | None = None
+        self._look: asyncio.Task[None] | None = None
         self._stop_metrics: Callable[[], None] = lambda: None
         self.address = ""
         self.metrics_address = ""
@@ -92,20 +105,25 @@ class Server:
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )
-        self._server.add_generic_rpc_handlers((method_handlers(service, self._calls),))
-        health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
-        reflection.enable_server_reflection((SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME), self._server)
+        self._server.add_generic_rpc_handlers(
+            (
+                hull_handlers(service, self._calls),
+                health_handlers(self._health, self._calls),
+                reflection_handlers(self._calls),
+            )
+        )
         port = self._listen()
         self.address = f"{self._settings.host}:{port}"
         self._serve_metrics()
-        await self._health.set("", NOT_SERVING)
-        await self._health.set(SERVICE, NOT_SERVING)
+        self._health.set(NOT_SERVING, "", SERVICE)
         await self._server.start()
         for note in await self._engine.restore(progress):
             log.warning("lost", extra={"what": note})
         self._calls.ready()
-        for name in ("", SERVICE, SCRUB):
-            await self._health.set(name, SERVING)
+        self._health.set(SERVING, "", SERVICE, SCRUB)
+        if self._tokens is not None:
+            self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
+            self._look = asyncio.create_task(self._tokens.run())
         if not self._settings.in_memory:
             self._snapshots = asyncio.create_task(keep_snapshots(self._engine, self._settings.snapshot_points))
         if self._settings.scrub_cpu:
@@ -123,8 +141,8 @@ class Server:
     async def drain(self) -> None:
         """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
         log.info("draining")
-        await self._health.enter_graceful_shutdown()
-        for task in (self._scrub, self._snapshots):
+        self._health.stop()
+        for task in (self._scrub, self._snapshots, self._look):
             if task is not None:
                 task.cancel()
         await self._calls.drain(self._settings.grace)
@@ -172,12 +190,12 @@ class Server:
             log.error(
                 "a hull differs from Chan's algorithm", extra={"hull": hull.name, "difference": outcome.difference}
             )
-            asyncio.get_running_loop().create_task(self._health.set(SCRUB, NOT_SERVING))
+            self._health.set(NOT_SERVING, SCRUB)
 
 
-def _anonymous(_: Context) -> Access:
-    return EVERYTHING
+def _anonymous(_: Context) -> Caller:
+    return ANYBODY
 
 
-def _bearer(tokens: TokenFile) -> Callable[[Context], Access]:
-    return lambda context: tokens.access(dict(context.invocation_metadata() or ()))
+def _bearer(tokens: TokenFile) -> Callable[[Context], Caller]:
+    return lambda context: tokens.authenticate(context.invocation_metadata() or ())

@@ -46,6 +46,15 @@ class Settings(BaseSettings):
     max_points: int = Field(100_000_000, ge=1, description="How many points a hull may have.")
     max_producers: int = Field(10_000, ge=1, description="How many numbering writers a hull may have in a day.")
     max_streams: int = Field(10_000, ge=1, description="How many streaming calls there may be at a time.")
+    max_streams_per_caller: int = Field(
+        2_500, ge=1, description="How many of those one token may have, or without tokens one address."
+    )
+    max_health_calls: int = Field(1_000, ge=1, description="How many health checks and watches there may be at a time.")
+    max_health_calls_per_caller: int = Field(100, ge=1, description="How many of those one address may have.")
+    max_connections: int = Field(10_000, ge=1, description="How many connections there may be at a time.")
+    max_connection_idle: float = Field(
+        600.0, gt=0, description="Seconds that a connection without calls is kept; clients make a new one when needed."
+    )
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds a watcher may take for one event.")
     history_bytes: int = Field(4 * 2**20, ge=0, description="Memory a hull may take for watches that resume.")
 

@@ -41,6 +41,14 @@ class StartingError(Exception):
     """The server is not ready yet."""
 
 
+class ServiceUnknownError(RefusedError):
+    """There is no service of that name to ask the health of."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no service {_short(name)!r}")
+        self.name = name
+
+
 ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError, StartingError)
 
 
@@ -104,6 +112,8 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             quota.violations.add(subject=error.limit, description=str(error))
             metadata = {"limit": error.limit, "value": str(error.maximum), **where}
             return _status(code.RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
+        case ServiceUnknownError():
+            return _status(code.NOT_FOUND, str(error), "SERVICE_UNKNOWN", {"value": _short(error.name)})
         case DecodeError():
             return _status(
                 code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where
