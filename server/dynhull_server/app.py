@@ -37,6 +37,8 @@ NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 LAST_WORDS = 1.0
 # Milliseconds between signs of life on a quiet connection, and until one without an answer is given up.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
+# Bytes of each call that a client may send before they are read.
+LOOKAHEAD = 512 * 2**10
 # Milliseconds until a connection must be one of HTTP/2.
 HANDSHAKE_TIMEOUT = 10_000
 
@@ -77,6 +79,8 @@ class Server:
                 ("grpc.so_reuseport", 0),
                 ("grpc.keepalive_time_ms", KEEPALIVE),
                 ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
+                ("grpc.http2.bdp_probe", 0),
+                ("grpc.http2.lookahead_bytes", LOOKAHEAD),
                 ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
                 ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
                 ("grpc.max_allowed_incoming_connections", settings.max_connections),

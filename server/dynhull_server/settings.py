@@ -50,7 +50,7 @@ class Settings(BaseSettings):
         2_500, ge=1, description="How many of those one token may have, or without tokens one address."
     )
     max_health_calls: int = Field(1_000, ge=1, description="How many health checks and watches there may be at a time.")
-    max_health_calls_per_caller: int = Field(100, ge=1, description="How many of those one address may have.")
+    max_health_calls_per_caller: int = Field(32, ge=1, description="How many of those one address may have.")
     max_connections: int = Field(10_000, ge=1, description="How many connections there may be at a time.")
     max_connection_idle: float = Field(
         600.0, gt=0, description="Seconds that a connection without calls is kept; clients make a new one when needed."

@@ -14,7 +14,7 @@ from .status import ServiceUnknownError
 # A request is a name. gRPC tells no message's size before it has all of it in memory: so of each address one request is
 # read at a time, and what is not there at once is refused.
 MAX_BYTES = 4096
-READ_SECONDS = 0.1
+READ_SECONDS = 0.025
 
 
 class Health:
@@ -62,9 +62,13 @@ class Health:
                 await changed.wait()
 
     async def _request(self, call: Call) -> Any:
-        lock = self._reading.setdefault(call.owner, asyncio.Lock())
-        try:
-            async with lock, asyncio.timeout(READ_SECONDS):
-                return await call.receive()
-        except TimeoutError:
-            raise LimitExceededError("max_message_bytes", MAX_BYTES) from None
+        async with self._reading.setdefault(call.owner, asyncio.Lock()):
+            reading = asyncio.create_task(call.receive())
+            try:
+                # Not `timeout`: where the loop is late, a request may be there at the same moment as the time is over.
+                await asyncio.wait([reading], timeout=READ_SECONDS)
+                if not reading.done():
+                    raise LimitExceededError("max_message_bytes", MAX_BYTES)
+                return reading.result()
+            finally:
+                reading.cancel()
