@@ -3,12 +3,12 @@
 import asyncio
 import logging
 import math
+import ssl
 from collections.abc import Callable
 from functools import partial
 
 import grpc
 from grpc_health.v1 import health_pb2
-from prometheus_client import start_http_server
 
 from .engine.hulls import Engine
 from .engine.live_hull import LiveHull
@@ -21,8 +21,9 @@ from .rpc.health import Health
 from .rpc.hull_service import HullService
 from .rpc.methods import DESCRIPTOR, health_handlers, hull_handlers, reflection_handlers
 from .rpc.metrics import Metrics, StateCollector
+from .rpc.metrics_page import MetricsPage
 from .rpc.places import Places
-from .settings import Settings
+from .settings import Settings, is_loopback
 from .state.limits import Limits
 from .storage.sqlite.journal import Journal
 
@@ -53,7 +54,7 @@ class Server:
 
     Attributes:
         address: host:port it listens on, once started.
-        metrics_address: host:port for Prometheus; empty for none.
+        metrics_url: the page for Prometheus; empty for none.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -91,7 +92,7 @@ class Server:
         self._look: asyncio.Task[None] | None = None
         self._stop_metrics: Callable[[], None] = lambda: None
         self.address = ""
-        self.metrics_address = ""
+        self.metrics_url = ""
 
     async def start(self, progress: Callable[[int, int], None]) -> None:
         """Listen, take up what is stored, then serve. Meanwhile calls are told so, and health is NOT_SERVING.
@@ -174,18 +175,26 @@ class Server:
         registry = self._metrics.registry
         registry.register(StateCollector(self._engine, self._metrics, asyncio.get_running_loop()))
         host, port = self._settings.metrics_host, self._settings.metrics_port
+        open_to_others = not is_loopback(host)
+        tls = self._tls() if open_to_others else None
+        bearer = self._tokens.bearer if open_to_others and self._tokens is not None else None
         try:
-            server, thread = start_http_server(port, host, registry)
+            page = MetricsPage(host, port, registry, bearer, tls, self._calls.refused_elsewhere())
         except OSError as error:
             raise OSError(f"no metrics on {host}:{port}: {error.strerror}") from None
-        self.metrics_address = f"{host}:{server.server_port}"
+        self.metrics_url = f"{'http' if tls is None else 'https'}://{host}:{page.port}/metrics"
+        self._stop_metrics = page.close
 
-        def stop() -> None:
-            server.shutdown()
-            server.server_close()
-            thread.join()
-
-        self._stop_metrics = stop
+    def _tls(self) -> ssl.SSLContext | None:
+        settings = self._settings
+        if settings.tls_cert is None or settings.tls_key is None:
+            return None
+        context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+        context.load_cert_chain(settings.tls_cert, settings.tls_key)
+        if settings.tls_client_ca is not None:
+            context.load_verify_locations(settings.tls_client_ca)
+            context.verify_mode = ssl.CERT_REQUIRED
+        return context
 
     def _compared(self, hull: LiveHull, outcome: Verification) -> None:
         equal = outcome.difference is None

@@ -24,6 +24,9 @@ Work = Callable[["Call"], Awaitable[Any]]
 # A message and how many bytes it had, or what is wrong with it.
 Received = tuple[Message, int] | Exception
 
+# The page for Prometheus among the methods that are counted.
+METRICS_PAGE = "metrics"
+
 SUSPICIOUS = ("UNAUTHENTICATED", "PERMISSION_DENIED")
 
 log = logging.getLogger(__name__)
@@ -197,6 +200,19 @@ class Calls:
     def admit_anybody(self, context: Context) -> Call:
         """A call that needs no token and may begin at any time."""
         return Call(self, context, NOBODY)
+
+    def refused_elsewhere(self) -> Callable[[str, str, str], None]:
+        """What other threads call with the reason, code and peer of a request for metrics that they have refused."""
+        loop = asyncio.get_running_loop()
+
+        def count(reason: str, code: str, peer: str) -> None:
+            self._refusals.add(reason, METRICS_PAGE, code, peer)
+            self._metrics.call(METRICS_PAGE, code, 0.0)
+
+        def refused(reason: str, code: str, peer: str) -> None:
+            loop.call_soon_threadsafe(count, reason, code, peer)
+
+        return refused
 
     def finish(self, task: asyncio.Task[Any]) -> None:
         """A draining server waits for this task."""
