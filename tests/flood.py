@@ -1,4 +1,4 @@
-"""Many large calls at once, from a process of their own: ADDRESS TOKEN METHOD CALLS BYTES. Prints their codes as JSON."""
+"""Many large calls at once, from a process of their own: ADDRESS TOKEN METHOD CALLS BYTES. Prints the codes as JSON."""
 
 import json
 import sys

@@ -118,11 +118,12 @@ class _Server(ThreadingHTTPServer):
             if self._tls is not None:  # here, for it waits for the other end
                 request.settimeout(PATIENCE)
                 request = self._tls.wrap_socket(request, server_side=True)
-            super().process_request_thread(request, client_address)
         except OSError:  # the other end is none, or speaks something else
             self.shutdown_request(request)
+        else:
+            super().process_request_thread(request, client_address)
         finally:
             self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """The other end has gone."""
+        """Nothing: the other end has gone."""
