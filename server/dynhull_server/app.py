@@ -19,7 +19,7 @@ from .rpc.access import ANYBODY, Caller, TokenFile
 from .rpc.calls import Calls, Context
 from .rpc.health import Health
 from .rpc.hull_service import HullService
-from .rpc.methods import DESCRIPTOR, health_handlers, hull_handlers, reflection_handlers
+from .rpc.methods import DESCRIPTOR, UnknownMethods, health_handlers, hull_handlers, reflection_handlers
 from .rpc.metrics import Metrics, StateCollector
 from .rpc.metrics_page import MetricsPage
 from .rpc.places import Places
@@ -115,6 +115,7 @@ class Server:
                 hull_handlers(service, self._calls),
                 health_handlers(self._health, self._calls),
                 reflection_handlers(self._calls),
+                UnknownMethods(self._calls),
             )
         )
         port = self._listen()

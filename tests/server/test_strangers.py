@@ -15,10 +15,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import grpc
+import numpy as np
 import pytest
 import trustme
 from grpc_health.v1 import health_pb2, health_pb2_grpc
-from metrics import scrape
+from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from refusal import refusal
 from server_process import Server, run, server_process
@@ -164,6 +165,26 @@ def test_a_token_narrowed_ends_what_it_no_longer_allows(guarded: Server, tokens:
         watches["b"].cancel()
 
 
+def test_a_watcher_that_does_not_read_is_ended_too(tokens: Tokens) -> None:
+    """Its first event is larger than what waits on the way: it gets that event whole, and then the refusal."""
+    x = np.arange(300_000.0)
+    parabola = np.column_stack([x, x * x]).astype("<f8")
+    options = ("--tokens", str(tokens.path), "--log-level", "error", "--create-on-write")
+    with measured(*options) as (server, metrics), ExitStack() as stack:
+        two = stub(stack, server, "two")
+        two("Apply", pb.ApplyRequest(name="a", batch={"inserts": {"packed": parabola.tobytes()}}))
+        large = [("grpc.max_receive_message_length", -1)]
+        unread = HullServiceStub(stack.enter_context(grpc.insecure_channel(server.address, options=large)))
+        watch = unread.Watch(pb.WatchRequest(name="a"), metadata=[("authorization", "Bearer one")])
+        wait_until(lambda: scrape(metrics)["dynhull_watch_lag_seconds"] > 0)
+        tokens.write(two=ALL)
+        wait_until(lambda: scrape(metrics)["dynhull_watchers"] == 0)
+        read = []
+        code, info, _ = refusal(lambda: read.extend(watch))
+        assert (code, info.reason) == (grpc.StatusCode.UNAUTHENTICATED, "UNAUTHENTICATED")
+        assert [len(event.snapshot.vertices.packed) for event in read] == [parabola.nbytes]
+
+
 def test_a_missing_file_of_tokens_is_told_once(tokens: Tokens, tmp_path: Path) -> None:
     with (
         logged(tmp_path, "--tokens", str(tokens.path)) as (server, log),
@@ -205,10 +226,23 @@ def test_refusals_do_not_fill_the_log_and_are_all_counted(tokens: Tokens, tmp_pa
             for _ in range(0, calls, at_once):
                 begun = [locate.future(pb.LocateRequest(name="a")) for _ in range(at_once)]
                 assert {call.code() for call in begun} == {grpc.StatusCode.UNAUTHENTICATED}
-        wait_until(lambda: scrape(metrics)['dynhull_calls_total{code="UNAUTHENTICATED",method="Locate"}'] == calls)
+        counted = 'dynhull_calls_total{code="UNAUTHENTICATED",method="Locate"}'
+        wait_until(lambda: scrape(metrics).get(counted) == calls)
     lines = [json.loads(line) for line in log.read_text().splitlines()]
     assert sum(line.get("left_out", 1) for line in lines) == calls
     assert len(lines) < calls / 10
+
+
+def test_methods_that_there_are_not_are_refused_like_others(tokens: Tokens) -> None:
+    with measured("--tokens", str(tokens.path), "--log-level", "error") as (server, metrics):
+        with grpc.insecure_channel(server.address) as channel:
+            call = channel.unary_unary("/dynhull.v1.HullService/Nothing")
+            assert refusal(lambda: call(b""))[1].reason == "UNAUTHENTICATED"
+            code, info, _ = refusal(lambda: call(b"", metadata=[("authorization", "Bearer one")]))
+            assert (code, info.reason) == (grpc.StatusCode.UNIMPLEMENTED, "METHOD_UNKNOWN")
+        for counted in ("UNAUTHENTICATED", "UNIMPLEMENTED"):
+            sample = f'dynhull_calls_total{{code="{counted}",method="unknown"}}'
+            wait_until(lambda sample=sample: scrape(metrics).get(sample) == 1)
 
 
 def test_one_caller_cannot_have_every_stream(tokens: Tokens) -> None:

@@ -51,6 +51,7 @@ class Call:
         self.waiting: set[asyncio.Task[Any]] = set()
         self._calls = calls
         self._context = context
+        self._begun = False
 
     @property
     def owner(self) -> str:
@@ -99,12 +100,16 @@ class Call:
             raise asyncio.CancelledError from None
 
     async def write_within(self, seconds: float, message: Message) -> None:
-        """Send a message, or raise LimitExceededError where that took longer.
+        """Send a message, or raise LimitExceededError where that took longer, or the error of `end`.
 
         The client will get the message and then the error, for gRPC cannot take back what it has begun to send.
         """
         begun = time.monotonic()
-        await self.write(message)
+        if not self._begun:  # else a first message that is cut off leaves it open whether the call has begun
+            self._begun = True
+            await self._context.send_initial_metadata(())
+        with self.cutoff():
+            await self.write(message)
         if time.monotonic() - begun > seconds:
             raise LimitExceededError("max_watch_lag", seconds)
 
@@ -119,10 +124,7 @@ class Call:
         yield
 
     def cutoff(self) -> "Cutoff":
-        """Whatever happens inside ends with the error of `end`.
-
-        It must not be sending: a message cut off half-way would leave the call without a status.
-        """
+        """Whatever happens inside ends with the error of `end`."""
         return Cutoff(self)
 
     def end(self, error: Exception) -> None:

@@ -22,6 +22,7 @@ from ..state.errors import LimitExceededError
 from .calls import Call, Calls, Context, Received, Work
 from .health import MAX_BYTES, Health
 from .hull_service import HullService
+from .status import MethodUnknownError
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
 HEALTH = health_pb2.DESCRIPTOR.services_by_name["Health"]
@@ -29,6 +30,9 @@ REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 
 # A draining server finishes these, and cuts off the other calls.
 FINISHED = {"CreateHull", "DeleteHull", "ListHulls", "Apply"}
+
+# What the methods that there are not are counted as.
+UNKNOWN_METHOD = "unknown"
 
 Behave = Callable[[Any, Call], Awaitable[Any]]
 
@@ -61,6 +65,23 @@ def reflection_handlers(calls: Calls) -> grpc.GenericRpcHandler:
 
     works = {"ServerReflectionInfo": describe}
     return _handlers(REFLECTION, works, f"{REFLECTION.full_name}/", calls, calls.admit, calls.max_message_bytes)
+
+
+class UnknownMethods(grpc.GenericRpcHandler):
+    """Every other method: refused, and counted as the others are."""
+
+    def __init__(self, calls: Calls) -> None:
+        self._handler: Any = grpc.stream_stream_rpc_method_handler(
+            partial(calls.serve, UNKNOWN_METHOD, calls.admit, _refuse_method)
+        )
+
+    def service(self, _: grpc.HandlerCallDetails) -> Any:
+        """The same for all."""
+        return self._handler
+
+
+async def _refuse_method(_: Call) -> None:
+    raise MethodUnknownError
 
 
 def _handlers(

@@ -49,6 +49,13 @@ class ServiceUnknownError(RefusedError):
         self.name = name
 
 
+class MethodUnknownError(RefusedError):
+    """There is no such method."""
+
+    def __init__(self) -> None:
+        super().__init__("there is no such method")
+
+
 ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError, StartingError)
 
 
@@ -114,6 +121,8 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             return _status(code.RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
         case ServiceUnknownError():
             return _status(code.NOT_FOUND, str(error), "SERVICE_UNKNOWN", {"value": _short(error.name)})
+        case MethodUnknownError():
+            return _status(code.UNIMPLEMENTED, str(error), "METHOD_UNKNOWN", {})
         case DecodeError():
             return _status(
                 code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where
