@@ -40,7 +40,11 @@ class Call:
         access: what the call may do.
         batches: how many batches the call has applied; None for calls that apply none or one.
         message_bytes: the size of the last message that came.
+        ending: what ends it; None as long as nothing does.
+        waiting: its tasks that `end` may cancel.
     """
+
+    __slots__ = ("_begun", "_calls", "_context", "access", "batches", "caller", "ending", "message_bytes", "waiting")
 
     def __init__(self, calls: "Calls", context: Context, caller: Caller) -> None:
         self.caller = caller
@@ -60,20 +64,18 @@ class Call:
 
     async def receive(self) -> Any:
         """The only message of a call that is no stream."""
-        message = await self.read()
-        if message is None:
-            raise DecodeError("a call without a message")
-        return message
+        return self._take(await self._context.read())
 
     async def read(self) -> Any:
         """The next message, None after the last."""
         received = await self._context.read()
-        if received is grpc.aio.EOF:
-            return None
-        if isinstance(received, Exception):
-            raise received
-        message, self.message_bytes = received
-        return message
+        return None if received is grpc.aio.EOF else self._take(received)
+
+    def _take(self, received: Any) -> Any:
+        if isinstance(received, tuple):
+            message, self.message_bytes = received
+            return message
+        raise DecodeError("no message") if received is grpc.aio.EOF else received
 
     async def messages(self) -> AsyncIterator[Any]:
         """All messages of a stream."""
