@@ -44,10 +44,22 @@ class Call:
         waiting: its tasks that `end` may cancel.
     """
 
-    __slots__ = ("_begun", "_calls", "_context", "access", "batches", "caller", "ending", "message_bytes", "waiting")
+    __slots__ = (
+        "_begun",
+        "_calls",
+        "_context",
+        "_owner",
+        "access",
+        "batches",
+        "caller",
+        "ending",
+        "message_bytes",
+        "waiting",
+    )
 
     def __init__(self, calls: "Calls", context: Context, caller: Caller) -> None:
         self.caller = caller
+        self._owner = caller.owner
         self.access = Rights(caller.access)
         self.batches: int | None = None
         self.message_bytes = 0
@@ -60,7 +72,9 @@ class Call:
     @property
     def owner(self) -> str:
         """Whose bounds the call counts under: the token's, or without tokens the address it comes from."""
-        return self.caller.owner or self._context.peer().partition(":")[2].rpartition(":")[0]
+        if not self._owner:
+            self._owner = self._context.peer().partition(":")[2].rpartition(":")[0]
+        return self._owner
 
     async def receive(self) -> Any:
         """The only message of a call that is no stream."""
