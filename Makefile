@@ -4,7 +4,7 @@ BIN := .venv/bin
 KERNEL := $(wildcard dynhull/kernel/*)
 DAY ?= 2013-03-08
 
-.PHONY: demo test check docs proto contract fuzz fuzz-server robustness clean
+.PHONY: demo test check docs proto contract fuzz fuzz-reference fuzz-server robustness clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
@@ -15,13 +15,17 @@ test: .venv/.test tests/strangers/node_modules  ## the whole test suite, on both
 FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
 	-DDYNHULL_FAIL_ALLOCATIONS
 SECONDS ?= 60
+OPERATIONS ?= 1000000
 
-fuzz:  ## random lives of the kernel under sanitizers, SECONDS for each size of leaf
+fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kernel, under sanitizers, SECONDS a leaf size
 	mkdir -p build
 	for leaf in 4 62; do \
 		$(FUZZ) -DDYNHULL_LEAF=$$leaf tests/kernel/fuzz.cpp -o build/fuzz$$leaf \
 		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
 	done
+
+fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
+	$(BIN)/python tests/lives.py --operations $(OPERATIONS)
 
 check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .

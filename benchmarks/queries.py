@@ -27,6 +27,7 @@ from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram, energy_above_hull_nd
 from dynhull.gjk import contact, distance_many, intersect_many
 from dynhull.margin import max_margin
+from dynhull.tree import HullTree
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from judges import fcl_body
@@ -70,6 +71,93 @@ def measures() -> Iterator[Case]:
 
 def area_of(box: np.ndarray) -> float:
     return float(np.prod(np.hypot(*(box[[1, 3]] - box[0]).T)))
+
+
+def many() -> Iterator[Case]:
+    """Many questions about one live hull. Where shapely has no such question, numpy or this library's reference."""
+    count, lines = 200_000, 60_000
+    middle, size = np.array([5.0, 7.0]), np.array([3.0, 1.0])
+
+    def around(n: int) -> np.ndarray:
+        angle = RANDOM.random(n) * 2 * np.pi
+        return np.column_stack([np.cos(angle), np.sin(angle)])
+
+    hull = DynamicHull(middle + size * around(3000))
+    vertices = hull.vertices()
+    reference = HullTree(vertices)
+    shape = shapely.Polygon(vertices)
+    shapely.prepare(shape)
+    anywhere = middle + 2 * size * RANDOM.standard_normal((count, 2))
+    outside = middle + size * around(count) * (1.01 + RANDOM.exponential(1, (count, 1)))
+    ways = around(count)
+    p, q = middle + size * RANDOM.standard_normal((2, lines, 2))
+    kind = f"live hull of {len(vertices):,} vertices, {count:,} points: "
+
+    def support() -> np.ndarray:
+        edges = np.roll(vertices, -1, axis=0) - vertices
+        normals = np.unwrap(np.arctan2(-edges[:, 0], edges[:, 1]))
+        angle = (np.arctan2(ways[:, 1], ways[:, 0]) - normals[0]) % (2 * np.pi) + normals[0]
+        return vertices[np.searchsorted(normals, angle) % len(vertices)]
+
+    def crossings() -> np.ndarray:
+        far = 1e3 * (q - p)
+        met = shapely.intersection(shapely.linestrings(np.stack([p - far, p + far], axis=1)), shape)
+        found = np.full((lines, 2, 2), np.nan)
+        hits = ~shapely.is_empty(met)
+        found[hits] = shapely.get_coordinates(met[hits]).reshape(-1, 2, 2)
+        return found
+
+    yield Case(
+        kind + "locate",
+        "shapely",
+        lambda: hull.locate(anywhere) >= 0,
+        lambda: shapely.intersects_xy(shape, *anywhere.T),
+        count,
+    )
+    yield Case(
+        kind + "count",
+        "Python, a call each",
+        lambda: hull.count_many(anywhere),
+        lambda: [hull.count(x, y) for x, y in anywhere.tolist()],
+        count,
+    )
+    yield Case(kind + "support", "numpy, by angle", lambda: hull.support(ways), support, count)
+    yield Case(
+        kind + "tangents",
+        "reference in Python",
+        lambda: hull.tangents(outside),
+        lambda: reference.tangents(outside),
+        count,
+    )
+    yield Case(
+        kind + "distance",
+        "shapely",
+        lambda: hull.distance(outside),
+        lambda: shapely.distance(shape, shapely.points(outside)),
+        count,
+    )
+    yield Case(
+        f"live hull of {len(vertices):,} vertices, {lines:,} lines: crossings",
+        "shapely",
+        lambda: hull.intersect_lines(p, q),
+        crossings,
+        lines,
+    )
+    # Where pairs of doubles overflow: exact signs for every row.
+    huge, block = 2.0**600, 8192
+    large, judge = DynamicHull(huge * vertices), HullTree(huge * vertices)
+    far, starts, ends = (huge * rows[:block] for rows in (outside, p, q))
+    kind = f"the same times 2^600, {block:,} rows: "
+    yield Case(
+        kind + "distance", "reference in Python", lambda: large.distance(far), lambda: judge.distance(far), block
+    )
+    yield Case(
+        kind + "crossings",
+        "reference in Python",
+        lambda: large.intersect_lines(starts, ends),
+        lambda: judge.intersect_lines(starts, ends),
+        block,
+    )
 
 
 def pairs() -> Iterator[Case]:
@@ -162,7 +250,7 @@ def envelopes() -> Iterator[Case]:
 
 def difference(ours: object, theirs: object) -> float:
     """The largest, relative to the largest value."""
-    a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
+    a, b = (np.nan_to_num(np.asarray(answer, dtype=np.float64)) for answer in (ours, theirs))
     return float(np.abs(a - b).max() / max(np.abs(b).max(), 1e-300))
 
 
@@ -186,7 +274,7 @@ def main() -> None:
     options = parser.parse_args()
     print("| question | dynhull | judge | its time | differ by |")
     print("| --- | ---: | --- | ---: | ---: |")
-    for source in (measures, pairs, bodies, margins, defects, envelopes):
+    for source in (measures, many, pairs, bodies, margins, defects, envelopes):
         for case in source():
             if not any(word in case.question for word in options.only):
                 continue

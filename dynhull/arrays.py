@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Iterable
+from itertools import chain
 from numbers import Number
 from typing import Any
 
@@ -14,6 +15,7 @@ from .implementation import kernel
 Points = npt.NDArray[np.float64]
 
 LARGEST_EXACT_INTEGER = 2**53
+MOST_AXES = 64  # of an array: no list is nested deeper
 
 
 def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
@@ -60,6 +62,33 @@ def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
     return np.ascontiguousarray(vectors.reshape(-1, dimension))
 
 
+def as_array(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+    """Return what numpy makes of the values, without a masked array among them."""
+    refuse_masked(values, name)
+    return np.asarray(values)
+
+
+def refuse_masked(values: Any, name: str) -> None:
+    """Raise ValueError for a masked array and for lists of them: numpy would take what is hidden for values.
+
+    Also where nothing is hidden, as scipy does: whether a call works does not depend on which data are missing today.
+    """
+    entries = [values]
+    for _ in range(MOST_AXES):
+        kinds = set(map(type, entries))
+        if kinds <= {float, int} or "numpy.ma" not in sys.modules:
+            return
+        if any(issubclass(kind, np.ma.MaskedArray) for kind in kinds):
+            raise ValueError(
+                f"{name} must not be or hold a masked array: give np.ma.compress_rows(...), which leaves out the rows "
+                "with hidden entries, or the array's .filled(value)"
+            )
+        lists = tuple(kind for kind in kinds if issubclass(kind, (list, tuple)))
+        if not lists:
+            return
+        entries = list(chain.from_iterable(entry for entry in entries if type(entry) in lists))
+
+
 def as_tuples(points: Points) -> list[tuple[float, float]]:
     """The rows of an (n, 2) array, for code that looks at one point at a time."""
     return [(x, y) for x, y in points.tolist()]
@@ -67,7 +96,7 @@ def as_tuples(points: Points) -> list[tuple[float, float]]:
 
 def as_vector(value: npt.ArrayLike, name: str) -> Points:
     """Return one point or vector of two or more finite coordinates."""
-    array = np.asarray(value)
+    array = as_array(value, name)
     if array.ndim != 1 or len(array) < 2:
         raise ValueError(f"{name} must have shape (d,), d at least 2, got {array.shape}")
     vector: Points = as_rows(array[None], name)[0]
@@ -85,7 +114,11 @@ def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
 
 def as_coordinate(value: Any, name: str) -> float:
     """Return one coordinate as a finite float, converted when exact."""
-    double: float = value if type(value) is float else _as_double_scalar(value, name)
+    if type(value) is float:
+        double = value
+    else:
+        refuse_masked(value, name)
+        double = _as_double_scalar(value, name)
     if not math.isfinite(double):
         raise ValueError(f"{name} is {double!r}: coordinates must be finite")
     return double + 0.0
@@ -93,7 +126,7 @@ def as_coordinate(value: Any, name: str) -> float:
 
 def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
     """Return `ops` as int8 of shape (rows,), each +1 (insert) or -1 (delete)."""
-    array = np.asarray(ops)
+    array = as_array(ops, "ops")
     if array.shape != (rows,):
         raise ValueError(f"ops must have shape ({rows},) like the points, got {array.shape}")
     if array.dtype.kind not in "iuf" and rows:
@@ -119,6 +152,7 @@ def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:
         return xy
     if isinstance(xy, Iterable) and not hasattr(xy, "__len__") and not hasattr(xy, "__array__"):
         xy = list(xy)
+    refuse_masked(xy, name)
     try:
         array = np.asarray(xy)
     except ValueError:

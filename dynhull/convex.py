@@ -20,7 +20,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Points, as_directions, as_points, as_rows, as_tuples, as_vector
+from .arrays import Points, as_array, as_directions, as_points, as_rows, as_tuples, as_vector
 from .exact import as_integers
 from .predicates import EPSILON, Point, cross_sign
 from .static import convex_hull
@@ -248,8 +248,9 @@ def rotated(shape: Convex, rotation: float | npt.ArrayLike) -> Mapped:
 
 def scaled(shape: Convex, factor: float | npt.ArrayLike) -> Mapped:
     """The shape scaled about the origin, by one factor or by one for each axis (an ellipse is a scaled ball)."""
-    matrix = np.diag(np.broadcast_to(np.asarray(factor, dtype=np.float64), (shape.dimension,)))
-    stretch = abs(float(np.asarray(factor))) if np.ndim(factor) == 0 else None
+    factors = as_array(factor, "factor").astype(np.float64)
+    matrix = np.diag(np.broadcast_to(factors, (shape.dimension,)))
+    stretch = abs(float(factors)) if factors.ndim == 0 else None
     return Mapped(shape, matrix, np.zeros(shape.dimension), stretch)
 
 

@@ -46,17 +46,14 @@ def rounded(value: Fraction) -> float:
 
 
 def root(value: Fraction) -> float:
-    """The square root of a rational number, within one unit in the last place; inf where no double is so large."""
-    if value == 0:
-        return 0.0
+    """The double nearest to the square root of a rational number; inf where no double is so large."""
     # A quotient of at least 2 * 64 bits whose power of two is even: its root has 64 bits or more.
     shift = 130 - value.numerator.bit_length() + value.denominator.bit_length()
     shift += shift % 2
-    scaled = (value.numerator << shift if shift > 0 else value.numerator) // (
-        value.denominator if shift > 0 else value.denominator << -shift
-    )
-    half = Fraction(2) ** (-shift // 2)
-    return rounded(isqrt(scaled) * half)
+    quotient, rest = divmod(value.numerator << max(shift, 0), value.denominator << max(-shift, 0))
+    whole = isqrt(quotient)
+    cut_off = rest > 0 or whole * whole < quotient  # one more bit, so that no root seems to be halfway
+    return rounded((2 * whole + cut_off) * Fraction(2) ** (-shift // 2 - 1))
 
 
 def as_integers(values: npt.NDArray[np.float64]) -> tuple[Integers, Fraction]:

@@ -139,6 +139,10 @@ class DynamicHull:
         """How many times the point is there. O(log n)."""
         return self._tree.count(x, y)
 
+    def count_many(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """How many times each of (k, 2) points is there. O(log n) each."""
+        return self._tree.count_many(as_points(xy))
+
     def __contains__(self, point: tuple[float, float]) -> bool:
         """Whether (x, y) is one of the points. O(log n)."""
         x, y = point
@@ -196,15 +200,14 @@ class DynamicHull:
         return self._tree.tangents(as_points(xy))
 
     def distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Distance of each of (k, 2) points to the hull, the exact value rounded. O(h + k log n).
+        """(k,) distances of (k, 2) points to the hull, each the exact value rounded once. O(log n) each.
 
         0.0 inside and on the boundary; inf from an empty hull.
         """
-        points = as_points(xy)
-        return measure.distance(self.vertices(), self._tree.tangents(points), points)
+        return self._tree.distance(as_points(xy))
 
     def intersect_lines(self, p: npt.ArrayLike, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """(k, 2, 2) where the lines through each of (k, 2) points p and q enter and leave the hull. O(h + k log h).
+        """(k, 2, 2) where the lines through each of (k, 2) points p and q enter and leave the hull. O(log n) each.
 
         In the order from p to q; each coordinate is the exact value rounded once. A line that touches a vertex has it
         twice, one along an edge has the edge's ends; NaN for a line that misses.
@@ -218,7 +221,7 @@ class DynamicHull:
         same = np.flatnonzero((starts == ends).all(axis=1))
         if same.size:
             raise ValueError(f"p and q row {same[0]} are the same point: no line")
-        return measure.intersect_lines(self.vertices(), starts, ends)
+        return self._tree.intersect_lines(starts, ends)
 
     # Measures, each computed once until the hull changes
 

@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from . import measure
 from .arrays import Points, as_coordinate, as_points
 from .nodes import (
     HIGHEST,
@@ -75,6 +76,10 @@ class HullTree:
     def count(self, x: float, y: float) -> int:
         """How many times the point is there. O(log n)."""
         return self._count(_point(x, y))
+
+    def count_many(self, xy: Points) -> npt.NDArray[np.int64]:
+        """How many times each row is there. O(log n) a row."""
+        return np.array([self._count(p) for p in _tuples(xy)], dtype=np.int64)
 
     def _count(self, p: Point) -> int:
         node = self._root
@@ -367,6 +372,14 @@ class HullTree:
         nothing = ((np.nan, np.nan), (np.nan, np.nan))
         rows = [self._tangents(p) or nothing for p in _tuples(xy)]
         return np.array(rows, dtype=np.float64).reshape(len(rows), 2, 2)
+
+    def distance(self, xy: Points) -> npt.NDArray[np.float64]:
+        """The distance of each row to the hull, the nearest double; inf without points. O(h + log n a row)."""
+        return measure.distance(self.vertices(), self.tangents(xy), xy)
+
+    def intersect_lines(self, p: Points, q: Points) -> npt.NDArray[np.float64]:
+        """Where the line through p and q of each row enters and leaves the hull. O(h + log n a row)."""
+        return measure.intersect_lines(self.vertices(), p, q)
 
     def _locate(self, p: Point) -> tuple[int, int, Edge]:
         """Where p is; outside, also the side and the edge it lies beyond: (p, p) where it lies before or after all."""

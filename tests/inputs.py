@@ -1,7 +1,10 @@
 """Points that hull code gets wrong, as hypothesis strategies."""
 
+from math import copysign, inf, nextafter
+
 import numpy as np
 from hypothesis import strategies as st
+from oracle import hull
 
 ULP = 2.0**-53
 # Integer points on the circle of radius sqrt(5525): all of them vertices, exactly.
@@ -32,6 +35,31 @@ def points(max_size: int) -> st.SearchStrategy[list[tuple[float, float]]]:
 
 grid_points = st.lists(st.tuples(*[st.integers(-6, 6).map(float)] * 2), min_size=1, max_size=12)
 any_points = st.one_of(grid_points, points(12).filter(len), st.lists(st.sampled_from(CIRCLE), min_size=1, max_size=9))
+
+
+@st.composite
+def questions(draw, max_size: int):
+    """Points to make a hull of, and points to ask about: any, and such as touch the hull or nearly do."""
+    rows = draw(any_points)
+    corners = hull(rows)
+    asked = draw(points(max_size))
+    for _ in range(draw(st.integers(0, max_size))):
+        i = draw(st.integers(0, len(corners) - 1))
+        share = draw(st.sampled_from([0.0, 0.5, 1 / 3, 1.0, -1.0, 2.0]))
+        ends = zip(corners[i - 1], corners[i], strict=True)
+        steps = draw(st.tuples(*[st.integers(-2, 2)] * 2))
+        on_edge = [a * (1 - share) + b * share for a, b in ends]
+        p = [moved(x, step) for x, step in zip(on_edge, steps, strict=True)]
+        if np.isfinite(p).all():
+            asked.append((p[0], p[1]))
+    return rows, draw(st.permutations(asked))
+
+
+def moved(x: float, steps: int) -> float:
+    """Some doubles further."""
+    for _ in range(abs(steps)):
+        x = nextafter(x, copysign(inf, steps))
+    return x
 
 
 @st.composite

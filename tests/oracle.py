@@ -77,13 +77,18 @@ def root(value):
     return Fraction(scaled) / Fraction(2) ** (2200 + 160)
 
 
+def nearest(value):
+    """The double nearest to a rational value >= 0; inf where it is too large."""
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
+
+
 def assert_rounded(measured, value):
     """The double next to a rational value, or one beside that; inf where it is too large."""
-    try:
-        nearest = float(value)
-    except OverflowError:
-        nearest = inf
-    assert measured in (nearest, nextafter(nearest, inf), nextafter(nearest, 0))
+    double = nearest(value)
+    assert measured in (double, nextafter(double, inf), nextafter(double, 0))
 
 
 def segment_distance(p: Point, a: Point, b: Point) -> Fraction:

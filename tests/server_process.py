@@ -22,11 +22,11 @@ class Server:
 
 @contextmanager
 def server_process(
-    *options: str, wrap: Sequence[str] = (), killed: bool = False, complaints: str = ""
+    *options: str, wrap: Sequence[str] = (), killed: bool = False, complaints: str = "", code: int = 0
 ) -> Iterator[Server]:
     """`dynhull serve` on a free port, in memory unless the options name a folder.
 
-    It must stop in peace, unless it was `killed`, and have nothing to complain about but what is expected. Its log is
+    It must end with `code`, unless it was `killed`, and have nothing to complain about but what is expected. Its log is
     of warnings and worse, unless the options say otherwise.
     """
     memory = [] if "--data" in options else ["--in-memory"]
@@ -41,10 +41,10 @@ def server_process(
             yield Server(first_line.split()[-1], process)
         finally:
             process.terminate()
-            code = process.wait(PATIENCE)
+            ended = process.wait(PATIENCE)
             errors.seek(0)
             said = errors.read()
-            assert code == (-signal.SIGKILL if killed else 0), said
+            assert ended == (-signal.SIGKILL if killed else code), said
             assert complaints in said if complaints else not said, said
 
 

@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Points, as_points, as_tuples
+from ..arrays import Points, as_array, as_points, as_tuples
 from ..exact import rounded
 from ..hull import DynamicHull
 from ..predicates import Point
@@ -103,7 +103,7 @@ class PhaseDiagram:
         >>> found.phases.tolist(), found.shares.tolist()
         ([[[0.0, 0.0], [0.5, -1.0]]], [[0.75, 0.25]])
         """
-        xs = np.asarray(compositions, dtype=np.float64)
+        xs = as_array(compositions, "compositions").astype(np.float64)
         if xs.ndim != 1:
             raise ValueError(f"compositions must have shape (k,), got {xs.shape}")
         rows = _as_entries(np.column_stack([xs, np.zeros(len(xs))]), "compositions")

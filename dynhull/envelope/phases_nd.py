@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import as_rows
+from ..arrays import as_array, as_rows
 from ..static import hull_nd
 
 SUM_ERROR = 1e-9
@@ -28,7 +28,7 @@ def energy_above_hull_nd(compositions: npt.ArrayLike, energies: npt.ArrayLike) -
     >>> energy_above_hull_nd([*elements, [0.5, 0.5, 0], [0.5, 0.25, 0.25]], [0, 0, 0, -2, -0.5]).tolist()
     [0.0, 0.0, 0.0, 0.0, 0.5]
     """
-    shares, heights = as_rows(compositions, "compositions"), np.asarray(energies)
+    shares, heights = as_rows(compositions, "compositions"), as_array(energies, "energies")
     if heights.shape != (len(shares),):
         raise ValueError(f"energies must have shape ({len(shares)},) like the compositions, got {heights.shape}")
     rows = as_rows(np.column_stack([shares[:, 1:], heights]), "entries")

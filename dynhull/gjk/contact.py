@@ -4,10 +4,11 @@ Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between 
 space" (1988); van den Bergen, "Proximity queries and penetration depth computation on 3D game objects" (2001).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,10 +17,12 @@ from ..convex import Cloud, Convex
 from ..hull import DynamicHull
 from ..static import convex_hull
 from .core import core
-from .difference import Difference, Walk, walk
+from .difference import Difference, Numbers, NumbersError, Walk, walk
 from .expand import expand
 from .polygons import certainly_apart, certainly_touching, distance_of_polygons, polygons_intersect
 from .vectors import scale, unit
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -71,9 +74,11 @@ def intersect(a: Shape, b: Shape) -> bool:
 def contact(a: Shape, b: Shape) -> Contact:
     """How two sets lie to each other: distance and closest points, or depth of the overlap and the way out of it.
 
-    Whether they intersect is decided as by `intersect`. Distance and depth: within 1e-12 of the sets' size for
-    polytopes, balls and their sums; within 1e-6 of it for shapes with other curves (a ball scaled unevenly). All this
-    for sets and gaps of a size from 1e-150 to 1e150: beyond, squares leave the range of doubles.
+    Whether they intersect is decided as by `intersect`. Distance and depth, at every size from the smallest doubles to
+    the largest: for points, segments, polygons, polyhedra and live hulls within 1e-12 of the extent of the two sets
+    together, wherever they lie; moved, turned, scaled, rounded and added up, within 1e-12 of their largest coordinate;
+    with other curves (a ball scaled unevenly) within 1e-6 of it. Below 1e-300, also within the smallest double; inf
+    beyond the largest. Where floats cannot keep that, the same steps are done in fractions, some thirty times slower.
     Between unions, all pairs of pieces are looked at: the closest two are told, or the two that overlap most, whose
     depth is a lower bound of the unions'.
 
@@ -106,22 +111,47 @@ def _pieces(shape: Shape) -> Sequence[Convex]:
 
 
 def _intersect(a: Convex, b: Convex) -> bool:
-    difference, radius_a, radius_b = _cores(a, b)
-    radius = radius_a + radius_b
-    return _meet(a, b, walk(difference, enough=radius), radius)
+    return _in_numbers_that_do(a, b, _are_touching)
 
 
 def _contact(a: Convex, b: Convex) -> Contact:
-    difference, radius_a, radius_b = _cores(a, b)
+    return _in_numbers_that_do(a, b, _in_contact)
+
+
+def _in_numbers_that_do(a: Convex, b: Convex, find: Callable[[Convex, Convex, Difference, float, float], T]) -> T:
+    """What is found from the difference of the sets' cores and the radius around each, in numbers that do."""
+    if a.dimension != b.dimension or a.dimension not in (2, 3):
+        raise ValueError(f"shapes must both be of dimension 2 or 3, got {a.dimension} and {b.dimension}")
+    (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
+    numbers = Numbers()
+    while True:
+        try:
+            return find(a, b, Difference(inner_a, inner_b, numbers), radius_a, radius_b)
+        except NumbersError as error:
+            numbers = error.numbers
+
+
+def _are_touching(a: Convex, b: Convex, difference: Difference, radius_a: float, radius_b: float) -> bool:
     radius = radius_a + radius_b
+    seen = walk(difference, enough=radius)
+    if not (seen.sure or _are_polygons(a, b)):
+        difference.doubt()
+    return _meet(a, b, seen, radius / difference.scale)
+
+
+def _in_contact(a: Convex, b: Convex, difference: Difference, radius_a: float, radius_b: float) -> Contact:
     seen = walk(difference, enough=inf)
+    if not seen.sure:
+        difference.doubt()
     iterations, points = seen.iterations, seen.points
+    radius = (radius_a + radius_b) / difference.scale
     if seen.distance > 0:
         gap, outwards = seen.distance - radius, unit(scale(-1.0, seen.nearest))
     else:
         overlap = expand(difference, seen.simplex)
         iterations, points = iterations + overlap.iterations, overlap.points
         gap, outwards = -overlap.depth - radius, overlap.normal
+    gap *= difference.scale
     d = a.dimension
     normal = np.array(outwards[:d]) + 0.0  # no negative zeros
     ends = np.array([p[:d] for p in points]) + np.outer([radius_a, -radius_b], normal)
@@ -132,25 +162,17 @@ def _contact(a: Convex, b: Convex) -> Contact:
     return Contact(False, gap, 0.0, normal, ends, iterations)
 
 
-def _cores(a: Convex, b: Convex) -> tuple[Difference, float, float]:
-    """The difference of the sets' cores, and the radius around each."""
-    if a.dimension != b.dimension or a.dimension not in (2, 3):
-        raise ValueError(f"shapes must both be of dimension 2 or 3, got {a.dimension} and {b.dimension}")
-    (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
-    return Difference(inner_a, inner_b), radius_a, radius_b
-
-
 def _meet(a: Convex, b: Convex, seen: Walk, radius: float) -> bool:
-    """Whether the sets intersect, from the walk through their cores: exact for polygons."""
-    if not (_is_polygon(a) and _is_polygon(b)):
+    """Whether the sets intersect, from the walk through their cores and the radius to scale: exact for polygons."""
+    if not _are_polygons(a, b):
         return seen.distance <= radius
     if certainly_apart(seen):
         return False
     return certainly_touching(seen) or polygons_intersect(_corners(a), _corners(b))
 
 
-def _is_polygon(shape: Convex) -> bool:
-    return isinstance(shape, Cloud | DynamicHull) and shape.dimension == 2
+def _are_polygons(a: Convex, b: Convex) -> bool:
+    return all(isinstance(shape, Cloud | DynamicHull) and shape.dimension == 2 for shape in (a, b))
 
 
 def _corners(shape: Convex) -> Points:

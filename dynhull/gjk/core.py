@@ -1,6 +1,7 @@
 """Rounded shapes as a core and a radius: on the cores GJK ends after a few steps, on curves it only converges."""
 
 from ..convex import Ball, Cloud, Convex, Mapped, Sum
+from ..hull import DynamicHull
 
 
 def core(shape: Convex) -> tuple[Convex, float]:
@@ -19,3 +20,10 @@ def core(shape: Convex) -> tuple[Convex, float]:
             else (shape, 0.0)
         )
     return shape, 0.0
+
+
+def is_polytope(shape: Convex) -> bool:
+    """Whether it is known to have finitely many vertices."""
+    if isinstance(shape, Sum):
+        return all(is_polytope(part) for part in shape.parts)
+    return is_polytope(shape.shape) if isinstance(shape, Mapped) else isinstance(shape, Cloud | DynamicHull)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from math import inf
 
+from ..predicates import EPSILON
 from .difference import Corner, Difference
 from .simplex import nearest
 from .vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale, subtract, unit
@@ -15,6 +16,10 @@ from .vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale,
 MOST_ITERATIONS = 512
 # Relative to the size of the difference: a push of less is rounding.
 GAIN = 1e-13
+# Of a cross product, relative to its factors.
+CROSS_ERROR = 4 * EPSILON
+# The same: two sides whose distances differ by less may be taken for each other.
+DOUBT = 4 * GAIN
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -30,11 +35,23 @@ class Overlap:
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """An edge in the plane, a triangle in space, seen counter-clockwise from outside."""
+    """An edge in the plane, a triangle in space, seen counter-clockwise from outside.
+
+    Attributes:
+        corners: two or three.
+        normal: unit vector that points outwards.
+        distance: of its line or plane from the origin, negative where that is outside.
+        error: of the normal, in floats: of a thin triangle.
+    """
 
     corners: tuple[Corner, ...]
     normal: Vector
     distance: float
+    error: float
+
+    def may_be_nearer(self, distance: float, size: float) -> bool:
+        """Whether it could be nearer to the origin than a distance, in a difference of a size."""
+        return self.error == inf or self.distance - self.error * size < distance
 
 
 def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
@@ -64,6 +81,10 @@ def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
         for s in new:
             heappush(heap, (s.distance, len(sides)))
             sides.append(s)
+    size = max([size, *(length(corner.w) for s in sides for corner in s.corners)])
+    left = [other for k, other in enumerate(sides) if k not in gone]
+    if side.distance < -DOUBT * size or any(other.may_be_nearer(side.distance - DOUBT * size, size) for other in left):
+        difference.doubt()
     foot = scale(side.distance, side.normal)
     kept, weights = nearest([subtract(corner.w, foot) for corner in side.corners])
     points = _points(weights, [side.corners[k] for k in kept])
@@ -105,14 +126,17 @@ def _across(corners: list[Corner], dimension: int) -> list[Vector]:
 def _side(corners: tuple[Corner, ...]) -> Side:
     if len(corners) == 2:
         way = subtract(corners[1].w, corners[0].w)
-        outwards = unit((way[1], -way[0], 0.0))
+        outwards, error = unit((way[1], -way[0], 0.0)), EPSILON
     else:
-        a, b, c = corners
-        outwards = unit(normal(a.w, b.w, c.w))
+        a, b, c = (corner.w for corner in corners)
+        across = normal(a, b, c)
+        outwards = unit(across)
+        lengths = length(subtract(b, a)) * length(subtract(c, a))
+        error = CROSS_ERROR * lengths / length(across) if any(across) else inf
     if outwards == ORIGIN:  # without area: never the nearest, never seen
-        return Side(corners, outwards, inf)
+        return Side(corners, outwards, inf, error)
     # Of the corners' distances, equal but for rounding, the one nearest to the origin is the most accurate.
-    return Side(corners, outwards, dot(outwards, min((c.w for c in corners), key=lambda w: dot(w, w))))
+    return Side(corners, outwards, dot(outwards, min((c.w for c in corners), key=lambda w: dot(w, w))), error)
 
 
 def _outward_sides(corners: list[Corner]) -> list[Side]:

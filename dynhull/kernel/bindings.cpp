@@ -66,10 +66,16 @@ double coordinate(nb::handle value, const char* name) {
 // What dynhull.arrays makes of points, or an error that says where one is wrong.
 nb::object as_points(const nb::object& xy) { return nb::module_::import_("dynhull.arrays").attr("as_points")(xy); }
 
+// Whether this is numpy's array and no subclass of it: a masked array's rows may be missing.
+bool is_plain_array(const nb::object& xy) {
+  static const nb::handle type = nb::module_::import_("numpy").attr("ndarray").release();
+  return xy.type().is(type);
+}
+
 // An array's rows as they are, of anything else what dynhull.arrays makes of it.
 Rows rows_of(const nb::object& xy) {
   Rows rows;
-  return nb::try_cast(xy, rows, false) ? rows : nb::cast<Rows>(as_points(xy));
+  return is_plain_array(xy) && nb::try_cast(xy, rows, false) ? rows : nb::cast<Rows>(as_points(xy));
 }
 
 HullTree tree_of(const nb::object& xy) {
@@ -168,6 +174,17 @@ class Hull {
     return output.array({count});
   }
 
+  nb::object count_many(const Rows& rows) {
+    const std::size_t count = rows.shape(0);
+    const Output<std::int64_t> output(count);
+    {
+      const Reading turn(turns_, count);
+      for (std::size_t i = 0; i < count; ++i)
+        output.data[i] = static_cast<std::int64_t>(tree_.count(points_of(rows)[i]));
+    }
+    return output.array({count});
+  }
+
   nb::object support(const Rows& directions) {
     const std::size_t count = directions.shape(0);
     const Output<double> output(2 * count);
@@ -177,7 +194,7 @@ class Hull {
       if (tree_.distinct() > 0)
         for (std::size_t i = 0; i < count; ++i) rows[i] = dynhull::support(tree_.nodes(), points_of(directions)[i]);
       else
-        std::fill_n(output.data, 2 * count, std::numeric_limits<double>::quiet_NaN());
+        std::fill_n(rows, count, NO_EDGE.a);
     }
     return output.array({count, 2});
   }
@@ -187,11 +204,32 @@ class Hull {
     const Output<double> output(4 * count);
     {
       const Reading turn(turns_, count);
-      constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
       auto* rows = reinterpret_cast<Edge*>(output.data);
       for (std::size_t i = 0; i < count; ++i)
-        rows[i] = dynhull::tangents(tree_.nodes(), points_of(points)[i])
-                      .value_or(Edge{{NOTHING, NOTHING}, {NOTHING, NOTHING}});
+        rows[i] = dynhull::tangents(tree_.nodes(), points_of(points)[i]).value_or(NO_EDGE);
+    }
+    return output.array({count, 2, 2});
+  }
+
+  nb::object distance(const Rows& points) {
+    const std::size_t count = points.shape(0);
+    const Output<double> output(count);
+    {
+      const Reading turn(turns_, count);
+      for (std::size_t i = 0; i < count; ++i) output.data[i] = dynhull::distance(tree_.nodes(), points_of(points)[i]);
+    }
+    return output.array({count});
+  }
+
+  nb::object intersect_lines(const Rows& p, const Rows& q) {
+    const std::size_t count = p.shape(0);
+    if (q.shape(0) != count) throw nb::value_error("p and q differ in length");
+    const Output<double> output(4 * count);
+    {
+      const Reading turn(turns_, count);
+      auto* rows = reinterpret_cast<Edge*>(output.data);
+      for (std::size_t i = 0; i < count; ++i)
+        rows[i] = intersect_line(tree_.nodes(), points_of(p)[i], points_of(q)[i]).value_or(NO_EDGE);
     }
     return output.array({count, 2, 2});
   }
@@ -215,6 +253,9 @@ class Hull {
   }
 
  private:
+  static constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
+  static constexpr Edge NO_EDGE = {{NOTHING, NOTHING}, {NOTHING, NOTHING}};
+
   std::int64_t apply(Ops ops, std::size_t ops_count, const nb::object& xy, bool ignore_missing,
                      std::optional<bool> together) {
     const Rows rows = rows_of(xy);
@@ -371,6 +412,7 @@ NB_MODULE(_kernel, module) {
       .def_prop_ro("distinct", &Hull::distinct, "How many different points.")
       .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "How many updates changed the hull.")
       .def("count", &Hull::count, "x"_a.none(), "y"_a.none(), "How many times the point is there. O(log n).")
+      .def("count_many", &Hull::count_many, "xy"_a, "How many times each point is there. O(log n) a row.")
       .def("insert", &Hull::insert, "x"_a.none(), "y"_a.none(), "Add a point. True where the hull changed. O(log² n).")
       .def("delete", &Hull::remove, "x"_a.none(), "y"_a.none(),
            "Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n).")
@@ -390,6 +432,11 @@ NB_MODULE(_kernel, module) {
            "The vertex farthest in each direction; of two the lexicographically smaller. O(log n) a row.")
       .def("tangents", &Hull::tangents, "xy"_a,
            "The left and the right tangent point seen from each row, NaN where it is not outside. O(log n) a row.")
+      .def("distance", &Hull::distance, "xy"_a,
+           "The distance of each row to the hull, the nearest double; infinite without points. O(log n) a row.")
+      .def("intersect_lines", &Hull::intersect_lines, "p"_a, "q"_a,
+           "Where the line through p and q of each row, different points, enters and leaves the hull; NaN where it "
+           "misses. O(log n) a row.")
       .def("copy", &Hull::copy, "An independent tree of the same points. O(n).")
       .def("check", &Hull::check, "Raise AssertionError where an invariant is broken. O(n log n).")
       .def_prop_ro("memory", &Hull::memory, "Bytes used and bytes reserved by the tree.");

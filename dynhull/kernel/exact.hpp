@@ -4,17 +4,25 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 namespace dynhull {
 
+// mantissa 2^exponent, the mantissa 0 or of size 0.5 to 1.
+struct Scaled {
+  double mantissa;
+  int exponent;
+};
+
 // A sum of products of FACTORS doubles each. Every product is an integer times 2^(-1074 FACTORS) and below
-// 2^(1024 FACTORS). Limbs have 32 bits and room for a sign and 2^31 carries, which are settled once, in sign().
+// 2^(1024 FACTORS). Limbs have 32 bits and room for a sign and 2^31 carries, which are settled in the end.
 template <int FACTORS>
 class ExactSum {
  public:
-  void add(int sign, std::array<double, FACTORS> factors) {
+  // Some small integer times the product.
+  void add(int weight, std::array<double, FACTORS> factors) {
     std::uint32_t product[2 * FACTORS + 1] = {1};
     int position = 0;  // of the product's lowest bit, counted from 2^(-1074 FACTORS)
     for (int f = 0; f < FACTORS; ++f) {
@@ -26,15 +34,15 @@ class ExactSum {
         position += exponent - 1;
       }
       if (mantissa == 0) return;
-      if (bits >> 63) sign = -sign;
+      if (bits >> 63) weight = -weight;
       multiply(product, mantissa);
     }
     std::size_t limb = static_cast<std::size_t>(position) / 32;
     const int shift = position % 32;
     for (std::uint32_t digit : product) {
       const std::uint64_t shifted = std::uint64_t{digit} << shift;
-      limbs_[limb] += sign * static_cast<std::int64_t>(shifted & LOW);
-      limbs_[++limb] += sign * static_cast<std::int64_t>(shifted >> 32);
+      limbs_[limb] += weight * static_cast<std::int64_t>(shifted & LOW);
+      limbs_[++limb] += weight * static_cast<std::int64_t>(shifted >> 32);
     }
   }
 
@@ -47,6 +55,25 @@ class ExactSum {
       carry = value >> 32;
     }
     return carry < 0 ? -1 : static_cast<int>(nonzero || carry > 0);
+  }
+
+  // The sum within a few units in the last place.
+  Scaled approximate() const {
+    const int negative = sign() < 0 ? -1 : 1;
+    std::uint32_t digits[LIMBS];
+    std::int64_t carry = 0;
+    for (std::size_t i = 0; i < LIMBS; ++i) {
+      const std::int64_t value = negative * limbs_[i] + carry;
+      digits[i] = static_cast<std::uint32_t>(value & LOW);
+      carry = value >> 32;
+    }
+    std::size_t top = LIMBS - 1;
+    while (top > 2 && digits[top] == 0) --top;
+    Scaled result;
+    const double value = (digits[top] * 0x1p32 + digits[top - 1]) * 0x1p32 + digits[top - 2];
+    result.mantissa = negative * std::frexp(value, &result.exponent);
+    result.exponent += 32 * (static_cast<int>(top) - 2) - 1074 * FACTORS;
+    return result;
   }
 
  private:

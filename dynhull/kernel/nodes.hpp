@@ -57,6 +57,10 @@ class Nodes {
     return tree;
   }
   Point first_point(Ref tree) const { return leaf(first_leaf(tree)).first(); }
+  Point last_point(Ref tree) const {
+    while (!is_leaf(tree)) tree = node(tree).child[1];
+    return leaf(tree)[leaf(tree).size - 1];
+  }
 
   // Which child of its parent a subtree is.
   int rank(Ref parent, Ref tree) const { return node(parent).child[1] == tree; }

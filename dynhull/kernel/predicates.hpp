@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include "exact.hpp"
 #include "point.hpp"
@@ -36,23 +37,34 @@ inline bool exact_difference(double a, double b, double difference) {
   return (a - a_part) + (b_part - b) == 0;
 }
 
+// A product of two coordinates, as a part of a sum.
+struct Term {
+  int weight;
+  double first, second;
+};
+
+// Twice the area of a triangle, positive where it turns left.
+inline std::array<Term, 6> triangle_terms(Point a, Point b, Point c) {
+  return {{{+1, a.x, b.y}, {-1, a.x, c.y}, {-1, c.x, b.y}, {-1, a.y, b.x}, {+1, a.y, c.x}, {+1, c.y, b.x}}};
+}
+
+// The sign of ux vy - uy vx, where the rounding errors of the products can be had.
+inline std::optional<int> determinant_sign(double ux, double uy, double vx, double vy) {
+  const double left = ux * vy, right = uy * vx;  // rounding never turns an order round
+  if (left != right && std::isfinite(left) && std::isfinite(right)) return sign_of(left - right);
+  if (left == right && std::abs(left) > EXACT_ERROR && std::isfinite(left))
+    return sign_of(std::fma(ux, vy, -left) - std::fma(uy, vx, -right));
+  if ((ux == 0 || vy == 0) && (uy == 0 || vx == 0)) return 0;
+  return std::nullopt;
+}
+
 [[gnu::noinline, gnu::cold]] inline int orientation_exact(Point a, Point b, Point c) {
   const double ux = a.x - c.x, uy = a.y - c.y, vx = b.x - c.x, vy = b.y - c.y;
   if (exact_difference(a.x, c.x, ux) && exact_difference(a.y, c.y, uy) && exact_difference(b.x, c.x, vx) &&
-      exact_difference(b.y, c.y, vy)) {
-    const double left = ux * vy, right = uy * vx;  // rounding never turns an order round
-    if (left != right && std::isfinite(left) && std::isfinite(right)) return sign_of(left - right);
-    if (left == right && std::abs(left) > EXACT_ERROR && std::isfinite(left))
-      return sign_of(std::fma(ux, vy, -left) - std::fma(uy, vx, -right));
-    if ((ux == 0 || vy == 0) && (uy == 0 || vx == 0)) return 0;
-  }
+      exact_difference(b.y, c.y, vy))
+    if (const std::optional<int> sign = determinant_sign(ux, uy, vx, vy)) return *sign;
   ExactSum<2> sum;
-  sum.add(+1, {a.x, b.y});
-  sum.add(-1, {a.x, c.y});
-  sum.add(-1, {c.x, b.y});
-  sum.add(-1, {a.y, b.x});
-  sum.add(+1, {a.y, c.x});
-  sum.add(+1, {c.y, b.x});
+  for (const Term& term : triangle_terms(a, b, c)) sum.add(term.weight, {term.first, term.second});
   return sum.sign();
 }
 
@@ -117,21 +129,47 @@ inline int direction_sign(Point d, Point a, Point b) {
   return sum.sign();
 }
 
+[[gnu::noinline, gnu::cold]] inline int cross_exact(Point a, Point b, Point c, Point d) {
+  const double ux = b.x - a.x, uy = b.y - a.y, vx = d.x - c.x, vy = d.y - c.y;
+  if (exact_difference(b.x, a.x, ux) && exact_difference(b.y, a.y, uy) && exact_difference(d.x, c.x, vx) &&
+      exact_difference(d.y, c.y, vy))
+    if (const std::optional<int> sign = determinant_sign(ux, uy, vx, vy)) return *sign;
+  ExactSum<2> sum;
+  for (const auto& [weight, p] : {std::pair{+1, b}, {-1, a}})
+    for (const auto& [other, q] : {std::pair{+1, d}, {-1, c}}) {
+      sum.add(+weight * other, {p.x, q.y});
+      sum.add(-weight * other, {p.y, q.x});
+    }
+  return sum.sign();
+}
+
+// The sign of (b - a) x (d - c): +1 where the way from c to d turns left of the way from a to b.
+inline int cross_sign(Point a, Point b, Point c, Point d) {
+  const double left = (b.x - a.x) * (d.y - c.y);
+  const double right = (b.y - a.y) * (d.x - c.x);
+  const double det = left - right;
+  const double bound = ORIENT_BOUND * (std::abs(left) + std::abs(right)) + UNDERFLOW_SLACK;
+  if (det > bound) return 1;
+  if (-det > bound) return -1;
+  return cross_exact(a, b, c, d);
+}
+
+// The sign of (b - a) . (d - c): +1 where the two ways lead in one direction rather than apart.
+inline int dot_sign(Point a, Point b, Point c, Point d) {
+  return cross_sign(a, b, {-c.y, c.x}, {-d.y, d.x});  // the second way, turned left
+}
+
 // det(c, d, z) (b.x - a.x) - det(a, b, z) (d.x - c.x), of degree three.
 [[gnu::noinline, gnu::cold]] inline int crossing_exact(Point a, Point b, Point c, Point d, Point z) {
   ExactSum<3> sum;
-  const auto add = [&](int sign, Point p, Point q, double factor) {  // sign * factor * det(p, q, z)
-    sum.add(+sign, {p.x, q.y, factor});
-    sum.add(-sign, {p.x, z.y, factor});
-    sum.add(-sign, {z.x, q.y, factor});
-    sum.add(-sign, {p.y, q.x, factor});
-    sum.add(+sign, {p.y, z.x, factor});
-    sum.add(+sign, {z.y, q.x, factor});
-  };
-  add(+1, c, d, b.x);
-  add(-1, c, d, a.x);
-  add(-1, a, b, d.x);
-  add(+1, a, b, c.x);
+  for (const Term& term : triangle_terms(c, d, z)) {
+    sum.add(+term.weight, {term.first, term.second, b.x});
+    sum.add(-term.weight, {term.first, term.second, a.x});
+  }
+  for (const Term& term : triangle_terms(a, b, z)) {
+    sum.add(-term.weight, {term.first, term.second, d.x});
+    sum.add(+term.weight, {term.first, term.second, c.x});
+  }
   return sum.sign();
 }
 

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "nearest.hpp"
 #include "tree.hpp"
 
 namespace dynhull {
@@ -74,6 +75,101 @@ inline std::optional<Edge> tangents(const Nodes& nodes, Point p) {
                 tangent_to_right(Cursor(nodes, root, LOWER), p, LOWER)};
   return Edge{tangent_to_left(Cursor(nodes, root, LOWER), p, LOWER),
               tangent_to_left(Cursor(nodes, root, UPPER), p, UPPER)};
+}
+
+// What is nearest to p, outside, of a side that p sees: an edge, where the nearest point lies between its ends, or a
+// vertex, twice. Along what p sees the distance falls, then rises; what it does not see lies beyond.
+inline Edge nearest(Cursor cursor, Side side, Point p) {
+  while (!cursor.single) {
+    const Point a = cursor.a, b = cursor.b;
+    if (turned(side, orientation(a, b, p)) <= 0)
+      p > a ? cursor.go_right() : cursor.go_left();
+    else if (dot_sign(b, p, a, b) >= 0)
+      cursor.go_right();
+    else if (dot_sign(a, p, a, b) <= 0)
+      cursor.go_left();
+    else
+      return {a, b};
+  }
+  return {cursor.a, cursor.a};
+}
+
+inline double distance(Point p, Edge edge) {
+  return edge.a == edge.b ? distance(p, edge.a) : distance_to_line(p, edge.a, edge.b);
+}
+
+// The double nearest to the distance of p from the hull: 0 inside, infinite without points.
+inline double distance(const Nodes& nodes, Point p) {
+  if (nodes.root == NONE) return INFINITE;
+  const Location at = locate(nodes, p);
+  if (at.where >= 0) return 0;
+  const Edge one = nearest(Cursor(nodes, nodes.root, at.side), at.side, p);
+  if (at.edge || !(one.a == one.b)) return distance(p, one);
+  // p lies before or after all points and may see both sides: one of the vertices is their common end, at least.
+  const Edge other = nearest(Cursor(nodes, nodes.root, LOWER), LOWER, p);
+  if (!(other.a == other.b)) return distance(p, other);
+  return distance(p, p < one.a ? std::max(one.a, other.a) : std::min(one.a, other.a));
+}
+
+// The vertex of a side that is farthest from the line through p and q, p < q, on that side of it; or an edge.
+inline Edge farthest(Cursor cursor, Side side, Point p, Point q) {
+  while (!cursor.single) {
+    const int turn = turned(side, cross_sign(p, q, cursor.a, cursor.b));
+    if (turn == 0) return {cursor.a, cursor.b};
+    turn > 0 ? cursor.go_right() : cursor.go_left();
+  }
+  return {cursor.a, cursor.a};
+}
+
+// Where the line through p and q crosses a part of a chain that begins on the line's side `sign` and ends on the other.
+inline Point crossing_point(Cursor cursor, Point p, Point q, int sign) {
+  while (true) {
+    const Point a = cursor.a, b = cursor.b;
+    const int at_b = sign * orientation(p, q, b);
+    if (at_b == 0) return b;
+    if (at_b > 0) {
+      cursor.go_right();
+    } else {
+      const int at_a = sign * orientation(p, q, a);
+      if (at_a == 0) return a;
+      if (at_a > 0) return meet(p, q, a, b);
+      cursor.go_left();
+    }
+  }
+}
+
+// Where the line through p and q, p < q, enters and leaves the hull, each coordinate the nearest double. It has a
+// vertex that it touches twice, and an edge's ends where it lies along the edge.
+inline std::optional<Edge> chord(const Nodes& nodes, Point p, Point q) {
+  const Ref root = nodes.root;
+  if (root == NONE) return std::nullopt;
+  Point vertex[2];
+  for (Side side : {LOWER, UPPER}) {
+    const Edge edge = farthest(Cursor(nodes, root, side), side, p, q);
+    const int turn = turned(side, orientation(p, q, edge.a));
+    if (turn < 0) return std::nullopt;
+    if (turn == 0) return edge;
+    vertex[side] = edge.a;
+  }
+  const Point first = nodes.first_point(root), last = nodes.last_point(root);
+  const int at_first = orientation(p, q, first), at_last = orientation(p, q, last);
+  Edge ends = {first, last};
+  if (at_first != 0) {
+    const Side side = at_first > 0 ? LOWER : UPPER;
+    ends.a = crossing_point(Cursor(nodes, root, side, LOWEST, vertex[side]), p, q, at_first);
+  }
+  if (at_last != 0) {
+    const Side side = at_last > 0 ? LOWER : UPPER;
+    ends.b = crossing_point(Cursor(nodes, root, side, vertex[side], HIGHEST), p, q, -at_last);
+  }
+  return ends;
+}
+
+// The same, in the order from p to q.
+inline std::optional<Edge> intersect_line(const Nodes& nodes, Point p, Point q) {
+  if (p < q) return chord(nodes, p, q);
+  const std::optional<Edge> ends = chord(nodes, q, p);
+  return ends ? std::optional(Edge{ends->b, ends->a}) : std::nullopt;
 }
 
 }  // namespace dynhull

@@ -1,6 +1,6 @@
 """Convex hulls in three and more dimensions: Qhull's, by the conventions of this library.
 
-The only part of the library that needs scipy, and the only one whose vertices are not exact.
+The only part of the library that needs scipy, and the only one whose vertices are not exact: `hull_nd` says how far.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import as_rows
+from ..exact import as_integers
 from .monotone_chain import monotone_chain
+from .quickhull import determinant_sign, independent, inverse, quickhull, whole
 
 Rows = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
+Integers = npt.NDArray[Any]
+
+LARGEST_TO_SUBTRACT = 2.0**1022
+# Far above the rounding errors of a determinant of vectors of length one.
+DOUBTFUL_VOLUME = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,26 +47,33 @@ class HullND:
 
 
 @dataclass(frozen=True, slots=True)
-class _Flat:
-    """The smallest flat that holds the points. Exact, but for the rounding of `position`.
+class _Boundary:
+    """Simplices in outward order.
 
     Attributes:
-        axes: as many axes as the flat has dimensions; the others can be computed from these.
-        basis: row numbers of points that, seen from the first point, span the flat.
-        position: (n, dimension) coordinates in that basis, none of them large.
+        simplices: row numbers.
+        faces: in which hyperplane each lies; equal for those in one.
+        normals: (f, d), one for each simplex.
     """
 
-    axes: list[int]
-    basis: list[int]
-    position: Rows
+    simplices: Indices
+    faces: list[tuple[Any, ...]]
+    normals: Rows
 
 
 def hull_nd(points: npt.ArrayLike, merge: bool = False) -> HullND:
     """Convex hull in two or more dimensions. O(n log n) in three, O(n^floor(d/2)) in d > 3.
 
     Barber, Dobkin, Huhdanpaa, "The Quickhull algorithm for convex hulls" (1996): Qhull, through scipy. Qhull works in
-    floating point: a point within its rounding error of a face may or may not be a vertex. Whether the input is flat
-    is decided exactly, and hulls of points in one plane are exact.
+    floating point: a point within its rounding error of a face may or may not be a vertex. Where rounding errors break
+    the boundary, as they do near a hyperplane, the same algorithm runs in exact arithmetic, some twenty times slower.
+
+    For points of any thickness in any position: the dimension is exact, the boundary is closed (each ridge is between
+    two simplices), and no point lies outside of a face by more than 1e-9 of the points' extent. Hulls of points in one
+    plane are exact.
+
+    Flat are only points that lie in a hyperplane exactly, as doubles. Points of a plane turned in space seldom do,
+    since their coordinates are rounded: their hull is of full dimension and a few roundings thick.
 
     Args:
         points: (n, d) array-like of finite numbers.
@@ -79,102 +93,134 @@ def hull_nd(points: npt.ArrayLike, merge: bool = False) -> HullND:
     n, d = rows.shape
     if n < 2:
         return HullND(n - 1, rows, [] if merge else np.empty((0, max(n - 1, 0)), np.int64), np.empty((0, d)))
-    dimension, simplices, equations, embedding = _simplices(rows)
-    normals = equations[:, :dimension] @ np.linalg.pinv(embedding).T
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    used, numbers = np.unique(simplices, return_inverse=True)
-    faces = numbers.reshape(simplices.shape).astype(np.int64)
+    dimension, boundary = _boundary(rows)
+    used, numbers = np.unique(boundary.simplices, return_inverse=True)
+    faces = numbers.reshape(boundary.simplices.shape).astype(np.int64)
     if not merge:
-        return HullND(dimension, rows[used], faces, normals)
-    # Qhull gives the simplices of a face the same equation, bit by bit.
-    _, first, group = np.unique(equations, axis=0, return_index=True, return_inverse=True)
-    merged = [_merged(faces[group.ravel() == i]) for i in range(len(first))]
-    return HullND(dimension, rows[used], merged, normals[first])
+        return HullND(dimension, rows[used], faces, boundary.normals)
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for i, face in enumerate(boundary.faces):
+        groups.setdefault(face, []).append(i)
+    merged = [_merged(faces[group]) for group in groups.values()]
+    return HullND(dimension, rows[used], merged, boundary.normals[[group[0] for group in groups.values()]])
 
 
-def _simplices(rows: Rows) -> tuple[int, Indices, Rows, Rows]:
-    """Simplices with outward equations in some coordinates of the rows, and the linear map from these to the space.
-
-    Three ways, each only where the one before found its input flat: the given coordinates, as many of these as the
-    points have dimensions, and coordinates in a basis of points, in which nothing is nearly flat.
-    """
+def _boundary(rows: Rows) -> tuple[int, _Boundary]:
+    """The dimension of two or more distinct rows, and the boundary of their hull."""
     d = rows.shape[1]
-    largest = np.frexp(np.abs(rows).max())[1]
-    scaled = np.ldexp(rows, -largest)  # by a power of two: squares neither overflow nor vanish
-    if d > 2 and (found := _qhull(scaled)):
-        return d, *found, np.eye(d)
-    flat = _smallest_flat(rows)
-    spanning = scaled[flat.basis] - scaled[0]
-    dimension = len(flat.axes)
+    if d > 2 and (found := _by_qhull(rows)):
+        simplices, equations = found
+        return d, _Boundary(simplices, _keys(equations), equations[:, :-1])
+    points, _ = as_integers(rows)
+    basis, axes = independent(points - points[0])
+    axes.sort()
+    dimension = len(axes)
+    seen = points[:, axes]  # in the flat, as many coordinates as it has dimensions tell points apart
     if dimension == 1:
         ends = np.array([[0], [len(rows) - 1]], np.int64)  # in lexicographic order, which on a line is along it
-        return 1, ends, np.array([[-1.0], [1.0]]), spanning
-    if dimension == d == 2:
-        return 2, *_polygon(rows), np.eye(2)
-    found = _polygon(rows[:, flat.axes]) if dimension == 2 else _qhull(scaled[:, flat.axes]) if dimension < d else None
-    if found:
+        simplices, outwards = ends, seen[ends[:, 0]] - seen[ends[::-1, 0]]
+        faces = _keys(simplices)
+    elif dimension == 2:
+        simplices = _polygon(rows[:, axes])
+        step = seen[simplices[:, 1]] - seen[simplices[:, 0]]
+        outwards = np.stack([step[:, 1], -step[:, 0]], axis=1)
+        faces = _keys(simplices)
+    elif dimension < d and (found := _by_qhull(rows[:, axes])):
         simplices, equations = found
-        return dimension, simplices, equations[:, :dimension] @ spanning[:, flat.axes].T, spanning
-    found = _qhull(flat.position)
-    assert found is not None  # the basis is a simplex in these coordinates, with edges of length one
-    return dimension, *found, spanning
+        outwards, _ = as_integers(equations[:, :-1])
+        faces = _keys(equations)
+    else:
+        facets = quickhull(seen)
+        simplices = np.array([facet.corners for facet in facets], np.int64)
+        planes = np.array([facet.plane for facet in facets], dtype=object)
+        faces, outwards = _keys(planes), planes[:, :-1]
+    if dimension < d:
+        outwards = outwards @ _embedding(points[basis] - points[0], axes).T
+    return dimension, _Boundary(simplices, faces, _units(outwards))
 
 
-def _smallest_flat(rows: Rows) -> _Flat:
-    """By Gauss-Jordan elimination on integers, without fractions (Bareiss 1968). O(n d²)."""
-    columns = [[value.as_integer_ratio() for value in column] for column in rows.T.tolist()]
-    scales = [max(denominator for _, denominator in column) for column in columns]
-    scale = max(scales)
-    matrix = np.array([[a * (scale // b) for a, b in column] for column in columns], dtype=object).T
-    matrix = matrix - matrix[0]
-    axes: list[int] = []
-    basis: list[int] = []
-    pivot = 1
-    for _ in range(rows.shape[1]):
-        rest = [axis for axis in range(rows.shape[1]) if axis not in axes]
-        i, k = divmod(int(np.abs(matrix[:, rest]).argmax()), len(rest))
-        axis = rest[k]
-        if matrix[i, axis] == 0:
-            break
-        last, pivot = pivot, matrix[i, axis]
-        for other in range(rows.shape[1]):
-            if other != axis:
-                matrix[:, other] = (matrix[:, other] * pivot - matrix[:, axis] * matrix[i, other]) // last
-        axes.append(axis)
-        basis.append(i)
-    # The pivot is the basis' determinant on the axes in this order: it says whether the new coordinates are mirrored.
-    mirrored = (pivot < 0) != (sum(a > b for a, b in combinations(axes, 2)) % 2 == 1)
-    if mirrored and len(basis) > 1:
-        order = [1, 0, *range(2, len(basis))]
-        basis, axes = [basis[i] for i in order], [axes[i] for i in order]
-    position = (matrix[:, axes] / pivot).astype(np.float64)
-    return _Flat(sorted(axes), basis, position)
+def _embedding(basis: Integers, axes: list[int]) -> Integers:
+    """The matrix that turns normals given on some of the axes into vectors of the flat in space, of another length.
+
+    A normal is known by its products with the basis, which are the same in the flat and on the axes. Exact.
+    """
+    gram = inverse(basis @ basis.T)
+    matrix = basis.T @ gram @ basis[:, axes]
+    return np.array(whole(matrix.ravel()), dtype=object).reshape(matrix.shape)
 
 
-def _polygon(xy: Rows) -> tuple[Indices, Rows]:
-    """The edges of distinct points in the plane, and their equations."""
+def _units(vectors: Integers) -> Rows:
+    """Of length one, rounded."""
+    largest = np.abs(vectors).max(axis=1, keepdims=True)
+    units = (vectors / largest).astype(np.float64)
+    return np.asarray(units / np.linalg.norm(units, axis=1, keepdims=True))
+
+
+def _keys(rows: npt.NDArray[Any]) -> list[tuple[Any, ...]]:
+    return list(map(tuple, rows.tolist()))
+
+
+def _polygon(xy: Rows) -> Indices:
+    """The edges of distinct points in the plane."""
     number = {point: i for i, point in enumerate(map(tuple, xy.tolist()))}
-    corners = monotone_chain(xy)
-    ahead = np.roll(corners, -1, axis=0)
-    edges = [[number[tuple(p)], number[tuple(q)]] for p, q in zip(corners.tolist(), ahead.tolist(), strict=True)]
-    step = np.ldexp(ahead, -1) - np.ldexp(corners, -1)  # half: no difference overflows
-    step /= np.abs(step).max(axis=1, keepdims=True)
-    return np.array(edges, np.int64), np.stack([step[:, 1], -step[:, 0]], axis=1)
+    corners = [number[tuple(corner)] for corner in monotone_chain(xy).tolist()]
+    return np.stack([corners, np.roll(corners, -1)], axis=1).astype(np.int64)
 
 
-def _qhull(points: Rows) -> tuple[Indices, Rows] | None:
-    """Simplices in outward order and outward equations; None where Qhull finds the points flat."""
+def _by_qhull(rows: Rows) -> tuple[Indices, Rows] | None:
+    """Simplices in outward order with equations; None for flat rows, or where rounding errors break the boundary."""
+    points = _near_the_origin(rows)
     spatial = _scipy_spatial()
     try:
         hull = spatial.ConvexHull(points)
     except spatial.QhullError:
         return None
     simplices = hull.simplices.astype(np.int64)
-    corners = points[simplices]
-    frames = np.concatenate([hull.equations[:, None, :-1], corners[:, 1:] - corners[:, :1]], axis=1)
-    inwards = np.linalg.det(frames) < 0
+    volumes = _volumes(rows, simplices, hull.equations[:, :-1])
+    inwards = volumes < 0
     simplices[inwards, -2:] = simplices[inwards, :-3:-1]
-    return simplices, hull.equations
+    largest = np.abs(volumes).argmax()
+    farthest = (points @ hull.equations[largest, :-1]).argmin()
+    sample, _ = as_integers(rows[[farthest, *simplices[largest]]])
+    spans = len(independent(sample[1:] - sample[0])[0]) == rows.shape[1]
+    return (simplices, hull.equations) if spans and volumes.all() and _is_closed(simplices) else None
+
+
+def _volumes(rows: Rows, simplices: Indices, normals: Rows) -> Rows:
+    """det(normal, v1 - v0, v2 - v0, ...) with edges of length one; the sign is exact."""
+    corners = _halves_where_large(rows)[simplices]
+    edges = corners[:, 1:] - corners[:, :1]
+    edges = edges / np.abs(edges).max(axis=2, keepdims=True)
+    edges = edges / np.linalg.norm(edges, axis=2, keepdims=True)
+    volumes = np.linalg.det(np.concatenate([normals[:, None], edges], axis=1))
+    for i in np.flatnonzero(np.abs(volumes) < DOUBTFUL_VOLUME).tolist():
+        exactly, _ = as_integers(rows[simplices[i]])
+        normal, _ = as_integers(normals[i])
+        volumes[i] = determinant_sign(np.stack([normal, *(exactly[1:] - exactly[0])])) * DOUBTFUL_VOLUME
+    return np.asarray(volumes)
+
+
+def _halves_where_large(rows: Rows) -> Rows:
+    """The rows, halved where a difference could overflow."""
+    return np.ldexp(rows, -1) if np.abs(rows).max() > LARGEST_TO_SUBTRACT else rows
+
+
+def _near_the_origin(rows: Rows) -> Rows:
+    """Moved, and scaled by a power of two: of a size near one. Errors are roundings relative to the extent."""
+    halves = _halves_where_large(rows)
+    points = halves - halves[0]
+    return np.asarray(np.ldexp(points, -np.frexp(np.abs(points).max())[1]))
+
+
+def _is_closed(simplices: Indices) -> bool:
+    """Whether each ridge is between two simplices, which go around it in opposite directions."""
+    k = simplices.shape[1]
+    ascending = np.sort(simplices, axis=1)
+    swaps = sum((simplices[:, i] > simplices[:, j]).astype(np.int64) for i, j in combinations(range(k), 2))
+    ridges = np.concatenate([np.delete(ascending, i, axis=1) for i in range(k)])
+    signs = np.concatenate([1 - 2 * ((swaps + i) % 2) for i in range(k)])
+    _, ridge, count = np.unique(ridges, axis=0, return_inverse=True, return_counts=True)
+    return bool((count == 2).all() and not np.bincount(ridge.ravel(), weights=signs).any())
 
 
 def _scipy_spatial() -> Any:

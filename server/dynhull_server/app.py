@@ -3,19 +3,22 @@
 import asyncio
 import logging
 import math
+import os
 import ssl
+import sys
 from collections.abc import Callable
 from functools import partial
 
 import grpc
 from grpc_health.v1 import health_pb2
 
-from .engine.hulls import Engine
+from .engine.engine import Engine
 from .engine.live_hull import LiveHull
-from .engine.scrub import scrub
-from .engine.snapshots import keep_snapshots
+from .engine.scrub import Scrub
+from .engine.supervisor import Supervisor
+from .engine.threads import Machine
 from .engine.verification import Verification
-from .rpc.access import ANYBODY, Caller, TokenFile
+from .rpc.access import ANYBODY, LOOK_SECONDS, Caller, TokenFile
 from .rpc.calls import Calls, Context
 from .rpc.health import Health
 from .rpc.hull_service import HullService
@@ -25,7 +28,10 @@ from .rpc.metrics_page import MetricsPage
 from .rpc.places import Places
 from .settings import Settings, is_loopback
 from .state.limits import Limits
-from .storage.sqlite.journal import Journal
+from .storage.durability import Durability
+from .storage.memory import MemoryStorage
+from .storage.port import Storage
+from .storage.sqlite.storage import SQLiteStorage
 
 SERVICE = DESCRIPTOR.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm.
@@ -46,6 +52,10 @@ HANDSHAKE_TIMEOUT = 10_000
 # A message of so many bytes beyond the limit is read, to be refused with details.
 REFUSED_BYTES = 64 * 2**20
 
+# Seconds between syncs where commits are not durable by themselves: with the sync itself, less than the tenth of a
+# second after which an acknowledged batch survives a power failure.
+SYNC_SECONDS = 0.05
+
 log = logging.getLogger(__name__)
 
 
@@ -59,10 +69,16 @@ class Server:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        journal = None if settings.in_memory else Journal(settings.data, settings.durability)
-        self._engine = Engine(
-            Limits(settings.max_hulls, settings.max_points, settings.max_producers, settings.history_bytes), journal
+        self._machine = machine = Machine()
+        self._supervisor = Supervisor(machine.clock, self._well_or_not, _end_process)
+        limits = Limits(
+            max_hulls=settings.max_hulls,
+            max_points=settings.max_points,
+            max_producers=settings.max_producers,
+            max_producers_per_caller=settings.max_producers_per_caller,
+            history_bytes=settings.history_bytes,
         )
+        self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
         self._metrics = Metrics()
         self._tokens = None if settings.tokens is None else TokenFile(settings.tokens)
         authenticate = _anonymous if self._tokens is None else _bearer(self._tokens)
@@ -87,10 +103,8 @@ class Server:
                 ("grpc.max_allowed_incoming_connections", settings.max_connections),
             ]
         )
-        self._scrub: asyncio.Task[None] | None = None
-        self._snapshots: asyncio.Task[None] | None = None
-        self._look: asyncio.Task[None] | None = None
         self._stop_metrics: Callable[[], None] = lambda: None
+        self._serving = False
         self.address = ""
         self.metrics_url = ""
 
@@ -102,7 +116,7 @@ class Server:
 
         Raises:
             RuntimeError: the address is taken or is none of this machine's.
-            JournalError: the stored data cannot be used.
+            StorageError: the stored data cannot be used.
         """
         service = HullService(
             self._engine,
@@ -123,39 +137,43 @@ class Server:
         self._serve_metrics()
         self._health.set(NOT_SERVING, "", SERVICE)
         await self._server.start()
-        for note in await self._engine.restore(progress):
+        for note in await self._engine.start(progress):
             log.warning("lost", extra={"what": note})
         self._calls.ready()
-        self._health.set(SERVING, "", SERVICE, SCRUB)
+        self._health.set(SERVING, SCRUB)
+        self._serving = True
+        self._well_or_not(None)
         if self._tokens is not None:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
-            self._look = asyncio.create_task(self._tokens.run())
+            self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
         if not self._settings.in_memory:
-            self._snapshots = asyncio.create_task(keep_snapshots(self._engine, self._settings.snapshot_points))
+            interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
+            self._engine.keep_house(self._settings.snapshot_points, interval)
         if self._settings.scrub_cpu:
-            self._scrub = asyncio.create_task(
-                scrub(
-                    self._engine,
-                    self._settings.scrub_cpu,
-                    self._settings.scrub_pause,
-                    self._compared,
-                    self._metrics.scrub_round,
-                )
-            )
+            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared)
+            self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
         log.info("serving", extra={"address": self.address})
 
     async def drain(self) -> None:
         """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
         log.info("draining")
         self._health.stop()
-        for task in (self._scrub, self._snapshots, self._look):
-            if task is not None:
-                task.cancel()
+        self._serving = False
+        await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_WORDS)
         self._stop_metrics()
-        self._engine.close()
+        await self._engine.close()
         log.info("stopped")
+
+    async def _scrub(self, scrub: Scrub) -> None:
+        await scrub.round()
+        self._metrics.scrub_round()
+
+    def _well_or_not(self, reason: str | None) -> None:
+        """Tell health checks."""
+        if self._serving:
+            self._health.set(SERVING if reason is None else NOT_SERVING, "", SERVICE)
 
     def _listen(self) -> int:
         address = f"{self._settings.host}:{self._settings.port}"
@@ -174,7 +192,7 @@ class Server:
         if self._settings.metrics_port is None:
             return
         registry = self._metrics.registry
-        registry.register(StateCollector(self._engine, self._metrics, asyncio.get_running_loop()))
+        registry.register(StateCollector(self._engine, self._metrics, self._supervisor, asyncio.get_running_loop()))
         host, port = self._settings.metrics_host, self._settings.metrics_port
         open_to_others = not is_loopback(host)
         tls = self._tls() if open_to_others else None
@@ -205,6 +223,18 @@ class Server:
                 "a hull differs from Chan's algorithm", extra={"hull": hull.name, "difference": outcome.difference}
             )
             self._health.set(NOT_SERVING, SCRUB)
+
+
+def _storage(settings: Settings) -> Storage:
+    if settings.in_memory:
+        return MemoryStorage(forgets=True)
+    return SQLiteStorage(settings.data, settings.durability)
+
+
+def _end_process(reason: str) -> None:
+    """What is acknowledged is kept. The rest cannot be relied on: whoever runs the server starts it again."""
+    print(f"the server ends: {reason}", file=sys.stderr, flush=True)  # noqa: T201  # logging may be what is broken
+    os._exit(os.EX_SOFTWARE)
 
 
 def _anonymous(_: Context) -> Caller:

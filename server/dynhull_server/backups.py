@@ -1,7 +1,6 @@
 """`dynhull backup`, `dynhull restore`, `dynhull export`: data folders as files."""
 
 import json
-import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,11 +12,10 @@ import typer
 
 from dynhull.arrays import Points
 
-from .engine.stored import read_hull
 from .progress import progress_bar
+from .storage.port import Progress, StorageError
+from .state.hull_state import replayed
 from .storage.sqlite import copies
-from .storage.sqlite.errors import JournalError
-from .storage.sqlite.folder import DATABASE
 
 DATA = Path("dynhull-data")
 ROWS_A_STEP = 100_000
@@ -29,31 +27,46 @@ def backup(
 ) -> None:
     """Copy a data folder, consistently, while a server runs on it.
 
-    The copy is a data folder itself: `dynhull serve --data COPY` serves it.
+    The copy is a data folder itself, examined in full: `dynhull serve --data COPY` serves it. Until it is whole and on
+    the disk, it is not taken for one.
     """
-    with _told(), progress_bar("pages") as progress:
-        copies.back_up(data, target, progress)
-    typer.echo(f"{target}: {len(copies.hulls(target))} hulls")
+    _copy(data, target)
 
 
 def restore(
-    backup: Annotated[Path, typer.Argument(help="A backup.", exists=True, file_okay=False)],
+    backup: Annotated[Path, typer.Argument(help="A backup, or any data folder.", exists=True, file_okay=False)],
     data: Annotated[Path, typer.Option(help="The data folder to make.")] = DATA,
 ) -> None:
-    """Make a data folder from a backup, after every hull in it has been read and found whole."""
-    with _told():
-        if data.exists() and any(data.iterdir()):
-            raise JournalError(f"{data} is not empty: move it away first, or name another folder with --data")
-        rows = copies.hulls(backup)
-        with progress_bar("hulls") as progress:
-            for done, row in enumerate(rows):
-                progress(done, len(rows))
-                notes = copies.look(backup, row.number).notes
-                if notes:
-                    raise JournalError(f"{backup}, hull {row.name}: {notes[0]}")
-        data.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(backup / DATABASE, data / DATABASE)
-    typer.echo(f"{data}: {len(rows)} hulls")
+    """Make a data folder from a backup, with all that the backup holds, and only where every hull in it is whole."""
+    _copy(backup, data)
+
+
+def check(
+    data: Annotated[Path, typer.Argument(help="A data folder or a backup; a server may be running on it.")] = DATA,
+) -> None:
+    """Examine a data folder or a backup, and say what was found, hull by hull. Nothing is changed.
+
+    Everything is read and compared with its checksums: every batch, every snapshot, also those that the next start
+    would not need. Where a server runs on the folder, what it has committed is examined as of one moment; its log is
+    examined once the server has stopped.
+
+    The exit code is 0 where all is whole, and 1 where something is damaged, or cannot be read:
+
+        dynhull check backups/monday && echo "can be restored"
+    """
+    with _told(), progress_bar("rows") as progress:
+        report = copies.check(data, progress)
+    for hull in report.hulls:
+        typer.echo(f"{hull.name}: {hull.summary}: {'; '.join(hull.problems) or 'whole'}")
+    for problem in [*report.notes, *report.fatal]:
+        typer.echo(problem, err=True)
+    if report.fatal:
+        typer.echo(f"{data}: damaged; it is not served: restore a backup")
+    elif report.notes:
+        typer.echo(f"{data}: damaged; it can be served without what is named")
+    else:
+        typer.echo(f"{data}: {len(report.hulls)} hulls, all whole")
+    raise typer.Exit(1 if report.fatal or report.notes else 0)
 
 
 def export(
@@ -65,23 +78,32 @@ def export(
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".geojson": _write_geojson}
     with _told():
         if file.suffix not in writers:
-            raise JournalError(f"{file}: the name must end in {', '.join(writers)}")
-        hull = read_hull(data, name)
-        for note in hull.notes:
+            raise StorageError(f"{file}: the name must end in {', '.join(writers)}")
+        kept, notes = copies.read(data, name)
+        for note in notes:
             typer.echo(note, err=True)
+        points = replayed(kept).points()
         with progress_bar("points") as progress:
-            writers[file.suffix](file, hull.points, progress)
-    typer.echo(f"{file}: {len(hull.points):,} points of {name} at revision {hull.revision}")
+            writers[file.suffix](file, points, progress)
+    typer.echo(f"{file}: {len(points):,} points of {name} at revision {kept.last_revision}")
 
 
-def _write_csv(file: Path, points: Points, progress: copies.Progress) -> None:
+def _copy(source: Path, target: Path) -> None:
+    with _told(), progress_bar("pages") as progress:
+        report = copies.copy(source, target, progress)
+    for note in report.notes:
+        typer.echo(note, err=True)
+    typer.echo(f"{target}: {len(report.hulls)} hulls")
+
+
+def _write_csv(file: Path, points: Points, progress: Progress) -> None:
     with file.open("w", encoding="utf-8") as out:
         out.write("x,y\n")
         for rows in _steps(points, progress):
             out.writelines(f"{x!r},{y!r}\n" for x, y in rows.tolist())
 
 
-def _write_geojson(file: Path, points: Points, progress: copies.Progress) -> None:
+def _write_geojson(file: Path, points: Points, progress: Progress) -> None:
     with file.open("w", encoding="utf-8") as out:
         out.write('{"type": "FeatureCollection", "features": [\n')
         between = ""
@@ -93,7 +115,7 @@ def _write_geojson(file: Path, points: Points, progress: copies.Progress) -> Non
         out.write("\n]}\n")
 
 
-def _write_parquet(file: Path, points: Points, progress: copies.Progress) -> None:
+def _write_parquet(file: Path, points: Points, progress: Progress) -> None:
     import pyarrow as pa  # takes a while to load, and only this format needs it
     import pyarrow.parquet as pq
 
@@ -103,7 +125,7 @@ def _write_parquet(file: Path, points: Points, progress: copies.Progress) -> Non
             out.write_table(pa.table({"x": np.ascontiguousarray(rows[:, 0]), "y": np.ascontiguousarray(rows[:, 1])}))
 
 
-def _steps(points: Points, progress: copies.Progress) -> Iterator[Points]:
+def _steps(points: Points, progress: Progress) -> Iterator[Points]:
     for first in range(0, len(points), ROWS_A_STEP):
         progress(first, len(points))
         yield points[first : first + ROWS_A_STEP]
@@ -114,5 +136,5 @@ def _told() -> Iterator[None]:
     """What cannot be done ends the command with a line."""
     try:
         yield
-    except (JournalError, OSError) as error:
+    except (StorageError, OSError) as error:
         sys.exit(f"error: {error}")

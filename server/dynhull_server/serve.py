@@ -13,7 +13,7 @@ from .app import Server
 from .flags import with_settings
 from .progress import progress_bar
 from .settings import Settings
-from .storage.sqlite.errors import JournalError
+from .storage.port import StorageError
 
 SIGNALS = signal.SIGTERM, signal.SIGINT
 
@@ -32,7 +32,7 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
         asyncio.run(_serve(settings))
     except RuntimeError as error:
         sys.exit(f"cannot listen on {settings.host}:{settings.port}: {error}")
-    except (OSError, ValueError, JournalError) as error:
+    except (OSError, ValueError, StorageError) as error:
         sys.exit(f"cannot serve: {error}")
 
 

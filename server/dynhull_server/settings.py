@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, TomlConfigSettingsSource
 
-from .storage.sqlite.writer import Durability
+from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"
 
@@ -45,6 +45,9 @@ class Settings(BaseSettings):
     max_hulls: int = Field(100_000, ge=1, description="How many hulls there may be.")
     max_points: int = Field(100_000_000, ge=1, description="How many points a hull may have.")
     max_producers: int = Field(10_000, ge=1, description="How many numbering writers a hull may have in a day.")
+    max_producers_per_caller: int = Field(
+        1_000, ge=1, description="How many of those one token may name, or without tokens one address."
+    )
     max_streams: int = Field(10_000, ge=1, description="How many streaming calls there may be at a time.")
     max_streams_per_caller: int = Field(
         2_500, ge=1, description="How many of those one token may have, or without tokens one address."

@@ -1,12 +1,14 @@
 """Intersection, distance and depth: against rational arithmetic in the plane, against python-fcl in space."""
 
 from fractions import Fraction
-from itertools import pairwise
+from itertools import combinations, pairwise, product
+from math import isqrt
 
 import numpy as np
 import oracle
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from inputs import any_points, grid_points
 from judges import fcl_body, fcl_distance
 from oracle import root
@@ -222,3 +224,88 @@ def test_the_gap_between_far_away_sets_is_exact():
     found = contact(box([far - 2, 0], [far - 1, 1]), box([far, 0], [far + 2, 1]))
     assert (found.intersect, found.distance) == (False, 1.0)
     assert Fraction(found.distance) == 1
+
+
+def exact_root(value):
+    """The root of a rational number to 120 bits, whatever its size."""
+    shift = max(0, 240 - value.numerator.bit_length() + value.denominator.bit_length()) // 2
+    return Fraction(isqrt((value.numerator << 2 * shift) // value.denominator), 1 << shift)
+
+
+def exact_depth(p, q):
+    """From the supporting lines or planes through points of the difference: 0 where one has the origin outside."""
+    scale = max(value.as_integer_ratio()[1] for point in p + q for value in point)
+    a, b = ([[int(Fraction(value) * scale) for value in point] for point in points] for points in (p, q))
+    corners = {tuple(s - t for s, t in zip(u, v, strict=True)) for u, v in product(a, b)}
+    squares = []
+    for first, *others in combinations(corners, len(p[0])):
+        ways = [[s - t for s, t in zip(other, first, strict=True)] for other in others]
+        if len(ways) == 1:
+            normal = (ways[0][1], -ways[0][0])
+        else:
+            (ux, uy, uz), (vx, vy, vz) = ways
+            normal = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
+        heights = [sum(n * (s - t) for n, s, t in zip(normal, corner, first, strict=True)) for corner in corners]
+        if any(normal) and (min(heights) == 0 or max(heights) == 0):
+            offset = sum(n * s for n, s in zip(normal, first, strict=True)) * (1 if max(heights) == 0 else -1)
+            if min(heights) == max(heights) or offset < 0:
+                return Fraction(0)
+            squares.append(Fraction(offset**2, sum(n * n for n in normal)))
+    return exact_root(min(squares)) / scale if squares else Fraction(0)
+
+
+def extent(points):
+    """Of the box around them, its longest side."""
+    return max(max(map(Fraction, values)) - min(map(Fraction, values)) for values in zip(*points, strict=True))
+
+
+def any_size(d):
+    """Small sets of points of any size: plain, along an axis a trillion times longer, far away, tiny, huge."""
+    whole = st.integers(-4, 4).map(float)
+    near = st.tuples(whole, st.integers(-3, 3)).map(lambda pair: pair[0] + pair[1] * 1e-13)
+    sizes = st.sampled_from([1.0, 6.5e11, 1e-9, 1e-160, 1e-300, 1e160, 1e295])
+    stretches = st.tuples(*[st.sampled_from([1.0, 1.0, 1e12, 1e-12, 0.7])] * d)
+    offsets = st.tuples(*[st.sampled_from([0.0, 0.0, 1.3, 1e8 / 3, -1e12])] * d)
+    rows = st.sampled_from([whole, near]).flatmap(
+        lambda value: st.lists(st.tuples(*[value] * d), min_size=1, max_size=4)
+    )
+    whole_rows = st.lists(st.tuples(*[whole] * d), min_size=4, max_size=4)  # many overlap in space, too
+
+    def placed(points, size, stretch, offset):
+        return [tuple((x * s + o) * size for x, s, o in zip(p, stretch, offset, strict=True)) for p in points]
+
+    twice = st.one_of(st.tuples(rows, rows), st.tuples(whole_rows, whole_rows))
+    pairs = st.tuples(twice, sizes, stretches, offsets)
+    same = pairs.map(lambda pair: tuple(placed(points, *pair[1:]) for points in pair[0]))
+    mixed = st.tuples(same, same).map(lambda two: (two[0][0], two[1][1]))
+    return st.one_of(same, mixed)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_depth_and_distance_at_every_size(d):
+    @given(any_size(d))
+    @settings(max_examples=150)
+    def within_the_bound(pair):
+        p, q = pair
+        bound = extent(p + q) / 10**12 + Fraction(5e-324)
+        found = contact(Cloud(p), Cloud(q))
+        assert abs(Fraction(found.depth) - exact_depth(p, q)) <= bound
+        if d == 2:
+            squared = oracle.polygons(p, q)
+            assert found.intersect == (squared == 0)
+            for distance in (found.distance, *distance_many([p], [q]).tolist()):
+                assert abs(Fraction(distance) - exact_root(squared)) <= bound
+
+    within_the_bound()
+
+
+def test_thin_sets_that_overlap_deeply():
+    """A point that a segment of another size passes by closely: the walk in floats stands still beside it."""
+    point = [(1597.3546340389446, 2328.7767867430694)]
+    around = [
+        (1597.3546340389546, 2328.736786743069),
+        (1597.3546340389546, 2328.7767867430694),
+        (1597.3546340389146, 2328.7767867430694),
+        (1597.3546340389746, 2328.7967867430693),
+    ]
+    assert contact(Cloud(point), Cloud(around)).depth == pytest.approx(float(exact_depth(point, around)), rel=1e-9)

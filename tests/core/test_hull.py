@@ -178,6 +178,8 @@ def test_counts(make):
     assert hull.insert(1.0, 2.0) is False
     assert hull.insert_many([[1, 2], [0, 0]]) == 2
     assert (len(hull), hull.distinct, hull.count(1, 2), hull.count(5, 5)) == (4, 2, 3, 0)
+    assert hull.count_many([[1, 2], [5, 5], [-0.0, 0]]).tolist() == [3, 0, 1]
+    assert hull.count_many([]).shape == make().count_many([]).shape == (0,)
     assert (1, 2) in hull
     assert (2, 1) not in hull
     assert hull.delete_many([[1, 2], [1, 2]]) == 2

@@ -1,17 +1,20 @@
 """Diameter, width, smallest box, distances and crossings, against definitions in rational arithmetic."""
 
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import inf
 
 import numpy as np
 import oracle
 import pytest
-from hypothesis import given
-from inputs import any_points, grid_points
-from oracle import assert_rounded, exact, root, segment_distance
+from hulls import HULLS
+from hypothesis import example, given
+from inputs import any_points, grid_points, questions
+from oracle import assert_rounded, exact, nearest, root, segment_distance
 
 from dynhull import DynamicHull
+
+both = pytest.mark.parametrize("make", HULLS.values(), ids=HULLS.keys())
 
 
 def squared(p, q):
@@ -60,15 +63,23 @@ def test_min_box(rows):
             assert cross(q, r, p) >= -1e-9
 
 
-@given(any_points, any_points)
-def test_distance(rows, queries):
+@both
+@given(questions(8))
+@example(([(0.0, 0.0)], [(193.0, 182.0)]))  # 64 bits of this root end halfway between two doubles
+@example(([(1.0, 0.0)], [(-(2.0**-53), 0.0)]))  # halfway between two doubles: to the even one, down and up
+@example(([(1 + 2.0**-52, 0.0)], [(-(2.0**-53), 0.0)]))
+@example(([(-1.7e308, 0.0)], [(1.7e308, 0.0), (9e307, 0.0), (1.7e308, 1.7e308)]))
+@example(([(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)], [(3.0, 5e-324), (-5e-324, 1.0), (1.5, 1.5000000000000002)]))
+@example(([(0.0, 0.0), (1.7e308, 5e-324)], [(1.0, 5e-324), (1e308, -5e-324), (-1.0, -1.0)]))
+def test_distance(make, question):
+    rows, queries = question
     corners = oracle.hull(rows)
     sides = list(zip(corners, corners[1:] + corners[:1], strict=True))
-    for measured, q in zip(DynamicHull(rows).distance(queries), queries, strict=True):
+    for measured, q in zip(make(rows).distance(queries).tolist(), queries, strict=True):
         if oracle.locate(corners, q) >= 0:
             assert measured == 0
         else:
-            assert_rounded(measured, root(min(segment_distance(q, a, b) for a, b in sides)))
+            assert measured == nearest(root(min(segment_distance(q, a, b) for a, b in sides)))
 
 
 def crossings(corners, p, q):
@@ -86,13 +97,20 @@ def crossings(corners, p, q):
     return [found[0], found[-1]] if found else None
 
 
-@given(any_points, any_points, any_points)
-def test_intersect_lines(rows, starts, ends):
-    lines = [(p, q) for p, q in zip(starts, ends, strict=False) if p != q and (p[0] + 0.0, p[1] + 0.0) != q]
+@both
+@given(questions(12))
+@example(([(0.5, 0.0), (0.5 + 2.0**-53, 1.0)], [(0.0, 0.5), (1.0, 0.5)]))  # halfway between two doubles
+@example(([(0.5 + 2.0**-53, 0.0), (0.5 + 2.0**-52, 1.0)], [(0.0, 0.5), (1.0, 0.5)]))
+@example(([(-1.0, -1.0), (1.0, -3.0), (1.0, 3.0)], [(0.0, 0.0), (3.0, 1.0), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
+@example(([(-5e-324, 0.0), (5e-324, 5e-324), (0.0, -1.0)], [(0.0, 0.0), (5e-324, 1e-323), (0.0, -0.5), (1.0, 1.0)]))
+@example(([(-1.7e308, -1.7e308), (1.7e308, 1.0), (0.0, 1.7e308)], [(0.0, 0.0), (1.0, 3.0), (1e308, 0.0), (1e308, 1.0)]))
+def test_intersect_lines(make, question):
+    rows, asked = question
+    lines = [(p, q) for p, q in pairwise(asked) if p != q]
     if not lines:
         return
     p, q = zip(*lines, strict=True)
-    for line, found in zip(lines, DynamicHull(rows).intersect_lines(p, q), strict=True):
+    for line, found in zip(lines, make(rows).intersect_lines(p, q), strict=True):
         expected = crossings(oracle.hull(rows), *line)
         if expected is None:
             assert np.isnan(found).all()
@@ -100,25 +118,41 @@ def test_intersect_lines(rows, starts, ends):
             assert found.tolist() == [[float(x), float(y)] for x, y in expected]
 
 
-def test_no_points():
-    hull = DynamicHull()
+@both
+def test_no_points(make):
+    hull = make()
     assert (hull.diameter(), hull.width()) == (0.0, 0.0)
     assert np.isnan(hull.min_box()).all()
     assert hull.distance([[1, 2]]).tolist() == [inf]
     assert np.isnan(hull.intersect_lines([[0, 0]], [[1, 1]])).all()
 
 
-def test_known_values():
-    hull = DynamicHull([[0, 0], [4, 0], [4, 3], [0, 3], [2, 1]])
+@both
+def test_no_questions(make):
+    for hull in (make(), make([[0, 0], [1, 2], [3, 0]])):
+        assert hull.distance([]).shape == (0,)
+        assert hull.intersect_lines([], []).shape == (0, 2, 2)
+
+
+@both
+def test_known_values(make):
+    hull = make([[0, 0], [4, 0], [4, 3], [0, 3], [2, 1]])
     assert (hull.diameter(), hull.width()) == (5.0, 3.0)
     assert hull.min_box().tolist() == [[0, 0], [4, 0], [4, 3], [0, 3]]
     assert hull.distance([[-3, -4], [2, 5], [2, 2], [6, 1]]).tolist() == [5, 2, 0, 2]
     assert hull.intersect_lines([[2, 9]], [[2, 8]]).tolist() == [[[2, 3], [2, 0]]]
+    assert hull.intersect_lines([[9, 3], [-1, 3]], [[8, 3], [7, 3]]).tolist() == [[[4, 3], [0, 3]], [[0, 3], [4, 3]]]
+    assert hull.intersect_lines([[3, 4]], [[5, 2]]).tolist() == [[[4, 3], [4, 3]]]
 
 
-def test_bad_lines():
-    hull = DynamicHull([[0, 0]])
+@both
+def test_bad_lines(make):
+    hull = make([[0, 0]])
     with pytest.raises(ValueError, match="p and q row 1 are the same point: no line"):
         hull.intersect_lines([[0, 0], [1, 1]], [[0, 1], [1, 1]])
     with pytest.raises(ValueError, match="p and q must have the same length, got 1 and 2"):
         hull.intersect_lines([[0, 0]], [[0, 1], [1, 1]])
+    with pytest.raises(ValueError, match=r"q row 0 is .*must be finite"):
+        hull.intersect_lines([[0, 0]], [[0, np.nan]])
+    with pytest.raises(ValueError, match=r"row 1 is .*must be finite"):
+        hull.distance([[0, 0], [np.inf, 1]])

@@ -3,7 +3,8 @@
 //     fuzz [--seconds S] [seed ...]
 //
 // Without seeds, random ones until the time is up. After every step the tree is checked against its definitions, and
-// its points and `changed` flags against a std::map and a monotone chain. Some allocations fail on purpose: then the
+// its points and `changed` flags against a std::map and a monotone chain, and queries are asked of the tree and, by
+// their definitions, of the monotone chain. Some allocations fail on purpose: then the
 // hull has to be as it was. Compile with -DDYNHULL_LEAF=4 to split, merge and rotate all the time.
 #include <chrono>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <random>
 
 #include "../../dynhull/kernel/check.hpp"
+#include "../../dynhull/kernel/queries.hpp"
 
 namespace {
 
@@ -65,6 +67,7 @@ class Life {
         default: below(30) == 0 ? clear() : copy(); break;
       }
       check();
+      for (int i = 0; i < 3; ++i) ask();
     }
   }
 
@@ -241,6 +244,87 @@ class Life {
       ++expected;
     });
     require(expected == model_.end(), "a point is missing");
+  }
+
+  // Counter-clockwise: each vertex and the next.
+  std::vector<Edge> edges() const {
+    std::vector<Point> around = chains_[LOWER];
+    if (chains_[UPPER].size() > 2) around.insert(around.end(), chains_[UPPER].rbegin() + 1, chains_[UPPER].rend() - 1);
+    std::vector<Edge> edges;
+    for (std::size_t i = 0; i < around.size(); ++i) edges.push_back({around[i], around[(i + 1) % around.size()]});
+    return edges;
+  }
+
+  // Any point, or one that the hull has, or one beside it.
+  Point question() {
+    Point p = below(2) == 0 || model_.empty() ? point() : present();
+    if (below(2) == 0) p.x = std::nextafter(p.x, below(2) == 0 ? 1e300 : -1e300) + 0.0;
+    if (below(2) == 0) p.y = std::nextafter(p.y, below(2) == 0 ? 1e300 : -1e300) + 0.0;
+    return p;
+  }
+
+  void ask() {
+    const Point p = question(), q = question();
+    const std::vector<Edge> around = edges();
+    ask_about_point(p, around);
+    if (!(p == q)) ask_about_line(p, q, around);
+    if (around.empty() || p == Point{0, 0}) return;
+    Point best = around[0].a;
+    for (const Edge& edge : around) {
+      const int sign = direction_sign(p, best, edge.a);
+      if (sign > 0 || (sign == 0 && edge.a < best)) best = edge.a;
+    }
+    require(support(tree_.nodes(), p) == best, "support is wrong");
+  }
+
+  void ask_about_point(Point p, const std::vector<Edge>& around) {
+    const bool flat = around.size() < 3;
+    int where = flat ? -1 : 1;
+    double shortest = INFINITE;
+    for (const auto& [a, b] : around) {
+      const int turn = orientation(a, b, p);
+      if (!flat) where = std::min(where, turn);
+      if (p == a || (turn == 0 && dot_sign(a, p, p, b) > 0)) {
+        shortest = 0;
+        if (flat) where = 0;
+      } else if (dot_sign(a, p, a, b) <= 0) {
+        shortest = std::min(shortest, distance_exact(p, a));
+      } else if (dot_sign(b, p, b, a) > 0) {
+        shortest = std::min(shortest, distance_to_line_exact(p, a, b));
+      }
+    }
+    require(dynhull::locate(tree_.nodes(), p).where == where, "a location is wrong");
+    require(distance(tree_.nodes(), p) == (where < 0 ? shortest : 0), "a distance is wrong");
+    const std::optional<Edge> seen = tangents(tree_.nodes(), p);
+    require(seen.has_value() == (where < 0 && !around.empty()), "tangents of the wrong points");
+    if (!seen) return;
+    for (const Edge& edge : around) {
+      const int left = orientation(p, seen->a, edge.a), right = orientation(p, seen->b, edge.a);
+      require(left <= 0 && right >= 0, "the hull leaves its tangents");
+      require((left != 0 || dot_sign(edge.a, seen->a, p, seen->a) >= 0) &&
+                  (right != 0 || dot_sign(edge.a, seen->b, p, seen->b) >= 0),
+              "a tangent does not end at the farther vertex");
+    }
+  }
+
+  void ask_about_line(Point p, Point q, const std::vector<Edge>& around) {
+    std::vector<Point> met;  // two at most, as no vertex lies between its neighbours
+    const auto meets = [&](Point at) {
+      if (std::find(met.begin(), met.end(), at) == met.end()) met.push_back(at);
+    };
+    for (const auto& [a, b] : around) {
+      const int at_a = orientation(p, q, a), at_b = orientation(p, q, b);
+      if (at_a == 0) meets(a);
+      if (at_a * at_b < 0) meets({meet_exact(p, q, a, b, a.x, b.x), meet_exact(p, q, a, b, a.y, b.y)});
+    }
+    const std::optional<Edge> ends = intersect_line(tree_.nodes(), p, q), back = intersect_line(tree_.nodes(), q, p);
+    require(ends.has_value() == !met.empty(), "a line misses, or does not");
+    if (!ends) return;
+    require(back->a == ends->b && back->b == ends->a, "a line is not the same from its other end");
+    require(p.x < q.x ? ends->a.x <= ends->b.x : p.x > q.x ? ends->a.x >= ends->b.x : true, "a line is the wrong way");
+    for (Point end : {ends->a, ends->b})
+      require(std::find(met.begin(), met.end(), end) != met.end(), "a line meets the hull elsewhere");
+    for (Point end : met) require(end == ends->a || end == ends->b, "a line has an end that is not there");
   }
 
   static void require(bool holds, const char* message) {

@@ -14,8 +14,8 @@ from inputs import cloud, point, points
 from dynhull import DynamicHull, _kernel, predicates, tree
 
 
-def rows(pairs):
-    return np.array(pairs, dtype=np.float64).reshape(len(pairs), 2) + 0.0
+def rows(pairs, columns=2):
+    return np.array(pairs, dtype=np.float64).reshape(len(pairs), columns) + 0.0
 
 
 def outcome(action, *arguments):
@@ -100,8 +100,18 @@ class Twins(RuleBasedStateMachine):
         self.both("locate", np.tile(rows(queries + corners), (repeat, 1)))
 
     @rule(queries=points(10))
-    def tangents(self, queries):
+    def tangents_and_distance(self, queries):
         self.both("tangents", rows(queries))
+        self.both("distance", rows(queries))
+
+    @rule(starts=points(10), ends=points(10))
+    def intersect_lines(self, starts, ends):
+        lines = rows([(*p, *q) for p, q in zip(starts, ends, strict=False) if p != q], 4)
+        self.both("intersect_lines", lines[:, :2].copy(), lines[:, 2:].copy())
+
+    @rule(queries=points(10))
+    def count_many(self, queries):
+        self.both("count_many", rows(queries + self.both.reference.points()[::3].tolist()))
 
     @precondition(lambda self: len(self.both.reference))
     @rule(directions=points(10))
@@ -174,6 +184,28 @@ def test_locate_in_one_batch_or_many(kind):
     queries = np.concatenate([around, hull.points(), hull.vertices()])
     parts = [hull.copy().locate(part) for part in np.array_split(queries, len(queries) // 100)]
     np.testing.assert_array_equal(hull.locate(queries), np.concatenate(parts))
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**600, 1.7e308, 2.0**-600, 5e-321])
+@pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])
+def test_queries_around_a_hull(kind, scale):
+    """Beyond all, on the boundary, and a few doubles beside it; hulls of many leaves."""
+    random = np.random.default_rng(11)
+    unit = cloud(kind, 2300, random)
+    unit /= 4 * np.abs(unit).max()
+    whole, around = scale * unit[:2000], scale * (2 * unit[2000:] - 0.25)
+    both = Both(tree.HullTree(whole), _kernel.HullTree(whole))
+    corners = both.reference.vertices()
+    share = random.choice([0, 0.5, 1], (len(corners), 1))
+    edges = corners * (1 - share) + np.roll(corners, -1, axis=0) * share
+    near = [edges, np.nextafter(edges, np.inf), np.nextafter(edges, -np.inf)]
+    asked = random.permutation(np.concatenate([*near, corners, around, whole[:50]]))[:400] + 0.0
+    for method in ("locate", "tangents", "distance", "count_many"):
+        both(method, asked)
+    p = np.concatenate([asked, np.roll(corners, -1, axis=0)[:100]])
+    q = np.concatenate([asked[::-1], corners[:100]])
+    different = (p != q).any(axis=1)
+    both("intersect_lines", p[different], q[different])
 
 
 @given(a=point, b=point, c=point)

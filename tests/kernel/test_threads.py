@@ -3,10 +3,13 @@
 import os
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
+from itertools import cycle
 
 import numpy as np
 import pytest
+from inputs import cloud
 
 from dynhull import DynamicHull, _kernel
 
@@ -18,6 +21,15 @@ def impatient():
     """Switch threads at every chance."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+@pytest.fixture
+def polite():
+    """Never take the interpreter from a thread: it has to let go of it."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000)
     yield
     sys.setswitchinterval(interval)
 
@@ -61,6 +73,37 @@ def test_writers_and_readers():
     np.testing.assert_array_equal(tree.points(), _kernel.HullTree(np.concatenate(expected)).points())
 
 
+@pytest.mark.usefixtures("impatient")
+def test_a_query_sees_no_half_of_an_update():
+    """Many points come and go as one batch: every answer belongs to the hull with them or to the hull without."""
+    random = np.random.default_rng(0)
+    circle, far = cloud("circle", 1000, random), 3 * cloud("circle", 300, random)
+    queries = 5 * random.random((100, 2)) - 2.5
+    hull = DynamicHull(circle)
+
+    def ask(hull):
+        lines = hull.intersect_lines(queries[:-1], queries[1:])
+        return [answer.tobytes() for answer in (hull.distance(queries), lines, hull.count_many(far))]
+
+    allowed = list(map(set, zip(ask(hull), ask(DynamicHull(np.concatenate([circle, far]))), strict=True)))
+    done = threading.Event()
+
+    def change():
+        for update in cycle([hull.insert_many, hull.delete_many]):
+            if done.is_set():
+                return
+            update(far)
+
+    with ThreadPoolExecutor(1) as pool:
+        changing = pool.submit(change)
+        try:
+            for _ in range(50):
+                assert all(answer in known for answer, known in zip(ask(hull), allowed, strict=True))
+        finally:
+            done.set()
+        changing.result()
+
+
 def test_other_threads_run_during_a_batch():
     """A batch lets go of the interpreter: another thread counts while it runs."""
     rows = np.random.default_rng(0).random((1_000_000, 2))
@@ -82,6 +125,35 @@ def test_other_threads_run_during_a_batch():
     counter.join()
     assert began == 0
     assert counted[0] > 1000
+
+
+@pytest.mark.usefixtures("polite")
+@pytest.mark.parametrize("method", ["locate", "support", "tangents", "distance", "intersect_lines", "count_many"])
+def test_other_threads_run_during_queries(method):
+    random = np.random.default_rng(0)
+    tree = _kernel.HullTree(cloud("circle", 1000, random))
+    rows = random.random((2, 20_000, 2))
+    steps = []
+    done = threading.Event()
+
+    def count():
+        while not done.is_set():
+            steps.append(None)
+            time.sleep(0)  # lets go
+
+    counter = threading.Thread(target=count)
+    counter.start()
+    try:
+        before = len(steps)
+        for _ in range(100):  # the system may be slow to run the other
+            getattr(tree, method)(*rows[: 2 if method == "intersect_lines" else 1])
+            if len(steps) > before:
+                break
+        else:
+            pytest.fail("the counter stood still")
+    finally:
+        done.set()
+        counter.join()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")

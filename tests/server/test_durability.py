@@ -109,7 +109,7 @@ def test_a_second_server_on_the_folder_is_refused(tmp_path):
         command = [COMMAND, "serve", "--port", "0", *options]
         second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert second.returncode == 1
-    assert "another server works on" in second.stderr
+    assert "another server" in second.stderr
     assert "Traceback" not in second.stderr
 
 
@@ -123,7 +123,7 @@ def test_a_full_disk_refuses_writes_and_recovers(tmp_path):
     wrap = ["unshare", "--map-root-user", "--mount", "sh", "-c", FULL_DISK, str(folder)]
     points = random_points(2000, 3)
     with (
-        server_process("--data", str(folder / "data"), wrap=wrap) as server,
+        server_process("--data", str(folder / "data"), wrap=wrap, complaints="the disk is full") as server,
         HullClient(server.address) as client,
     ):
         client.create_hull("fleet")

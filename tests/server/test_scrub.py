@@ -2,26 +2,30 @@
 
 import asyncio
 import sys
-from itertools import count
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import grpc
 import numpy as np
+import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from patience import wait_until
 from server_process import server_process
 
 from dynhull import DynamicHull
 from dynhull_client import HullClient
-from dynhull_server.engine.hulls import Engine
-from dynhull_server.engine.live_hull import Config, LiveHull
-from dynhull_server.engine.scrub import scrub
+from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.scrub import Scrub
+from dynhull_server.engine.supervisor import Supervisor
+from dynhull_server.engine.threads import Machine
 from dynhull_server.engine.verification import LARGE, Verification
-from dynhull_server.engine.writer import Write
 from dynhull_server.state.batch import Batch
+from dynhull_server.state.hull_state import HullState, Write
 from dynhull_server.state.limits import Limits
+from dynhull_server.storage.memory import MemoryStorage
 
-LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, history_bytes=10**6)
+LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, max_producers_per_caller=10, history_bytes=10**6)
 NONE = np.empty((0, 2))
 
 
@@ -32,54 +36,59 @@ class Liar(DynamicHull):
         return super().vertices()[1:]
 
 
-async def insert(hull: LiveHull, points: np.ndarray) -> None:
-    await hull.apply(Write(lambda: Batch(points, NONE, 0, False), len(points)))
+@asynccontextmanager
+async def engine_in_memory() -> AsyncIterator[Engine]:
+    machine = Machine()
+    supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
+    engine = Engine(LIMITS, MemoryStorage(), supervisor, machine)
+    await engine.start(lambda *_: None)
+    yield engine
+    await supervisor.stop()
+    await engine.close()
+
+
+async def insert(engine: Engine, name: str, points: np.ndarray) -> None:
+    await engine.apply(name, Write(lambda: Batch(points, NONE, 0, False), len(points)), create=True)
 
 
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:
     """What so many rounds of a scrub compare."""
     seen: list[tuple[str, Verification]] = []
-    done = asyncio.Event()
-    finished = count(1)
-
-    def finish() -> None:
-        if next(finished) == number:
-            done.set()
-
-    task = asyncio.create_task(scrub(engine, 1.0, 0.0, lambda hull, outcome: seen.append((hull.name, outcome)), finish))
-    await done.wait()
-    task.cancel()
+    scrub = Scrub(engine, Machine().clock, 1.0, lambda hull, outcome: seen.append((hull.name, outcome)))
+    for _ in range(number):
+        await scrub.round()
     return seen
 
 
 def test_a_wrong_hull_is_found() -> None:
     async def run() -> None:
-        engine = Engine(LIMITS)
-        random = np.random.default_rng(8)
-        for name in ("good", "large", "wrong"):
-            await insert(await engine.create(name, Config()), random.normal(size=(LARGE if name == "large" else 50, 2)))
-        wrong = engine.get("wrong")
-        wrong._hull = Liar(wrong._hull.points())
-        wrong._vertices_as_of = -1
-        outcomes = dict(await rounds(engine, 1))
+        async with engine_in_memory() as engine:
+            random = np.random.default_rng(8)
+            for name in ("good", "large", "wrong"):
+                await insert(engine, name, random.normal(size=(LARGE if name == "large" else 50, 2)))
+
+            def lie(state: HullState) -> None:
+                state.hull = Liar(state.hull.points())
+                state._vertices_as_of = -1
+
+            await engine.get("wrong").read(lie)
+            outcomes = dict(await rounds(engine, 1))
         assert outcomes["good"].difference is None
         assert outcomes["large"].difference is None
         assert outcomes["large"].points == LARGE
         assert outcomes["large"].rounds[-1].closed
         assert outcomes["wrong"].difference.index == 0
-        engine.close()
 
     asyncio.run(run())
 
 
 def test_a_hull_that_is_as_it_was_is_left_out() -> None:
     async def run() -> None:
-        engine = Engine(LIMITS)
-        for name in ("a", "b"):
-            await insert(await engine.create(name, Config()), np.ones((1, 2)))
-        seen = await rounds(engine, 3)
+        async with engine_in_memory() as engine:
+            for name in ("a", "b"):
+                await insert(engine, name, np.ones((1, 2)))
+            seen = await rounds(engine, 3)
         assert [name for name, _ in seen] == ["a", "b"]
-        engine.close()
 
     asyncio.run(run())
 

@@ -272,6 +272,23 @@ def test_one_caller_cannot_have_every_stream(tokens: Tokens) -> None:
             each.cancel()
 
 
+def test_one_caller_cannot_name_every_producer(tokens: Tokens) -> None:
+    with (
+        server_process("--tokens", str(tokens.path), "--max-producers-per-caller", "1") as server,
+        ExitStack() as stack,
+    ):
+        one, two = (stub(stack, server, token) for token in ("one", "two"))
+        one("CreateHull", pb.CreateHullRequest(name="a"))
+
+        def write(caller: Callable[..., object], producer: str) -> object:
+            return caller("Apply", pb.ApplyRequest(name="a", batch=POINT, producer=producer, sequence=1))
+
+        write(one, "p")
+        _, info, _ = refusal(lambda: write(one, "q"))
+        assert dict(info.metadata) == {"limit": "max_producers_per_caller", "value": "1"}
+        write(two, "q")
+
+
 def test_health_watches_are_bounded() -> None:
     with (
         server_process("--max-health-calls-per-caller", "2") as server,

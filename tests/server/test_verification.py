@@ -1,14 +1,20 @@
 """A hull that is wrong is found out."""
 
 import asyncio
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from dynhull_proto.v1 import points_pb2
-from dynhull_server.engine.live_hull import Counts
 from dynhull_server.engine.verification import verify
 from dynhull_server.rpc.encode import encode_verification
+from dynhull_server.state.hull_state import Counts
+
+
+async def at_once(function: Callable[[], object]) -> object:
+    return function()
+
 
 POINTS = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4], [1, 1]])
 VERTICES = POINTS[:4]
@@ -26,7 +32,7 @@ VERTICES = POINTS[:4]
 )
 def test_the_first_difference_is_told(live: np.ndarray, row: int, there: list[float], expected: list[float]) -> None:
     message = encode_verification(
-        Counts(7, 5, 5), asyncio.run(verify(POINTS, live)), points_pb2.POINT_ENCODING_COORDINATES
+        Counts(7, 5, 5), asyncio.run(verify(POINTS, live, at_once)), points_pb2.POINT_ENCODING_COORDINATES
     )
     assert not message.equal
     assert (message.revision, message.point_count, message.vertex_count) == (7, 5, len(live))
@@ -36,4 +42,4 @@ def test_the_first_difference_is_told(live: np.ndarray, row: int, there: list[fl
 
 
 def test_a_right_hull_is_equal() -> None:
-    assert asyncio.run(verify(POINTS, VERTICES)).difference is None
+    assert asyncio.run(verify(POINTS, VERTICES, at_once)).difference is None

@@ -16,9 +16,9 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.engine.difference import difference
-from dynhull_server.engine.live_hull import Counts
 from dynhull_server.engine.views import Change as EngineChange
 from dynhull_server.rpc.encode import encode_event
+from dynhull_server.state.hull_state import Counts
 
 COUNTS = Counts(2, 0, 0)
 

@@ -2,7 +2,8 @@
 
 import subprocess
 import sys
-from itertools import product
+from fractions import Fraction
+from itertools import combinations, product
 from math import comb
 
 import numpy as np
@@ -135,8 +136,8 @@ def test_nearly_flat_is_not_flat():
     edges = ridges(hull.faces)
     assert {(b, a) for a, b in edges} == set(edges)
     a, b, c = (hull.vertices[hull.faces[0][i]] for i in range(3))
-    centre = thin.mean(axis=0)
-    assert np.cross(b - a, c - b) @ (centre - a) < 0
+    inwards = (thin - a).mean(axis=0)  # the mean of the points themselves would be rounded to a face
+    assert np.cross(b - a, c - b) @ inwards < 0
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1e300])
@@ -174,3 +175,96 @@ def test_without_scipy_the_message_says_what_to_install(points, answer):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == answer
     assert ("need scipy: pip install 'dynhull[nd]'" in done.stderr) == (not answer)
+
+
+def exact_rank(points):
+    """Of the smallest flat that holds the points, in rational numbers."""
+    origin, *others = ([Fraction(value) for value in point] for point in points.tolist())
+    rows = [[a - b for a, b in zip(row, origin, strict=True)] for row in others]
+    rank = 0
+    for axis in range(points.shape[1]):
+        pivot = next((row for row in rows if row[axis]), None)
+        if pivot is not None:
+            rank += 1
+            rows = [[a - row[axis] / pivot[axis] * b for a, b in zip(row, pivot, strict=True)] for row in rows]
+    return rank
+
+
+def assert_closed(faces):
+    """Each ridge of simplices is passed twice, in opposite directions."""
+    passed = {}
+    for face in np.asarray(faces).tolist():
+        parity = sum(a > b for a, b in combinations(face, 2))
+        for i, corner in enumerate(sorted(face)):
+            passed.setdefault(frozenset(face) - {corner}, []).append((parity + i) % 2)
+    assert all(sorted(ways) == [0, 1] for ways in passed.values())
+
+
+def assert_a_hull(hull, points):
+    """Of the right dimension, closed, outward normals: no point outside by more than 1e-9 of the extent."""
+    assert hull.dimension == exact_rank(points)
+    wide = points.astype(np.longdouble)
+    extent = np.ptp(wide, axis=0).max()
+    for face, normal in zip(hull.faces, hull.normals, strict=True):
+        assert np.linalg.norm(normal) == pytest.approx(1)
+        assert ((wide - hull.vertices[face[0]]) @ normal).max() <= 1e-9 * extent
+    if hull.dimension > 1 and not isinstance(hull.faces, list):
+        assert_closed(hull.faces)
+    elif hull.dimension == 3:
+        edges = ridges(hull.faces)
+        assert len(set(edges)) == len(edges)
+        assert {(b, a) for a, b in edges} == set(edges)
+        assert len(hull.vertices) - len(edges) // 2 + len(hull.faces) == 2
+
+
+def near_a_flat(random, d, dimension, thickness):
+    """Points of a few kinds beside a flat of some dimension, turned, moved and scaled at random."""
+    n = random.integers(d + 1, 25)
+    points = [
+        random.normal(size=(n, d)),
+        random.integers(0, 3, (n, d)).astype(float),
+        random.normal(size=(n, d)) * 10.0 ** random.integers(-12, 1, (n, 1)),
+    ][random.integers(3)]
+    points[:, dimension:] *= thickness
+    turn = [np.eye(d), np.linalg.qr(random.normal(size=(d, d)))[0]][random.integers(2)]
+    offset = random.choice([0, 1, 1e8, 1e15]) * random.normal(size=d)
+    return (points @ turn + offset) * random.choice([1, 1e-300, 1e290])
+
+
+@pytest.mark.parametrize("d", [2, 3, 4, 5])
+@pytest.mark.parametrize("thickness", [1e-9, 1e-12, 1e-13, 1e-14, 1e-15, 1e-16, 1e-17, 0])
+def test_points_near_a_flat(thickness, d):
+    random = np.random.default_rng([d, int(thickness * 1e18)])
+    for dimension in range(1, d):
+        for _ in range(4):
+            points = near_a_flat(random, d, dimension, thickness)
+            for merge in (False, True):
+                assert_a_hull(hull_nd(points, merge), points)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3, 4])
+def test_a_flat_turned_in_space_by_whole_numbers(dimension):
+    """Exactly flat wherever it lies: its hull is the same simplices as before the turn."""
+    random = np.random.default_rng(dimension)
+    low = random.integers(-1000, 1000, (30, dimension)).astype(float)
+    for _ in range(20):
+        flat = low @ random.integers(-1000, 1000, (dimension, 5)) + random.integers(-(2**50), 2**50, 5)
+        hull = hull_nd(flat)
+        assert hull.dimension == dimension
+        assert_a_hull(hull, flat)
+        assert len(hull.vertices) == (len(hull_nd(low).vertices) if dimension > 1 else 2)
+
+
+def test_a_flat_cloud_of_many_points_is_exact():
+    """Too thin for floats: every vertex is extreme, every other point inside, in rational arithmetic."""
+    random = np.random.default_rng(3)
+    points = (random.normal(size=(2000, 3)) * (1, 1, 0)) @ np.linalg.qr(random.normal(size=(3, 3)))[0] + 5
+    hull = hull_nd(points)
+    assert hull.dimension == 3
+    rows = [[Fraction(value) for value in row] for row in points.tolist()]
+    for face in hull.faces.tolist():
+        a, b, c = ([Fraction(value) for value in hull.vertices[i].tolist()] for i in face)
+        (ux, uy, uz), (vx, vy, vz) = ([q - p for p, q in zip(a, corner, strict=True)] for corner in (b, c))
+        normal = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
+        level = sum(n * x for n, x in zip(normal, a, strict=True))
+        assert max(sum(n * x for n, x in zip(normal, row, strict=True)) for row in rows) <= level

@@ -85,6 +85,14 @@ class UnavailableError(DynhullError, ConnectionError):
     """There is no server at the address, or it is starting or shutting down."""
 
 
+class OutcomeUnknownError(DynhullError):
+    """The server's disk failed in the middle of the batch: it may have been applied or not.
+
+    A Writer finds out by itself. Otherwise ask for the producer's last sequence number, or read the hull, before you
+    send the batch again.
+    """
+
+
 class DeadlineError(DynhullError, TimeoutError):
     """The call took longer than its timeout."""
 
@@ -93,6 +101,7 @@ BY_REASON: Mapping[str, type[DynhullError]] = {
     "SEQUENCE_GAP": SequenceGapError,
     "HULL_EMPTY": HullEmptyError,
     "HULL_UNSUITABLE": HullUnsuitableError,
+    "OUTCOME_UNKNOWN": OutcomeUnknownError,
 }
 
 BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {

@@ -4,10 +4,13 @@ import random
 from collections.abc import Iterator
 from time import monotonic
 
-from .errors import DynhullError, UnavailableError
+from .errors import DynhullError, OutcomeUnknownError, UnavailableError
 
 FIRST_PAUSE = 0.1
 LONGEST_PAUSE = 5.0
+
+# What passes once the server can be reached, or can read its disk. A numbered batch that was applied is a duplicate.
+PASSING = (OutcomeUnknownError, UnavailableError)
 
 
 def pauses() -> Iterator[float]:
@@ -39,6 +42,6 @@ class Attempts:
         self._left -= 1
         pause = next(self._pauses)
         left = self.timeout()
-        if self._left < 0 or not isinstance(error, UnavailableError) or (left is not None and left <= pause):
+        if self._left < 0 or not isinstance(error, PASSING) or (left is not None and left <= pause):
             raise error from None
         return pause

@@ -19,10 +19,9 @@ from .errors import (
     ProducerInUseError,
     SequenceGapError,
     UnauthenticatedError,
-    UnavailableError,
 )
 from .messages import Applied, decode_applied
-from .retry import pauses
+from .retry import PASSING, pauses
 
 if TYPE_CHECKING:
     from asyncio import Future as TaskFuture
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 
 # What refuses the writer, not one of its batches.
 FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
-
 Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
 Settled = list[tuple[Any, Applied | DynhullError]]
 
@@ -152,12 +150,12 @@ class Window(Generic[Future]):
         self._on_this_connection = 0
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
             return self._end(error), None
-        if error.reason and not isinstance(error, UnavailableError):
+        if error.reason and not isinstance(error, PASSING):
             return self._refuse(error)
         if error.code == grpc.StatusCode.RESOURCE_EXHAUSTED and alone:  # gRPC's own limit on messages
             return self._refuse(error)
         # Where nobody says which batch it was, or whether it was applied, sending one at a time will tell.
-        self._one_at_a_time = not isinstance(error, UnavailableError)
+        self._one_at_a_time = not isinstance(error, PASSING)
         if self.empty or self._lost_since is None:
             self._lost_since = now
         if now - self._lost_since > self._writing.patience:

@@ -33,6 +33,12 @@ class HullServiceStub(object):
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
 
+    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
+    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
+    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
+    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
+    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+
     Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
     hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
     beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
@@ -162,6 +168,12 @@ class HullServiceServicer(object):
     "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+
+    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
+    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
+    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
+    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
+    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
 
     Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
     hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
@@ -450,6 +462,12 @@ class HullService(object):
     "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
     too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
     QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+
+    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
+    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
+    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
+    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
+    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
 
     Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
     hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number

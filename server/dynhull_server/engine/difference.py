@@ -2,7 +2,9 @@
 
 import asyncio
 from collections import OrderedDict
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,9 +32,14 @@ class Difference:
 
 
 class Differences:
-    """Differences that many watchers want: each is computed once."""
+    """Differences that many watchers want: each is computed once.
 
-    def __init__(self) -> None:
+    Args:
+        run: calls a function in a thread.
+    """
+
+    def __init__(self, run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
+        self._run = run
         self._recent: OrderedDict[tuple[int, int], tuple[Points, Points, asyncio.Future[Difference]]] = OrderedDict()
 
     async def between(self, old: Points, new: Points) -> Difference:
@@ -42,12 +49,17 @@ class Differences:
         # The arrays are kept beside the result, so that their ids stay theirs.
         key = id(old), id(new)
         if key not in self._recent:
-            computing = asyncio.ensure_future(asyncio.to_thread(difference, old, new))
+            computing = asyncio.ensure_future(self._run(partial(difference, old, new)))
+            computing.add_done_callback(partial(self._computed, key))
             self._recent[key] = old, new, computing
             if len(self._recent) > KEPT:
                 self._recent.popitem(last=False)
         # A watcher that leaves does not take the result away from the others.
         return await asyncio.shield(self._recent[key][2])
+
+    def _computed(self, key: tuple[int, int], computing: "asyncio.Future[Difference]") -> None:
+        if computing.cancelled() or computing.exception() is not None:
+            self._recent.pop(key, None)  # the next watcher may have more luck
 
 
 def difference(old: Points, new: Points) -> Difference:

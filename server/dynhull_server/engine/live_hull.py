@@ -1,173 +1,174 @@
-"""One named hull: its points, its revision, and everybody who waits for the next one."""
+"""What callers see of one hull: reads of one revision, waiting for the next, and earlier revisions."""
 
 import asyncio
-import secrets
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from ..state.batch import Applied, apply_batch
-from ..state.errors import (
-    HullEmptyError,
-    HullNotFoundError,
-    HullReplacedError,
-    LimitExceededError,
-    RevisionForgottenError,
-    StorageError,
-)
-from ..state.history import History
-from ..state.limits import Limits
-from ..state.producers import Producers
+from ..state.errors import HullEmptyError, HullNotFoundError, HullReplacedError, RevisionForgottenError
+from ..state.events import ReadHull
+from ..state.hull import Hull
+from ..state.hull_state import Counts, HullState
 from ..state.sample import sample
-from ..storage.sqlite.errors import JournalError
-from ..storage.sqlite.records import Record
 from .difference import Differences
-from .serial import SerialExecutor
-from .storage import HullStore, Restored, storage_error
+from .recalls import Recalls
 from .verification import Verification, verify
-from .writer import SMALL, Write, Writer
+from .waiter import Waiter
+
+if TYPE_CHECKING:
+    from .engine import Engine
 
 T = TypeVar("T")
 
-# A hull of at most so many vertices is told at once.
-FEW_VERTICES = 256
-
-
-@dataclass(frozen=True, slots=True)
-class Config:
-    """What a hull is told at its creation; no bound on its points but the server's where `max_points` is 0."""
-
-    max_points: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Birth:
-    """Where a hull comes from: `uid` tells it from others of its name."""
-
-    uid: str
-    created: datetime
-
-    @classmethod
-    def now(cls) -> "Birth":
-        """Of a new hull."""
-        return cls(secrets.token_hex(8), datetime.now(UTC))
-
-
-@dataclass(slots=True)
-class Counts:
-    """How much a hull holds at a revision; `points` with multiplicity."""
-
-    revision: int
-    points: int
-    distinct: int
+# A question about more points than these is answered beside the hull's turn, this many at a time: a read holds up the
+# writes behind it for some milliseconds, and a caller that has gone costs no more than one block.
+BLOCK = 8192
 
 
 class LiveHull:
-    """A hull that many callers read, write and wait for.
+    """A hull that many callers read and wait for.
 
-    Batches and reads run one at a time in the order they came, so every read sees one revision. With a store, nobody
-    is told of a batch before it is committed.
+    Batches and reads run one at a time in the order they came, so every read sees one revision, one that is committed.
 
     Attributes:
-        name: the hull's name.
-        config: what it was told at its creation.
-        uid: tells it from other hulls of its name.
-        created: when.
-        counts: as of the latest revision that anybody may be told of.
-        unsaved: points in batches since the last snapshot.
         differences: between the vertices it has told.
     """
 
-    def __init__(
-        self,
-        name: str,
-        config: Config,
-        pool: Executor,
-        limits: Limits,
-        birth: Birth | None = None,
-        store: HullStore | None = None,
-        restored: Restored | None = None,
-    ) -> None:
-        birth = birth or Birth.now()
-        self.name = name
-        self.config = config
-        self.uid = birth.uid
-        self.created = birth.created
-        self.unsaved = 0
-        self.differences = Differences()
-        self._limits = limits
-        self._most_points = min(config.max_points or limits.max_points, limits.max_points)
-        self._pool = pool
-        self._serial = SerialExecutor(pool, self._commit, self._roll_back, self._wake)
-        self._store = store
-        self._uncommitted: list[Record] = []
+    def __init__(self, engine: "Engine", hull: Hull, recalls: Recalls) -> None:
+        self.differences = Differences(partial(engine.run, engine.reads))
+        self._engine = engine
+        self._hull = hull
+        self._recalls = recalls
         self._moved: asyncio.Event | None = None
-        self._closed = False
-        self._deleted = False
-        self._load(restored or Restored(DynamicHull(), 0, {}))
-        self.counts = self._counts
+        self._outline: tuple[Points, DynamicHull] | None = None
 
-    def _load(self, restored: Restored) -> None:
-        self._hull = restored.hull
-        self._counts = Counts(restored.revision, len(restored.hull), restored.hull.distinct)
-        self._producers = Producers(self._limits.max_producers, restored.producers)
-        self._vertices = self._hull.vertices()
-        self._vertices.setflags(write=False)
-        self._vertices_as_of = self._hull.changes
-        self._changed_at = restored.revision
-        self._history = History(self._limits.history_bytes, self._vertices, restored.revision)
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._hull.name
+
+    @property
+    def number(self) -> int:
+        """Its number in the storage."""
+        return self._hull.row.number
+
+    @property
+    def uid(self) -> str:
+        """What tells it from other hulls of its name."""
+        return self._hull.uid
+
+    @property
+    def created(self) -> datetime:
+        """When it was created."""
+        return datetime.fromtimestamp(self._hull.row.created, UTC)
+
+    @property
+    def max_points(self) -> int:
+        """The limit on its points that it was created with, 0 for the server's."""
+        return self._hull.row.max_points
+
+    @property
+    def counts(self) -> Counts:
+        """As of the latest revision that anybody may be told of."""
+        return self._hull.counts
 
     @property
     def vertex_count(self) -> int:
         """The number of vertices when somebody last looked."""
-        return len(self._vertices)
+        return self._hull.vertex_count
 
-    def writer(self, notify: Callable[[], None]) -> Writer:
-        """For many batches, without waiting for each; `notify` is called when there is news of one."""
-        return Writer(self._apply, self._serial, notify)
+    @property
+    def unsaved(self) -> int:
+        """Points in batches since the last snapshot."""
+        return self._hull.unsaved
 
-    async def apply(self, write: Write) -> Applied:
-        """Apply a batch as the next revision, or raise what refuses it and change nothing."""
-        return await self._serial.run(lambda: self._apply(write), small=write.rows <= SMALL, writes=True)
+    def saved(self, points: int) -> None:
+        """A snapshot has made batches of so many points superfluous."""
+        self._hull.unsaved -= points
 
-    async def read(
-        self, function: Callable[[DynamicHull], T], rows: int = 0, min_revision: int = 0
+    # Reads
+
+    async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
+        """What `function`, which looks at about `rows` points, says of the hull in its turn."""
+        while True:
+            if self._hull.counts.revision < min_revision:
+                await self.reached(min_revision)
+            counts, result = await self._engine.ask(ReadHull(Waiter(), self._hull, function, rows=rows))
+            if counts.revision >= min_revision:
+                return counts, result
+
+    async def vertices(self, min_revision: int = 0) -> tuple[Counts, Points]:
+        """The vertices; the very same array for as long as the hull has not changed."""
+        return await self.read(HullState.vertices, self.vertex_count // 2, min_revision)
+
+    async def ask_rows(
+        self, question: Callable[[DynamicHull, slice], T], rows: int, min_revision: int = 0
     ) -> tuple[Counts, T]:
-        """What `function`, which does work for `rows` points, says of the hull."""
-        return await self._read(min_revision, lambda: function(self._hull), rows <= SMALL)
+        """The answers to a question about so many rows that depends on the vertices alone.
+
+        Args:
+            question: called with a hull of these vertices and a slice of the rows, perhaps several times.
+            rows: how many rows there are.
+            min_revision: of the hull, at least.
+
+        Returns:
+            The counts of the one revision that was asked, and an array of the answers.
+        """
+        if rows <= BLOCK:
+            return await self.read(lambda state: question(state.hull, slice(0, rows)), rows, min_revision)
+        counts, vertices = await self.vertices(min_revision)
+        outline = await self._hull_of(vertices)
+        return counts, await self._in_blocks(partial(question, outline), rows)
+
+    async def count(self, points: Points, min_revision: int = 0) -> tuple[Counts, list[int]]:
+        """How many times each of some points is there."""
+        xy = points.tolist()
+
+        def count(hull: DynamicHull, block: slice) -> list[int]:
+            return [hull.count(x, y) for x, y in xy[block]]
+
+        if len(xy) <= BLOCK:
+            return await self.read(lambda state: count(state.hull, slice(0, len(xy))), len(xy), min_revision)
+        counts, stored = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
+        hull = await self._engine.run(self._engine.reads, partial(DynamicHull, stored))
+        return counts, (await self._in_blocks(partial(count, hull), len(xy))).tolist()
 
     async def support(self, directions: Points, min_revision: int = 0) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
 
-        def extreme(hull: DynamicHull) -> Points:
+        def extreme(hull: DynamicHull, block: slice) -> Points:
             if not len(hull):
                 raise HullEmptyError(self.name)
-            return hull.support(directions)
+            return hull.support(directions[block])
 
-        return await self.read(extreme, len(directions), min_revision)
-
-    async def vertices(self, min_revision: int = 0) -> tuple[Counts, Points]:
-        """The vertices; the very same array for as long as the hull has not changed."""
-        return await self._read(min_revision, self._current_vertices, len(self._vertices) <= FEW_VERTICES)
+        return await self.ask_rows(extreme, len(directions), min_revision)
 
     async def verify(self, min_revision: int = 0) -> tuple[Counts, Verification]:
         """Compare the live hull with Chan's algorithm on the stored points. Writes go on meanwhile."""
-        counts, (points, vertices) = await self._read(
-            min_revision, lambda: (self._hull.points(), self._current_vertices()), small=False
+        counts, (points, vertices) = await self.read(
+            lambda state: (state.hull.points(), state.vertices()), self.counts.points, min_revision
         )
-        return counts, await verify(points, vertices)
+        return counts, await verify(points, vertices, partial(self._engine.run, self._engine.reads))
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
         """At most `size` of the points. Writes go on while they are chosen."""
-        counts, points = await self._read(min_revision, lambda: self._hull.points(), self._counts.points <= SMALL)
+        counts, points = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
         if len(points) <= size:
             return counts, points
-        return counts, await asyncio.to_thread(sample, points, size)
+        return counts, await self._engine.run(self._engine.reads, partial(sample, points, size))
+
+    async def last_sequence(self, producer: str) -> int:
+        """The last number of a producer that was applied, 0 where there is none."""
+        _, last = await self.read(lambda state: state.last_sequence(producer))
+        return last
+
+    # Revisions
 
     async def recall(self, uid: str, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where nobody was told them.
@@ -179,133 +180,45 @@ class LiveHull:
         if uid != self.uid:
             raise HullReplacedError(self.name, self.uid)
         try:
-            _, vertices = await self._read(0, lambda: self._history.at(revision, self._counts.revision), small=True)
+            _, vertices = await self.read(lambda state: state.earlier_vertices(revision))
         except RevisionForgottenError as error:
-            if self._store is None or revision > error.newest:
+            if revision > error.newest:
                 raise
-            loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(self._pool, self._recall_stored, self._store, error)
-        return vertices
-
-    async def last_sequence(self, producer: str) -> int:
-        """The last number of a producer that was applied, 0 where there is none."""
-        _, last = await self._read(0, lambda: self._producers.last(producer), small=True)
-        return last
-
-    async def snapshot(self) -> None:
-        """Write the points and the producers to the store, beside the traffic."""
-        if self._store is None:
-            return
-        unsaved = self.unsaved
-        counts, (points, producers) = await self._read(
-            0, lambda: (self._hull.points(), self._producers.state()), small=False
-        )
-        loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._pool, self._store.snapshot, counts.revision, points, producers)
-        self.unsaved -= unsaved
+            remembered = error.oldest
+        else:
+            return vertices
+        try:
+            return await self._recalls.vertices(self._hull, revision)
+        except RevisionForgottenError as error:
+            oldest = min(remembered, error.oldest)
+            raise RevisionForgottenError(revision, oldest, error.newest) from None
 
     async def reached(self, revision: int) -> None:
         """Wait until the hull has this revision or a later one."""
-        while not self._deleted and self.counts.revision < revision:
+        while not self._hull.ended and self.counts.revision < revision:
             if self._moved is None:
                 self._moved = asyncio.Event()
             await self._moved.wait()
-        if self._deleted:
+        if self._hull.ended:
             raise HullNotFoundError(self.name)
 
-    async def create(self) -> None:
-        """Commit the hull to the store, or raise StorageError."""
-        if self._store is not None:
-            await _committed(self._store.create())
-
-    async def delete(self) -> None:
-        """Refuse all further work; whoever waits gets HullNotFoundError. StorageError where it cannot be committed."""
-        await self._serial.run(lambda: self._close(closed=True), small=True)  # after the batches under way
-        if self._store is not None:
-            try:
-                await _committed(self._store.delete())
-            except StorageError:
-                self._close(closed=False)
-                raise
-        self.discard()
-
-    def discard(self) -> None:
-        """As `delete`, of a hull that the store does not know."""
-        self._deleted = True
-        self._wake()
-
-    def stop(self) -> None:
-        """Begin nothing more: the server ends."""
-        self._serial.stop()
-
-    def _close(self, *, closed: bool) -> None:
-        self._closed = closed
-
-    async def _read(self, min_revision: int, function: Callable[[], T], small: bool) -> tuple[Counts, T]:
-        while True:
-            await self.reached(min_revision)
-            counts, result = await self._serial.run(lambda: (self._counts, function()), small=small)
-            if counts.revision >= min_revision:
-                return counts, result
-
-    def _apply(self, write: Write) -> Applied:
-        if self._closed or self._deleted:
-            raise HullNotFoundError(self.name)
-        counts = self._counts
-        if write.producer and not self._producers.is_new(write.producer, write.sequence):
-            return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True)
-        batch = write.make()
-        if counts.points + batch.growth > self._most_points:
-            raise LimitExceededError("max_points", self._most_points)
-        applied = apply_batch(self._hull, batch, counts.revision + 1)
-        if applied.hull_changed:
-            self._changed_at = applied.revision
-            self._history.changed(applied.revision)
-        if write.producer:
-            self._producers.applied(write.producer, write.sequence)
-        self._counts = Counts(applied.revision, applied.points, self._hull.distinct)
-        if self._store is not None:
-            lenient = applied.missing > 0
-            self._uncommitted.append(
-                Record(applied.revision, batch.inserts, batch.deletes, write.producer, write.sequence, lenient)
-            )
-            self.unsaved += len(batch.inserts) + len(batch.deletes)
-        return applied
-
-    def _commit(self) -> Future[None] | None:
-        if self._store is None or not self._uncommitted:
-            return None
-        records, self._uncommitted = self._uncommitted, []
-        return self._store.append(records)
-
-    def _roll_back(self, failure: BaseException) -> StorageError:
-        assert self._store is not None
-        self._load(self._store.restore())
-        return storage_error(failure)
-
-    def _recall_stored(self, store: HullStore, forgotten: RevisionForgottenError) -> Points:
-        oldest = store.oldest()
-        if forgotten.revision < oldest:
-            raise RevisionForgottenError(forgotten.revision, oldest, forgotten.newest) from None
-        return store.restore(forgotten.revision).hull.vertices()
-
-    def _current_vertices(self) -> Points:
-        if self._vertices_as_of != self._hull.changes:
-            self._vertices = self._hull.vertices()
-            self._vertices.setflags(write=False)
-            self._vertices_as_of = self._hull.changes
-            self._history.told(self._changed_at, self._vertices)
-        return self._vertices
-
-    def _wake(self) -> None:
-        self.counts = self._counts
+    def moved(self) -> None:
+        """The hull has a new revision, or is no more."""
         if self._moved is not None:
             self._moved.set()
             self._moved = None
 
+    async def _hull_of(self, vertices: Points) -> DynamicHull:
+        """A hull of its own with these vertices: several large reads of one revision share it."""
+        if self._outline is None or self._outline[0] is not vertices:
+            made: DynamicHull = await self._engine.run(self._engine.reads, partial(DynamicHull, vertices))
+            self._outline = vertices, made
+            return made
+        return self._outline[1]
 
-async def _committed(commit: Future[None]) -> None:
-    try:
-        await asyncio.wrap_future(commit)
-    except JournalError as error:
-        raise storage_error(error) from error
+    async def _in_blocks(self, question: Callable[[slice], Any], rows: int) -> Any:
+        answers = [
+            await self._engine.run(self._engine.reads, partial(question, slice(first, min(first + BLOCK, rows))))
+            for first in range(0, rows, BLOCK)
+        ]
+        return np.concatenate(answers)

@@ -4,7 +4,10 @@ import asyncio
 import json
 import sys
 import time
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -42,10 +45,10 @@ class Verification:
     seconds: float
 
 
-async def verify(points: Points, vertices: Points) -> Verification:
-    """Compare `vertices`, a live hull's, with the hull of `points` computed anew, off the event loop."""
+async def verify(points: Points, vertices: Points, run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> Verification:
+    """Compare `vertices`, a live hull's, with the hull of `points` computed anew, in a thread: `run` calls it there."""
     if KERNEL == "cpp" or len(points) < LARGE:  # the kernel leaves the interpreter to others
-        recomputed, rounds, seconds = await asyncio.to_thread(_recompute, points)
+        recomputed, rounds, seconds = await run(partial(_recompute, points))
     else:
         recomputed, rounds, seconds = await _recompute_apart(points)
     return Verification(len(points), len(vertices), rounds, first_difference(vertices, recomputed), seconds)

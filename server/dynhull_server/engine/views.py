@@ -5,11 +5,11 @@ from typing import Protocol
 
 import numpy as np
 
-from dynhull import DynamicHull
 from dynhull.arrays import Points
 
+from ..state.hull_state import Counts, HullState
 from .difference import Difference
-from .live_hull import Counts, LiveHull
+from .live_hull import LiveHull
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +105,9 @@ class SketchView:
         self._rows = len(directions) + (hull.vertex_count if vertices else 0)
         self._held: tuple[Points, Points | None] = np.empty((0, 2)), None
 
-    def _look(self, live: DynamicHull) -> tuple[Points, Points | None]:
-        extremes = live.support(self._directions) if len(live) else np.empty((0, 2))
-        return extremes, live.vertices() if self._with_vertices else None
+    def _look(self, state: HullState) -> tuple[Points, Points | None]:
+        extremes = state.hull.support(self._directions) if len(state.hull) else np.empty((0, 2))
+        return extremes, state.vertices() if self._with_vertices else None
 
     async def first(self, min_revision: int) -> Event:
         """A sketch."""

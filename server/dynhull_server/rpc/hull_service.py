@@ -2,15 +2,14 @@
 
 import asyncio
 import time
-from collections.abc import Iterator
-from contextlib import aclosing, contextmanager
+from contextlib import aclosing
 
 import numpy as np
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ..engine.hulls import Engine
-from ..engine.live_hull import Config, LiveHull
+from ..engine.engine import Engine
+from ..engine.live_hull import LiveHull
 from ..engine.views import SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..state.errors import HullEmptyError
@@ -18,7 +17,7 @@ from . import answers, decode, encode
 from .calls import Call
 from .metrics import Metrics
 from .readings import ENTRIES, RISKS
-from .writing import BatchStream, decode_write
+from .writing import StreamedBatches, decode_write
 
 
 class HullService:
@@ -42,8 +41,7 @@ class HullService:
     async def CreateHull(self, request: pb.CreateHullRequest, call: Call) -> pb.CreateHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        config = decode.decode_config(request.config)
-        hull = await self._engine.create(name, config)
+        hull = await self._engine.create(name, decode.decode_max_points(request.config))
         return pb.CreateHullResponse(hull=encode.encode_hull(hull, hull.counts))
 
     async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:
@@ -64,15 +62,15 @@ class HullService:
 
     async def Apply(self, request: pb.ApplyRequest, call: Call) -> pb.ApplyResponse:
         begun = time.perf_counter()
-        with self._written(call, request.name) as hull:
-            if not request.HasField("batch"):
-                raise decode.InvalidFieldError("batch", "", "a batch is required")
-            write = decode_write(request, call.message_bytes, decode.decode_producer(request.producer))
-            try:
-                applied = await hull.apply(write)
-            except Exception:
-                self._metrics.batches.refused()
-                raise
+        name = self._written(call, request.name)
+        if not request.HasField("batch"):
+            raise decode.InvalidFieldError("batch", "", "a batch is required")
+        write = decode_write(request, call.message_bytes, decode.decode_producer(request.producer), call.owner)
+        try:
+            applied = await self._engine.apply(name, write, create=self._create_on_write)
+        except Exception:
+            self._metrics.batches.refused()
+            raise
         self._metrics.batches.applied(applied, time.perf_counter() - begun)
         response = pb.ApplyResponse()
         encode.encode_applied(applied, response.result)
@@ -80,36 +78,30 @@ class HullService:
 
     async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
         call.batches = 0
-        with call.cutoff():
-            first = await call.read()
-        if first is None:
-            raise decode.InvalidFieldError("name", "", "the first message names the hull, and there was none")
-        with self._written(call, first.name) as hull:
-            summary = pb.IngestResponse(revision=hull.counts.revision, point_count=hull.counts.points)
-            async with aclosing(BatchStream(call, first, hull, self._metrics).applied()) as batches:
-                async for _, applied in batches:
-                    call.batches += 1
-                    summary.duplicates += applied.duplicate
-                    summary.inserted += applied.inserted
-                    summary.deleted += applied.deleted
-                    summary.missing += applied.missing
-                    summary.revision, summary.point_count = applied.revision, applied.points
+        summary = pb.IngestResponse()
+        streamed = await self._batches(call)
+        if self._engine.has(streamed.name):
+            counts = self._engine.get(streamed.name).counts
+            summary.revision, summary.point_count = counts.revision, counts.points
+        async with aclosing(streamed.applied()) as batches:
+            async for _, applied in batches:
+                call.batches += 1
+                summary.duplicates += applied.duplicate
+                summary.inserted += applied.inserted
+                summary.deleted += applied.deleted
+                summary.missing += applied.missing
+                summary.revision, summary.point_count = applied.revision, applied.points
         summary.batches = call.batches - summary.duplicates
         return summary
 
     async def Stream(self, _: object, call: Call) -> None:
         call.batches = 0
-        with call.cutoff():
-            first = await call.read()
-        if first is None:
-            raise decode.InvalidFieldError("name", "", "the first message names the hull, and there was none")
-        with self._written(call, first.name) as hull:
-            async with aclosing(BatchStream(call, first, hull, self._metrics).applied()) as batches:
-                async for sequence, applied in batches:
-                    call.batches += 1
-                    response = pb.StreamResponse(sequence=sequence)
-                    encode.encode_applied(applied, response.result)
-                    await call.write(response)
+        async with aclosing((await self._batches(call)).applied()) as batches:
+            async for sequence, applied in batches:
+                call.batches += 1
+                response = pb.StreamResponse(sequence=sequence)
+                encode.encode_applied(applied, response.result)
+                await call.write(response)
 
     async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
         name = decode.decode_name(request.name)
@@ -125,15 +117,13 @@ class HullService:
     async def Locate(self, request: pb.LocateRequest, call: Call) -> pb.LocateResponse:
         hull = self._read(call, request.name)
         xy = decode.decode_points(request.points, "points")
-        counts, sides = await hull.read(lambda live: live.locate(xy), len(xy), request.min_revision)
+        counts, sides = await hull.ask_rows(lambda live, rows: live.locate(xy[rows]), len(xy), request.min_revision)
         return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
 
     async def Count(self, request: pb.CountRequest, call: Call) -> pb.CountResponse:
         hull = self._read(call, request.name)
-        points = decode.decode_points(request.points, "points").tolist()
-        counts, times = await hull.read(
-            lambda live: [live.count(x, y) for x, y in points], len(points), request.min_revision
-        )
+        points = decode.decode_points(request.points, "points")
+        counts, times = await hull.count(points, request.min_revision)
         return pb.CountResponse(revision=counts.revision, counts=times)
 
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
@@ -147,7 +137,9 @@ class HullService:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         xy = decode.decode_points(request.points, "points")
-        counts, tangents = await hull.read(lambda live: live.tangents(xy), len(xy), request.min_revision)
+        counts, tangents = await hull.ask_rows(
+            lambda live, rows: live.tangents(xy[rows]), len(xy), request.min_revision
+        )
         return pb.TangentsResponse(
             revision=counts.revision,
             left=encode.encode_points(np.ascontiguousarray(tangents[:, 0]), encoding),
@@ -157,16 +149,18 @@ class HullService:
     async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
         hull = self._read(call, request.name)
         xy = decode.decode_points(request.points, "points")
-        rows = len(xy) + hull.vertex_count
-        counts, distances = await hull.read(lambda live: live.distance(xy), rows, request.min_revision)
+        counts, distances = await hull.ask_rows(
+            lambda live, rows: live.distance(xy[rows]), len(xy), request.min_revision
+        )
         return pb.DistanceResponse(revision=counts.revision, distances=distances)
 
     async def IntersectLines(self, request: pb.IntersectLinesRequest, call: Call) -> pb.IntersectLinesResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         p, q = decode.decode_lines(request)
-        rows = len(p) + hull.vertex_count
-        counts, crossings = await hull.read(lambda live: live.intersect_lines(p, q), rows, request.min_revision)
+        counts, crossings = await hull.ask_rows(
+            lambda live, rows: live.intersect_lines(p[rows], q[rows]), len(p), request.min_revision
+        )
         return pb.IntersectLinesResponse(
             revision=counts.revision,
             entries=encode.encode_points(np.ascontiguousarray(crossings[:, 0]), encoding),
@@ -281,16 +275,16 @@ class HullService:
         call.access.require_read(name)
         return self._engine.get(name)
 
-    @contextmanager
-    def _written(self, call: Call, name: str) -> Iterator[LiveHull]:
-        """The hull to write to. One that the call creates is removed again where nothing is written to it."""
+    def _written(self, call: Call, name: str) -> str:
         name = decode.decode_name(name)
         call.access.require_write(name)
-        created = self._create_on_write and not self._engine.has(name)
-        hull = self._engine.begin(name, Config()) if created else self._engine.get(name)
-        try:
-            yield hull
-        except BaseException:
-            if created:
-                self._engine.discard_unwritten(hull)
-            raise
+        return name
+
+    async def _batches(self, call: Call) -> StreamedBatches:
+        """The batches of a call, whose first message names the hull."""
+        with call.cutoff():
+            first = await call.read()
+        if first is None:
+            raise decode.InvalidFieldError("name", "", "the first message names the hull, and there was none")
+        name = self._written(call, first.name)
+        return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)

@@ -13,7 +13,9 @@ from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from ..engine.hulls import Engine
+from ..engine.engine import Engine
+from ..engine.supervisor import Supervisor
+from .background import background_families
 from .batch_counts import BatchCounts
 
 # Seconds; from a small batch applied at once to one that fills a message.
@@ -121,14 +123,20 @@ class Metrics:
 class StateCollector(Collector):
     """Hulls, watchers and counts of batches at the moment of asking, in other threads than the event loop's."""
 
-    def __init__(self, engine: Engine, metrics: Metrics, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, engine: Engine, metrics: Metrics, supervisor: Supervisor, loop: asyncio.AbstractEventLoop
+    ) -> None:
         self._engine = engine
         self._metrics = metrics
+        self._supervisor = supervisor
         self._loop = loop
 
     def collect(self) -> Iterator[Metric]:
         """Gauges of the state, and the counts."""
-        yield from _on(self._loop, lambda: [*self._gauges(), *self._metrics.batches.families()])
+        yield from _on(self._loop, self._all)
+
+    def _all(self) -> list[Metric]:
+        return [*self._gauges(), *self._metrics.batches.families(), *background_families(self._supervisor)]
 
     def _gauges(self) -> list[GaugeMetricFamily]:
         hulls = list(self._engine)

@@ -9,18 +9,20 @@ from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFail
 from google.rpc.status_pb2 import Status
 
 from ..state.errors import (
+    DiskFullError,
     HullEmptyError,
     HullExistsError,
     HullNotFoundError,
     HullReplacedError,
     HullUnsuitableError,
     LimitExceededError,
+    NotStoredError,
+    OutcomeUnknownError,
     PointMissingError,
     RefusedError,
     RevisionForgottenError,
     SequenceGapError,
-    StorageError,
-    StorageFullError,
+    StoppingError,
 )
 from .access import PermissionDeniedError, UnauthenticatedError
 from .decode import InvalidFieldError
@@ -56,7 +58,15 @@ class MethodUnknownError(RefusedError):
         super().__init__("there is no such method")
 
 
-ANSWERED = (RefusedError, InvalidFieldError, DecodeError, DrainingError, StartingError)
+ANSWERED = (
+    RefusedError,
+    InvalidFieldError,
+    DecodeError,
+    DrainingError,
+    OutcomeUnknownError,
+    StartingError,
+    StoppingError,
+)
 
 
 def error_status(error: Exception, batch: int | None = None) -> Status:
@@ -127,15 +137,17 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             return _status(
                 code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where
             )
-        case StorageFullError():
+        case DiskFullError():
             quota = QuotaFailure()
             quota.violations.add(subject="disk", description=str(error))
             return _status(code.RESOURCE_EXHAUSTED, str(error), "DISK_FULL", {"limit": "disk", **where}, quota)
-        case StorageError():
+        case NotStoredError():
             return _status(code.UNAVAILABLE, str(error), "STORAGE_FAILED", where)
+        case OutcomeUnknownError():
+            return _status(code.UNKNOWN, str(error), "OUTCOME_UNKNOWN", where)
         case StartingError():
             return _status(code.UNAVAILABLE, "the server is reading its data", "STARTING", where)
-        case DrainingError():
+        case DrainingError() | StoppingError():
             return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error
 

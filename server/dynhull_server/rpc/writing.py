@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from typing import Any
 
-from ..engine.live_hull import LiveHull
-from ..engine.writer import Write
+from ..engine.engine import Engine
 from ..state.batch import Applied
+from ..state.hull_state import Write
 from . import decode
 from .calls import Call
 from .metrics import Metrics
@@ -18,36 +18,45 @@ MOST_ROWS = 65_536
 MOST_BATCHES = 1_024
 
 
-def decode_write(request: Any, message_bytes: int, producer: str) -> Write:
-    """The batch of a request, to be decoded when its turn comes."""
+def decode_write(request: Any, message_bytes: int, producer: str, owner: str) -> Write:
+    """The batch of a request, to be decoded when its turn comes; `owner` is who answers for the producer."""
     batch = request.batch
     return Write(
         lambda: decode.decode_batch(batch),
         message_bytes // decode.BYTES_PER_POINT,  # about: to look at the points is to copy them
         producer,
         decode.decode_sequence(producer, request.sequence),
+        owner,
     )
 
 
-class BatchStream:
+class StreamedBatches:
     """The batches of a call to one hull: one task reads and applies them, its caller tells what they did.
 
     Args:
         call: the call.
         first: its first message, which names the hull and may name a producer.
-        hull: the hull.
+        name: the hull's name.
+        engine: where it is.
+        create: whether a hull that is not there is created with its first batch.
         metrics: where batches are counted.
+
+    Attributes:
+        name: the hull's name.
+
+    Raises:
+        HullNotFoundError: there is no such hull, and none is to be created.
     """
 
-    def __init__(self, call: Call, first: Any, hull: LiveHull, metrics: Metrics) -> None:
+    def __init__(self, call: Call, first: Any, name: str, engine: Engine, metrics: Metrics, *, create: bool) -> None:
         self._call = call
-        self._hull = hull
+        self.name = name
         self._producer = decode.decode_producer(first.producer)
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # while the caller waits for some
         self._room = asyncio.Event()
-        self._writer = hull.writer(self._notify)
-        self._untold: deque[tuple[int, float]] = deque()
+        self._batches = engine.stream(name, self._notify, create=create)
+        self._arrivals: deque[float] = deque()
         self._failure: Exception | None = None
         self._take(first)
 
@@ -56,21 +65,20 @@ class BatchStream:
 
         What refuses a batch is raised after the ones before it, DrainingError after those that are under way.
         """
-        writer = self._writer
+        batches = self._batches
         reading = asyncio.create_task(self._read())
         reading.add_done_callback(lambda _: self._notify())
         try:
             while True:
-                while writer.applied:
-                    applied = writer.applied.popleft()
-                    sequence, came = self._untold.popleft()
+                while batches.applied:
+                    sequence, applied = batches.applied.popleft()
                     self._room.set()
-                    self._metrics.batches.applied(applied, time.perf_counter() - came)
+                    self._metrics.batches.applied(applied, time.perf_counter() - self._arrivals.popleft())
                     yield sequence, applied
-                if writer.refusal is not None:
+                if batches.refusal is not None:
                     self._metrics.batches.refused()
-                    raise writer.refusal
-                if reading.done() and not writer.batches:
+                    raise batches.refusal.with_traceback(None)
+                if reading.done() and not batches.batches:
                     if self._failure is not None:
                         raise self._failure
                     return
@@ -78,6 +86,7 @@ class BatchStream:
                 await self._news
         finally:
             reading.cancel()
+            batches.close()
 
     def _notify(self) -> None:
         if self._news is not None and not self._news.done():
@@ -88,7 +97,7 @@ class BatchStream:
         try:
             with self._call.cutoff():
                 while True:
-                    while self._writer.rows >= MOST_ROWS or len(self._untold) >= MOST_BATCHES:
+                    while self._batches.rows >= MOST_ROWS or len(self._arrivals) >= MOST_BATCHES:
                         self._room.clear()
                         await self._room.wait()
                     message = await self._call.read()
@@ -99,14 +108,14 @@ class BatchStream:
             self._failure = failure
 
     def _take(self, message: Any) -> None:
-        if message.name not in ("", self._hull.name):
-            raise decode.InvalidFieldError("name", message.name, f"this call writes to {self._hull.name!r}")
+        if message.name not in ("", self.name):
+            raise decode.InvalidFieldError("name", message.name, f"this call writes to {self.name!r}")
         if message.producer not in ("", self._producer):
             raise decode.InvalidFieldError("producer", message.producer, f"this call's is {self._producer!r}")
         if not message.HasField("batch"):
             if message.sequence:
                 raise decode.InvalidFieldError("sequence", message.sequence, "there is no batch to number")
             return
-        write = decode_write(message, self._call.message_bytes, self._producer)
-        self._untold.append((write.sequence, time.perf_counter()))
-        self._writer.write(write)
+        write = decode_write(message, self._call.message_bytes, self._producer, self._call.owner)
+        self._arrivals.append(time.perf_counter())
+        self._batches.write(write)

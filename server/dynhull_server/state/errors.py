@@ -119,9 +119,26 @@ class HullReplacedError(RefusedError):
         self.uid = uid
 
 
-class StorageError(RefusedError):
-    """The disk did not take a change; nothing of it was applied."""
+class NotStoredError(RefusedError):
+    """The storage did not take a change: nothing of it was applied, and it may be sent again."""
 
 
-class StorageFullError(StorageError):
+class DiskFullError(NotStoredError):
     """There is no room on the disk; nothing of the change was applied."""
+
+
+class OutcomeUnknownError(Exception):
+    """The storage failed in the middle of a change: it may have been applied or not.
+
+    Whoever numbers batches finds out by asking for the producer's last number; everybody else, by reading.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(
+            f"whether this was applied is unknown until the disk can be read again ({reason}): "
+            "ask for the producer's last number, or read, before you send it again"
+        )
+
+
+class StoppingError(Exception):
+    """The server is about to stop; nothing of the request was applied."""

@@ -1,13 +1,20 @@
 """Writers that number their batches, so that each batch is applied exactly once."""
 
-import time
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from .errors import LimitExceededError, SequenceGapError
 
-# A producer idle for so many seconds is forgotten where another one needs the room.
+# A producer idle for this many seconds is forgotten when another one needs the room.
 IDLE = 24 * 3600.0
+
+
+@dataclass(slots=True)
+class _Producer:
+    last: int
+    used: float
+    owner: str
 
 
 class Producers:
@@ -17,23 +24,27 @@ class Producers:
 
     Args:
         most: how many producers there may be.
+        most_of_one: how many of them may be one caller's.
         last: the last sequence number of each that is known already.
+        now: seconds on a clock that never goes back.
     """
 
-    def __init__(self, most: int, last: Mapping[str, int] | None = None) -> None:
+    def __init__(self, most: int, most_of_one: int, last: Mapping[str, int], now: float) -> None:
         self._most = most
-        now = time.monotonic()
-        self._last = OrderedDict((producer, (sequence, now)) for producer, sequence in (last or {}).items())
+        self._most_of_one = most_of_one
+        self._producers = OrderedDict((name, _Producer(number, now, "")) for name, number in last.items())
+        self._owned: Counter[str] = Counter()
 
     def state(self) -> dict[str, int]:
         """The last sequence number of each producer."""
-        return {producer: sequence for producer, (sequence, _) in self._last.items()}
+        return {name: each.last for name, each in self._producers.items()}
 
     def last(self, producer: str) -> int:
         """The last number applied, 0 for a producer that is not known."""
-        return self._last.get(producer, (0, 0.0))[0]
+        known = self._producers.get(producer)
+        return 0 if known is None else known.last
 
-    def is_new(self, producer: str, sequence: int) -> bool:
+    def is_new(self, producer: str, sequence: int, owner: str, now: float) -> bool:
         """Whether the batch is the next one, False where it has been applied before.
 
         Raises:
@@ -43,14 +54,35 @@ class Producers:
         last = self.last(producer)
         if sequence > last + 1:
             raise SequenceGapError(producer, sequence, last + 1)
-        if last == 0 and len(self._last) >= self._most:
-            oldest, (_, used) = next(iter(self._last.items()))
-            if time.monotonic() - used < IDLE:
-                raise LimitExceededError("max_producers", self._most)
-            del self._last[oldest]
+        if last == 0:
+            self._make_room(owner, now)
         return sequence > last
 
-    def applied(self, producer: str, sequence: int) -> None:
+    def applied(self, producer: str, sequence: int, owner: str, now: float) -> None:
         """Remember that the batch has been applied."""
-        self._last[producer] = sequence, time.monotonic()
-        self._last.move_to_end(producer)
+        known = self._producers.get(producer)
+        if known is None:
+            self._producers[producer] = _Producer(sequence, now, owner)
+            self._owned[owner] += 1
+            return
+        known.last, known.used = sequence, now
+        self._producers.move_to_end(producer)
+
+    def _make_room(self, owner: str, now: float) -> None:
+        """Forget producers that have been idle for long, where there is no room for another one."""
+        if self._owned[owner] >= self._most_of_one:
+            self._forget_idle(now)
+            if self._owned[owner] >= self._most_of_one:
+                raise LimitExceededError("max_producers_per_caller", self._most_of_one)
+        if len(self._producers) >= self._most:
+            self._forget_idle(now)
+            if len(self._producers) >= self._most:
+                raise LimitExceededError("max_producers", self._most)
+
+    def _forget_idle(self, now: float) -> None:
+        while self._producers:
+            name, oldest = next(iter(self._producers.items()))
+            if now - oldest.used < IDLE:
+                return
+            del self._producers[name]
+            self._owned[oldest.owner] -= 1

@@ -8,7 +8,7 @@ import numpy as np
 from dynhull.arrays import Points
 
 from ..state.records import Append, Change, Create, Delete, HullRow, Kept, Record
-from .port import NEWEST, Contents, DamagedError, Progress, Step
+from .port import NEWEST, Contents, DamagedError, NotCommittedError, Progress, Step
 
 KEPT_SNAPSHOTS = 2
 
@@ -26,6 +26,7 @@ class _Snapshot:
 @dataclass(slots=True)
 class _Hull:
     row: HullRow
+    last: int = 0
     records: list[Record] = field(default_factory=list)
     snapshots: list[_Snapshot] = field(default_factory=list)
 
@@ -52,6 +53,8 @@ class MemoryStorage:
 
     def commit(self, changes: Sequence[Change | Step]) -> None:
         """Keep the changes."""
+        if not self._forgets:  # what comes from the core is right; with nothing to compare, this would cost for nothing
+            self._examine(changes)
         for change in changes:
             match change:
                 case Append():
@@ -83,6 +86,8 @@ class MemoryStorage:
         if base is None:
             base = _Snapshot(number, 0, np.empty((0, 2)), {})
         records = [record for record in hull.records if base.revision < record.revision <= until]
+        if records and records[0].revision != base.revision + 1:
+            raise DamagedError(f"hull {hull.row.name!r}: revision {base.revision + 1} is not kept any more")
         return Kept(base.revision, base.points, dict(base.producers), records)
 
     def oldest(self, number: int) -> int:
@@ -92,9 +97,7 @@ class MemoryStorage:
             return NEWEST
         return hull.snapshots[0].revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
 
-    def snapshot(
-        self, number: int, revision: int, points: Points, producers: Mapping[str, int]
-    ) -> Iterator[Step]:
+    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
         """One step."""
         if not self._forgets:
             yield _Snapshot(number, revision, points, dict(producers))
@@ -116,8 +119,36 @@ class MemoryStorage:
     def close(self) -> None:
         """Nobody else waits for it."""
 
+    def _examine(self, changes: Sequence[Change | Step]) -> None:
+        """Raise NotCommittedError where one of them cannot be carried out behind those before it."""
+        last: dict[int, int | None] = {}  # revisions, as the changes make them; None for a hull that they delete
+        for change in changes:
+            if isinstance(change, Create):
+                if self._last(change.row.number, last) is not None:
+                    raise NotCommittedError(f"there is a hull {change.row.number} already")
+                last[change.row.number] = 0
+            elif isinstance(change, Append | Delete):
+                before = self._last(change.number, last)
+                if before is None:
+                    raise NotCommittedError(f"there is no hull {change.number}")
+                if isinstance(change, Delete):
+                    last[change.number] = None
+                    continue
+                revisions = [record.revision for record in change.records]
+                if revisions != list(range(before + 1, before + 1 + len(revisions))):
+                    raise NotCommittedError(f"revisions {revisions} of hull {change.number} do not follow {before}")
+                last[change.number] = before + len(revisions)
+
+    def _last(self, number: int, changed: Mapping[int, int | None]) -> int | None:
+        """The last revision of a hull, None where there is none."""
+        if number in changed:
+            return changed[number]
+        hull = self._hulls.get(number)
+        return None if hull is None else hull.last
+
     def _append(self, change: Append) -> None:
         hull = self._hulls[change.number]
+        hull.last = change.records[-1].revision
         hull.records += change.records
 
     def _take(self, snapshot: _Snapshot) -> None:

@@ -11,6 +11,6 @@ def test_no_promise_is_broken():
     run = subprocess.run([sys.executable, torture, "--faults", "12"], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     counts = run.stdout.splitlines()[-1]
-    assert "faults: 1 damage, 1 full disk, 7 kill, 1 pause, 2 sever;" in counts
+    assert "faults: 1 copy, 1 damage, 1 descriptors, 1 full disk, 6 kill, 1 pause, 1 sever;" in counts
     assert "lost: 0, doubled: 0" in counts
     assert int(re.search(r"batches acknowledged: (\d+)", counts)[1]) > 100

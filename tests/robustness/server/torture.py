@@ -9,13 +9,16 @@ and send again. After every fault a model, the multiset of all batches, checks e
 * no reader ever sees a revision below one it has seen
 * a watcher's copy is the exact hull at the revision named
 * the hull is the one that a static algorithm finds, here and in the server
-* a server that is given the data with one byte changed does not start, and says why, or keeps all this too, but for
-  the last batches, and says that it lost them
+* callers that go away in the middle of a call, and a server that is out of file descriptors, change nothing of this
+* a server that is given the data with one bit changed does not start, and says why, or keeps all this too, but for the
+  last batches, and says that it lost them
+* a backup of the running server, and a restore of a killed one's folder, have every batch acknowledged before
 """
 
 import argparse
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -24,6 +27,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,6 +50,7 @@ COMMAND = str(Path(sys.executable).with_name("dynhull"))
 IN_FLIGHT = 12
 PATIENCE = 60.0  # seconds, for anything to happen at all
 DISK = "64m"
+PAGE_BYTES = 8192  # of the database
 # What a client hears when a server dies, stalls, or is cut off; all of it may be tried again.
 PASSING = {
     grpc.StatusCode.UNAVAILABLE,
@@ -78,7 +83,7 @@ class Server:
 
     def starts(self) -> bool:
         command = [COMMAND, "serve", "--port", str(self._port), "--data", str(self.data)]
-        command += ["--snapshot-points", "2000", "--log-level", "warning", "--scrub-cpu", "0"]
+        command += ["--create-on-write", "--snapshot-points", "2000", "--log-level", "warning", "--scrub-cpu", "0"]
         with self._log.open("ab") as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
         line = self.process.stdout.readline()
@@ -254,6 +259,45 @@ class Watcher(Actor):
             return self.copy.vertices
 
 
+class Leaver(Actor):
+    """Makes calls, and goes away in the middle of most: nobody else may notice."""
+
+    NAMES = ("left/a", "left/b")
+
+    def __init__(self, shared: Shared, name: str, seed: int) -> None:
+        super().__init__(shared, name)
+        self.left = 0
+        self._random = random.Random(seed)
+
+    def act(self, stub: HullServiceStub) -> None:
+        while not self.shared.over.is_set():
+            hull = self._random.choice((*self.NAMES, HULL))
+            call = self._begin(stub, hull)
+            threading.Event().wait(self._random.random() ** 3 * 0.02)
+            self.left += call.cancel()
+            if (code := call.code()) in PASSING - {grpc.StatusCode.CANCELLED}:
+                time.sleep(0.02 if code else 0)
+
+    def _begin(self, stub: HullServiceStub, hull: str) -> grpc.Future:
+        if hull == HULL:
+            return self._random.choice(
+                [
+                    lambda: stub.GetHull.future(pb.GetHullRequest(name=HULL)),
+                    lambda: stub.CreateHull.future(pb.CreateHullRequest(name=HULL)),
+                    lambda: stub.Verify.future(pb.VerifyRequest(name=HULL)),
+                ]
+            )()
+        batch = batch_pb2.Batch()
+        batch.inserts.packed = np.random.default_rng(self.left).normal(size=(5, 2)).tobytes()
+        return self._random.choice(
+            [
+                lambda: stub.CreateHull.future(pb.CreateHullRequest(name=hull)),
+                lambda: stub.DeleteHull.future(pb.DeleteHullRequest(name=hull)),
+                lambda: stub.Apply.future(pb.ApplyRequest(name=hull, batch=batch)),
+            ]
+        )()
+
+
 class Torture:
     def __init__(self, folder: Path, seed: int, writers: int) -> None:
         self._folder = folder
@@ -267,9 +311,10 @@ class Torture:
         self.writers = [Writer(self.shared, i, seed + i) for i in range(writers)]
         self.readers = [Reader(self.shared, "reader")]
         self.watchers = [Watcher(self.shared, f"watcher-{i}") for i in range(2)]
+        self.leavers = [Leaver(self.shared, f"leaver-{i}", seed + i) for i in range(2)]
         self.faults: Counter[str] = Counter()
         self.damage: Counter[str] = Counter()
-        for actor in (*self.writers, *self.readers, *self.watchers):
+        for actor in (*self.writers, *self.readers, *self.watchers, *self.leavers):
             actor.start()
         self.shared.gate.set()
 
@@ -311,8 +356,48 @@ class Torture:
         else:
             ballast.unlink()
 
+    def _descriptors(self) -> None:
+        """No file can be opened, and no connection taken, for a while."""
+        pid = self.server.process.pid
+        before = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+        used = max(int(each.name) for each in Path(f"/proc/{pid}/fd").iterdir())
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (used, before[1]))
+        time.sleep(self._random.uniform(0.2, 1.5))
+        self._proxy.cut()
+        time.sleep(self._random.uniform(0.2, 0.8))
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, before)
+
+    def _copy(self) -> None:
+        """A backup of the running server, and a restore of a killed one's folder: both are served, and are right."""
+        acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
+        with tempfile.TemporaryDirectory() as folder:
+            copied = Server(Path(folder))
+            self._command("backup", str(copied.data), "--data", str(self.server.data))
+            self._check_copy(copied, acknowledged)
+        self.shared.gate.clear()
+        self.server.kill()
+        acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
+        with tempfile.TemporaryDirectory() as folder:
+            restored = Server(Path(folder))
+            self._command("restore", str(self.server.data), "--data", str(restored.data))
+            self._proxy.cut()
+            self.server.start()
+            self._check_copy(restored, acknowledged)
+
+    def _command(self, *words: str) -> None:
+        run = subprocess.run([COMMAND, *words], capture_output=True, text=True, check=False)
+        require(run.returncode == 0, f"dynhull {' '.join(words)}: {run.stderr}")
+
+    def _check_copy(self, copied: Server, acknowledged: dict[str, int]) -> None:
+        copied.start()
+        with grpc.insecure_channel(copied.address) as channel:
+            last = self._check_damaged(HullServiceStub(channel), acknowledged, copied, "a copy")
+        for name, count in acknowledged.items():
+            require(last[name] >= count, f"{name}: of {count} batches acknowledged the copy has {last[name]}")
+        copied.kill()
+
     def _damage(self) -> None:
-        """A kill, and a second server on a copy of the data in which a byte is another one."""
+        """A kill, and a second server on a copy of the data in which a bit is another one."""
         self.shared.gate.clear()
         self.server.kill()
         with tempfile.TemporaryDirectory() as folder:
@@ -321,7 +406,7 @@ class Torture:
             self._proxy.cut()
             self.server.start()
             acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
-            where = self._change_byte(damaged.data)
+            where = self._flip_bit(damaged.data)
             if damaged.starts():
                 with grpc.insecure_channel(damaged.address) as channel:
                     self._check_damaged(HullServiceStub(channel), acknowledged, damaged, where)
@@ -332,16 +417,31 @@ class Torture:
                 require("Traceback" not in damaged.said(), f"{where}: {damaged.said()}")
                 self.damage["refused"] += 1
 
-    def _change_byte(self, data: Path) -> str:
+    def _flip_bit(self, data: Path) -> str:
+        """Any bit, or one of a header: they are few, and more depends on them."""
         files = [file for file in sorted(data.iterdir()) if file.stat().st_size and file.suffix != ".db-shm"]
         file = self._random.choices(files, [file.stat().st_size for file in files])[0]
         content = bytearray(file.read_bytes())
         place = self._random.randrange(len(content))
-        content[place] ^= self._random.randrange(1, 256)
+        if self._random.random() < 0.5:
+            place = self._random.choice(list(self._header_bytes(file, len(content))))
+        content[place] ^= 1 << self._random.randrange(8)
         file.write_bytes(content)
-        return f"byte {place} of {file.name} changed"
+        return f"a bit of byte {place} of {file.name} changed"
 
-    def _check_damaged(self, stub: HullServiceStub, acknowledged: dict[str, int], server: Server, where: str) -> None:
+    def _header_bytes(self, file: Path, size: int) -> Iterator[int]:
+        """The places of the database's first header, or of the log's and all its frames'."""
+        if file.suffix != ".db-wal":
+            yield from range(min(100, size))
+            return
+        yield from range(min(32, size))
+        for frame in range(32, size - 24, 24 + PAGE_BYTES):
+            yield from range(frame, frame + 24)
+
+    def _check_damaged(
+        self, stub: HullServiceStub, acknowledged: dict[str, int], server: Server, where: str
+    ) -> dict[str, int]:
+        """It has whole batches, the first so many of each writer; returns how many."""
         last = {}
         for name in acknowledged:
             last[name] = stub.GetProducer(pb.GetProducerRequest(name=HULL, producer=name), timeout=10).last_sequence
@@ -354,6 +454,7 @@ class Torture:
         lost = {name: count for name, count in acknowledged.items() if last[name] < count}
         said = server.said()
         require(not lost or "lost" in said, f"{where}: of batches {acknowledged} there are {last}, and nothing is said")
+        return last
 
     def _settle(self) -> None:
         """Everything sent is acknowledged, and nobody writes."""
@@ -422,7 +523,7 @@ class Torture:
 def torture(folder: Path, faults: int, seed: int, writers: int = 3) -> str:
     """Run so many rounds. Returns the counts; raises BrokenPromiseError with what was broken."""
     run = Torture(folder, seed, writers)
-    kinds = ["kill"] * 5 + ["pause", "sever", "damage", "sever", "full_disk"]
+    kinds = ["kill", "kill", "descriptors", "damage", "kill", "full_disk", "pause", "copy", "kill", "sever"]
     try:
         for i in range(faults):
             run.round(kinds[i % len(kinds)])
@@ -435,7 +536,8 @@ def torture(folder: Path, faults: int, seed: int, writers: int = 3) -> str:
         f"faults: {kinds_seen}; batches acknowledged: {acknowledged}, lost: 0, doubled: 0; "
         f"reads: {sum(reader.reads for reader in run.readers)}, revisions back: 0; "
         f"watch events after a resume: {sum(watcher.resumed for watcher in run.watchers)}; "
-        f"with a byte changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
+        f"calls left: {sum(leaver.left for leaver in run.leavers)}; "
+        f"with a bit changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
     )
 
 

@@ -1,72 +1,205 @@
-"""Copies of a journal, and looks into one, beside a server that may be running on it."""
+"""Copies of a data folder, and looks into one, beside a server that may be running on it."""
 
+import os
 import sqlite3
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .errors import JournalDamagedError, JournalError
-from .folder import APPLICATION_ID, DATABASE, FORMAT
-from .journal import NEWEST, HullRow
-from .recovery import Recovered, recover
+from ...state.records import Kept
+from ..port import NEWEST, DamagedError, Progress, StorageError
+from .disk import Access, Disk
+from .examine import Findings, examine, format_of, load
+from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
+from .migration import migrate
+from .reading import read_hull
+from .schema import FORMAT
+from .totals import STOPPED, renew_totals
 
 PAGES_A_STEP = 256
 
-Progress = Callable[[int, int], None]
+
+@dataclass(frozen=True, slots=True)
+class HullReport:
+    """One hull of a folder, in words.
+
+    Attributes:
+        name: its name.
+        summary: what there is of it.
+        problems: what is wrong with it; empty where nothing is.
+    """
+
+    name: str
+    summary: str
+    problems: list[str]
 
 
-def back_up(folder: Path, target: Path, progress: Progress) -> None:
-    """Make a new folder with a consistent copy of a journal, as of one moment.
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A folder, in words.
+
+    Attributes:
+        hulls: in the order of their names.
+        notes: what is lost or damaged, and can be served without.
+        fatal: why it cannot be served; empty where it can.
+    """
+
+    hulls: list[HullReport]
+    notes: list[str]
+    fatal: list[str]
+
+
+def check(path: Path, progress: Progress) -> Report:
+    """Examine everything that a folder holds, and change nothing. A server may be writing to it.
 
     Args:
-        folder: the journal's; a server may be writing to it.
-        target: the new folder.
+        path: a data folder or a backup.
+        progress: called with rows done and rows in all.
+
+    Raises:
+        StorageError: it holds no hulls, or cannot be read at all.
+    """
+    with _opened(path) as opened:
+        findings = examine(opened.connection, opened.version, progress)
+        return _report(findings, opened.notes)
+
+
+def copy(source: Path, target: Path, progress: Progress) -> Report:
+    """Make a folder with all that another holds, its log included, as of one moment. Returns what is in the copy.
+
+    A copy has another name until it is whole and on the disk: half of one is never taken for one.
+
+    Args:
+        source: a data folder or a backup; a server may be writing to it.
+        target: the new folder; it may be there, and empty.
         progress: called with pages done and pages in all.
 
     Raises:
-        JournalError: there is no journal in the folder, or the target is there already.
+        StorageError: there is no database in the source, or something in the target.
+        DamagedError: what was copied is not whole.
     """
-    with _opened(folder) as connection:
+    with _opened(source) as opened:
+        made = _claim(target)
+        unfinished = target / UNFINISHED
         try:
-            target.mkdir(parents=True)
-        except FileExistsError:
-            raise JournalError(f"{target} is there already: name a folder that is not") from None
-        with closing(sqlite3.connect(target / DATABASE)) as copy:
-            connection.backup(
-                copy, pages=PAGES_A_STEP, progress=lambda _, remaining, total: progress(total - remaining, total)
-            )
+            with closing(sqlite3.connect(unfinished, isolation_level=None)) as connection:
+                opened.connection.backup(
+                    connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
+                )
+                report = _finish(connection, opened)
+            _make_durable(unfinished)
+        except BaseException as error:
+            for file in target.glob(f"{UNFINISHED}*"):
+                file.unlink()
+            if made:
+                target.rmdir()
+            if isinstance(error, sqlite3.Error):
+                raise StorageError(f"{source} cannot be copied to {target}: {error}") from error
+            raise
+        unfinished.rename(target / DATABASE)
+        _make_durable(target)
+        _make_durable(target.absolute().parent)
+    return report
 
 
-def hulls(folder: Path) -> list[HullRow]:
-    """The hulls of a journal, in the order of their names."""
-    with _opened(folder) as connection:
-        return [
-            HullRow(*row) for row in connection.execute("SELECT id, name, created, config FROM hulls ORDER BY name")
-        ]
-
-
-def look(folder: Path, number: int) -> Recovered:
-    """A hull's newest good snapshot and the batches after it, as of the last commit.
+def read(path: Path, name: str) -> tuple[Kept, list[str]]:
+    """A hull as of the last commit, and what was lost at the end of the log.
 
     Raises:
-        JournalDamagedError: a batch that others follow is damaged.
+        StorageError: there is no such hull.
+        DamagedError: it cannot be read.
     """
-    with _opened(folder) as connection:
-        connection.execute("BEGIN")  # all of it from one moment
-        return recover(connection, number, NEWEST)
+    with _opened(path) as opened:
+        hulls = load(opened.connection, opened.version).hulls.values()
+        hull = next((hull for hull in hulls if hull.row.name == name), None)
+        if hull is None:
+            raise StorageError(f"there is no hull {name!r} in {path}")
+        return read_hull(opened.connection, hull, NEWEST), opened.notes
+
+
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """A database, inside a transaction that reads.
+
+    Attributes:
+        connection: to it.
+        version: its format.
+        notes: what was lost at the end of its log.
+    """
+
+    connection: sqlite3.Connection
+    version: int
+    notes: list[str]
+
+
+def _claim(target: Path) -> bool:
+    """Make the folder for a copy; whether it was not there before."""
+    if not target.exists():
+        target.mkdir(parents=True)
+        return True
+    if (target / UNFINISHED).exists():
+        raise StorageError(f"{target} {UNFINISHED_WORDS}")
+    if any(target.iterdir()):
+        raise StorageError(f"{target} is not empty: name a folder that is, or that is not there yet")
+    return False
+
+
+def _make_durable(path: Path) -> None:
+    """A file's content, or the names in a folder."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 @contextmanager
-def _opened(folder: Path) -> Iterator[sqlite3.Connection]:
-    database = folder / DATABASE
-    if not database.exists():
-        raise JournalError(f"{folder} holds no hulls: there is no {DATABASE} in it")
-    with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True, isolation_level=None)) as connection:
+def _opened(path: Path) -> Iterator[_Opened]:
+    folder = Folder(path, Disk())
+    with ExitStack() as stack:
+        notes: list[str] = []
+        # A log that is being written to cannot be examined, and need not be: its server has read it.
+        if stack.enter_context(folder.alone()):
+            notes = folder.check_log()
+        if not folder.disk.size(folder.database):
+            raise StorageError(f"{path} holds no hulls: there is no {DATABASE} in it")
+        # Without a log nothing needs to be written beside the database to read it.
+        access = Access.READ if folder.disk.size(folder.log) else Access.RAW
         try:
-            (application,) = connection.execute("PRAGMA application_id").fetchone()
-            (version,) = connection.execute("PRAGMA user_version").fetchone()
-        except sqlite3.DatabaseError as error:
-            raise JournalDamagedError(f"{database} is no readable database ({error}): restore a backup") from error
-        if application != APPLICATION_ID or version > FORMAT:
-            raise JournalError(f"{database} was written by another program, or by a newer dynhull")
-        yield connection
+            connection = stack.enter_context(closing(folder.connect(access)))
+            connection.execute("BEGIN")
+            version = format_of(connection, folder.database)
+            if version == 0:
+                raise StorageError(f"{path} holds no hulls")
+            yield _Opened(connection, version, notes)
+        except sqlite3.Error as error:
+            raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
+
+
+def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
+    """Make a folder of today's format that nobody works on out of copied pages, and examine it."""
+    connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("BEGIN IMMEDIATE")
+    findings = examine(connection, opened.version, lambda *_: None)
+    report = _report(findings, opened.notes)
+    if report.fatal:
+        raise DamagedError(f"it is damaged, so it was not copied: {'; '.join(report.fatal)}")
+    findings.ledger.totals = replace(findings.ledger.totals, mode=STOPPED)
+    if opened.version < FORMAT:
+        migrate(connection, findings.ledger)
+    else:
+        renew_totals(connection, findings.ledger.totals)
+    connection.execute("COMMIT")
+    return report
+
+
+def _report(findings: Findings, notes: list[str]) -> Report:
+    hulls = sorted(findings.ledger.hulls.values(), key=lambda hull: hull.row.name)
+    reports = []
+    for hull in hulls:
+        summary = f"revision {hull.last}, {len(hull.ids)} rows of batches"
+        if hull.snapshots:
+            summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
+        reports.append(HullReport(hull.row.name, summary, findings.hulls.get(hull.row.number, [])))
+    return Report(reports, notes + findings.notes, findings.fatal)

@@ -1,39 +1,18 @@
-"""Batches as bytes: what one row of the journal holds."""
+"""Rows as bytes, and their checksums."""
 
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Points = npt.NDArray[np.float64]
+from dynhull.arrays import Points
+
+from ...state.records import HullRow, Record
 
 # Inserts, deletes, the batch's number among its producer's, length of the producer's name, whether lenient.
 HEADER = struct.Struct("<IIQHB")
 POINT_BYTES = 16
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One batch, as applied.
-
-    Attributes:
-        revision: the revision that it made.
-        inserts: (n, 2) points inserted.
-        deletes: (m, 2) points deleted.
-        producer: who wrote it; empty for a writer without a name.
-        sequence: the batch's number among the producer's.
-        lenient: whether some of the deletes were passed over, because the point was not there.
-    """
-
-    revision: int
-    inserts: Points
-    deletes: Points
-    producer: str = ""
-    sequence: int = 0
-    lenient: bool = False
 
 
 def encode(records: Iterable[Record]) -> bytes:
@@ -43,7 +22,7 @@ def encode(records: Iterable[Record]) -> bytes:
         producer = record.producer.encode()
         sizes = len(record.inserts), len(record.deletes)
         parts.append(HEADER.pack(*sizes, record.sequence, len(producer), record.lenient))
-        parts += [producer, _bytes(record.inserts), _bytes(record.deletes)]
+        parts += [producer, point_bytes(record.inserts), point_bytes(record.deletes)]
     return b"".join(parts)
 
 
@@ -60,7 +39,7 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
         if end > len(payload):
             raise ValueError(f"a record is cut at byte {position}")
         producer = payload[position + HEADER.size : start].decode()
-        inserted, deleted = _points(payload[start:middle]), _points(payload[middle:end])
+        inserted, deleted = points_from(payload[start:middle]), points_from(payload[middle:end])
         yield Record(revision, inserted, deleted, producer, sequence, bool(lenient))
         position, revision = end, revision + 1
 
@@ -70,9 +49,22 @@ def checksum(payload: bytes, *keys: int) -> int:
     return zlib.crc32(struct.pack(f"<{len(keys)}q", *keys), zlib.crc32(payload))
 
 
-def _bytes(points: Points) -> bytes:
+def weight(stored: int, *keys: int) -> int:
+    """What a row of batches adds to the sum of all: of its checksum and of where it belongs, whatever its payload."""
+    return checksum(b"", *keys, stored)
+
+
+def hull_checksum(row: HullRow) -> int:
+    """CRC-32 of a hull's row."""
+    text = f"{row.name}\n{row.uid}".encode()
+    return checksum(text + struct.pack("<d", row.created), row.number, row.max_points)
+
+
+def point_bytes(points: Points) -> bytes:
+    """(n, 2) points as 16 n bytes."""
     return np.ascontiguousarray(points, dtype="<f8").tobytes()
 
 
-def _points(data: bytes) -> Points:
+def points_from(data: bytes) -> Points:
+    """The points of `point_bytes`."""
     return np.frombuffer(data, dtype="<f8").reshape(-1, 2).astype(np.float64, copy=False)

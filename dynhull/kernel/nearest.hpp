@@ -1,0 +1,230 @@
+// Distances, and where lines cross: the double nearest to the exact value, of two the even one.
+//
+// Each is computed as a pair of doubles first (Dekker 1971; Joldes, Muller, Popescu 2017), with a bound on the error.
+// Where both ends of what that leaves open round to one double, that is it (Ziv 1991). Otherwise exact signs say
+// between which of the points halfway between two doubles the value lies.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+
+#include "predicates.hpp"
+
+namespace dynhull {
+
+// An unevaluated sum: `low` is at most half a unit in the last place of `high`.
+struct Pair {
+  double high, low;
+  Pair operator-() const { return {-high, -low}; }
+};
+
+// An operation on pairs is off by 2^-102 of its result at most, and so is a difference of coordinates by nothing; a
+// value here has less than 2^4 operations. The rest is for the roundings of the bound itself.
+constexpr double PAIR_ERROR = 0x1p-96;
+
+// Whether a bound relative to something of this size holds: no part of the value overflows, and what underflows is
+// far below the bound.
+inline bool safe(double size) { return size > 0x1p-500 && size < 0x1p500; }
+
+inline Pair fast_sum(double large, double small) {
+  const double high = large + small;
+  return {high, small - (high - large)};
+}
+inline Pair sum(double a, double b) {
+  const double high = a + b;
+  const double b_part = high - a;
+  return {high, (a - (high - b_part)) + (b - b_part)};
+}
+inline Pair difference(double a, double b) { return sum(a, -b); }
+inline Pair sum(Pair a, Pair b) {
+  const Pair high = sum(a.high, b.high), low = sum(a.low, b.low);
+  const Pair both = fast_sum(high.high, high.low + low.high);
+  return fast_sum(both.high, low.low + both.low);
+}
+inline Pair product(Pair a, Pair b) {
+  const double high = a.high * b.high;
+  return fast_sum(high, std::fma(a.high, b.high, -high) + (a.high * b.low + a.low * b.high));
+}
+inline Pair quotient(Pair a, Pair b) {
+  const double high = a.high / b.high;
+  return fast_sum(high, (std::fma(-high, b.high, a.high) + (a.low - high * b.low)) / b.high);
+}
+inline Pair root(Pair square) {
+  const double high = std::sqrt(square.high);
+  return fast_sum(high, (std::fma(-high, high, square.high) + square.low) / (2 * high));
+}
+
+// The double nearest to a value that is off by an error at most, where that is beyond doubt.
+inline std::optional<double> rounded(Pair value, double error) {
+  const double least = value.high + (value.low - error), most = value.high + (value.low + error);
+  return least == most ? std::optional(least) : std::nullopt;
+}
+
+// The double nearest to a value > 0, or infinity. `compare(r, ulp)` is the sign of the value minus r + ulp / 2; the
+// guess may be any number that is not negative, and is looked at first.
+template <class Compare>
+double nearest_double(double guess, Compare compare) {
+  constexpr std::uint64_t INFINITE_BITS = std::uint64_t{0x7ff} << 52;  // doubles > 0 are in the order of their bits
+  const auto reached = [&](std::uint64_t bits) {
+    if (bits == INFINITE_BITS) return true;
+    const int exponent = std::max(static_cast<int>(bits >> 52), 1);
+    const int sign = compare(std::bit_cast<double>(bits), std::ldexp(1.0, exponent - 1 - 1074));
+    return sign < 0 || (sign == 0 && bits % 2 == 0);
+  };
+  std::uint64_t least = 0, most = std::bit_cast<std::uint64_t>(guess);
+  std::uint64_t step = 1;
+  for (; !reached(most); step *= 2) {
+    least = most + 1;
+    most = std::min(most + step, INFINITE_BITS);
+  }
+  for (step = 1; least < most;) {
+    const std::uint64_t middle = std::max(least + (most - least) / 2, most - std::min(most, step));
+    if (reached(middle)) {
+      most = middle;
+      step *= 2;
+    } else {
+      least = middle + 1;
+    }
+  }
+  return std::bit_cast<double>(most);
+}
+
+inline std::array<Term, 6> squared_length_terms(Point a, Point b) {
+  return {{{1, a.x, a.x}, {-2, a.x, b.x}, {1, b.x, b.x}, {1, a.y, a.y}, {-2, a.y, b.y}, {1, b.y, b.y}}};
+}
+
+template <std::size_t COUNT>
+ExactSum<2> exact_sum(const std::array<Term, COUNT>& terms) {
+  ExactSum<2> sum;
+  for (const Term& term : terms) sum.add(term.weight, {term.first, term.second});
+  return sum;
+}
+
+// Of a value >= 0.
+inline Scaled root(Scaled square) {
+  if (square.exponent % 2 != 0) return {std::sqrt(2 * square.mantissa), (square.exponent - 1) / 2};
+  return {std::sqrt(square.mantissa), square.exponent / 2};
+}
+
+[[gnu::noinline, gnu::cold]] inline double distance_exact(Point p, Point q) {
+  const auto square = squared_length_terms(p, q);
+  const Scaled guess = root(exact_sum(square).approximate());
+  return nearest_double(std::ldexp(guess.mantissa, guess.exponent), [&](double r, double ulp) {
+    ExactSum<2> sum;  // 4 square - (2 r + ulp)^2
+    for (const Term& term : square) sum.add(4 * term.weight, {term.first, term.second});
+    sum.add(-4, {r, r});
+    sum.add(-4, {r, ulp});
+    sum.add(-1, {ulp, ulp});
+    return sum.sign();
+  });
+}
+
+inline Pair squared_length(Point a, Point b) {
+  const Pair x = difference(b.x, a.x), y = difference(b.y, a.y);
+  return sum(product(x, x), product(y, y));
+}
+
+// Of two different points.
+inline double distance(Point p, Point q) {
+  const Pair square = squared_length(p, q);
+  if (safe(square.high)) {
+    const Pair length = root(square);
+    if (const auto result = rounded(length, PAIR_ERROR * length.high)) return *result;
+  }
+  return distance_exact(p, q);
+}
+
+// Twice the area of a triangle, and what its error is relative to: the two products where their factors are rounded,
+// otherwise the area, for then no digits cancel but exact ones.
+struct Triangle {
+  Pair doubled;
+  double size;
+
+  Triangle(Point a, Point b, Point c) {
+    const Pair ux = difference(b.x, a.x), uy = difference(b.y, a.y);
+    const Pair vx = difference(c.x, a.x), vy = difference(c.y, a.y);
+    const Pair left = product(ux, vy), right = product(uy, vx);
+    doubled = sum(left, -right);
+    const bool exact = (ux.low == 0) & (uy.low == 0) & (vx.low == 0) & (vy.low == 0);
+    size = exact ? std::abs(doubled.high) : std::abs(left.high) + std::abs(right.high);
+  }
+};
+
+[[gnu::noinline, gnu::cold]] inline double distance_to_line_exact(Point p, Point a, Point b) {
+  const auto area = triangle_terms(a, b, p);
+  const auto square = squared_length_terms(a, b);
+  const Scaled height = exact_sum(area).approximate(), length = root(exact_sum(square).approximate());
+  const double guess = std::ldexp(std::abs(height.mantissa) / length.mantissa, height.exponent - length.exponent);
+  return nearest_double(guess, [&](double r, double ulp) {
+    ExactSum<4> sum;  // 4 area^2 - (2 r + ulp)^2 square
+    for (const Term& s : area)
+      for (const Term& t : area) sum.add(4 * s.weight * t.weight, {s.first, s.second, t.first, t.second});
+    for (const Term& term : square) {
+      sum.add(-4 * term.weight, {term.first, term.second, r, r});
+      sum.add(-4 * term.weight, {term.first, term.second, r, ulp});
+      sum.add(-1 * term.weight, {term.first, term.second, ulp, ulp});
+    }
+    return sum.sign();
+  });
+}
+
+// From p, not on the line, to the line through a and b.
+inline double distance_to_line(Point p, Point a, Point b) {
+  const Triangle triangle(a, b, p);
+  const Pair square = squared_length(a, b);
+  if (safe(triangle.size) && safe(square.high)) {
+    const Pair length = root(square);
+    const Pair height = quotient(triangle.doubled.high < 0 ? -triangle.doubled : triangle.doubled, length);
+    if (const auto result = rounded(height, PAIR_ERROR * (triangle.size / length.high))) return *result;
+  }
+  return distance_to_line_exact(p, a, b);
+}
+
+// One coordinate of where the line through p and q crosses the segment from a to b, whose ends have it at `from` and at
+// `to`: (to at_a - from at_b) / (at_a - at_b), at_a and at_b the areas of the triangles of the line with a and with b.
+[[gnu::noinline, gnu::cold]] inline double meet_exact(Point p, Point q, Point a, Point b, double from, double to) {
+  const auto at_a = triangle_terms(p, q, a), at_b = triangle_terms(p, q, b);
+  const auto add = [&](ExactSum<3>& sum, int weight, double value, double other) {  // weight (value at_a - other at_b)
+    for (const Term& term : at_a) sum.add(+weight * term.weight, {term.first, term.second, value});
+    for (const Term& term : at_b) sum.add(-weight * term.weight, {term.first, term.second, other});
+  };
+  ExactSum<3> above;
+  ExactSum<2> below;
+  add(above, 1, to, from);
+  for (const Term& term : at_a) below.add(+term.weight, {term.first, term.second});
+  for (const Term& term : at_b) below.add(-term.weight, {term.first, term.second});
+  if (above.sign() == 0) return 0;
+  if (above.sign() != below.sign()) return -meet_exact(p, q, a, b, -from, -to);
+  const Scaled numerator = above.approximate(), denominator = below.approximate();
+  const double guess = std::ldexp(numerator.mantissa / denominator.mantissa, numerator.exponent - denominator.exponent);
+  return nearest_double(guess, [&](double r, double ulp) {
+    ExactSum<3> sum;  // 2 above - (2 r + ulp) below
+    add(sum, +2, to, from);
+    add(sum, -2, r, r);
+    add(sum, -1, ulp, ulp);
+    return below.sign() * sum.sign();
+  });
+}
+
+// Where the line through p and q crosses the segment from a to b, which lie on different sides of it.
+inline Point meet(Point p, Point q, Point a, Point b) {
+  const Triangle at_a(p, q, a), at_b(p, q, b);
+  const double size = at_a.size + at_b.size;
+  const Pair whole = sum(at_a.doubled, -at_b.doubled);
+  const Pair share = quotient(at_a.doubled, whole);
+  const double doubt = size / std::abs(whole.high);  // of the share, as a multiple of PAIR_ERROR; 1 at least
+  const auto coordinate = [&](double Point::* axis) {
+    const double from = a.*axis, to = b.*axis;
+    if (from == to) return from;
+    if (p.*axis == q.*axis) return p.*axis;
+    const Pair way = difference(to, from);
+    const Pair value = sum({from, 0}, product(share, way));
+    const double bound = std::abs(way.high) * doubt + std::abs(value.high);
+    if (safe(size) && safe(bound))
+      if (const auto result = rounded(value, PAIR_ERROR * bound)) return *result;
+    return meet_exact(p, q, a, b, from, to);
+  };
+  return {coordinate(&Point::x), coordinate(&Point::y)};
+}
+
+}  // namespace dynhull

@@ -1,0 +1,363 @@
+"""Drives the core: hands in requests and what became of effects, one at a time, and carries the effects out."""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, assert_never
+
+from ..state.batch import Applied
+from ..state.core import Core
+from ..state.events import (
+    Birth,
+    Commit,
+    Committed,
+    Compute,
+    Computed,
+    CreateHull,
+    DeleteHull,
+    Effect,
+    Event,
+    Examine,
+    Examined,
+    Failed,
+    Gone,
+    Moved,
+    NotExamined,
+    Request,
+    Retried,
+    Retry,
+    Stopping,
+    Tick,
+    Told,
+    WriteBatch,
+)
+from ..state.hull import Hull
+from ..state.hull_state import HullState, Write
+from ..state.limits import Limits
+from ..state.trip import Trip
+from ..storage.port import Contents, Progress, Storage
+from .batch_stream import BatchStream
+from .group_commit import GroupCommit
+from .housekeeping import Housekeeping
+from .live_hull import LiveHull
+from .recalls import Recalls
+from .supervisor import Supervisor
+from .threads import Machine, Pool
+from .waiter import Waiter
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+# Threads for batches and reads in a hull's turn, for large reads beside the turns, and for the disk.
+TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
+# Seconds between two looks at the clock: producers are forgotten after a day.
+TICK = 1.0
+
+log = logging.getLogger(__name__)
+
+
+class Engine:
+    """Named hulls, in memory and in a storage. To be used on one event loop.
+
+    Args:
+        limits: on the state.
+        storage: where hulls are kept.
+        supervisor: hears of everything that fails in the background.
+        machine: time, threads and random names.
+    """
+
+    def __init__(self, limits: Limits, storage: Storage, supervisor: Supervisor, machine: Machine) -> None:
+        self._limits = limits
+        self._storage = storage
+        self._supervisor = supervisor
+        self._machine = machine
+        self._core = Core(limits)
+        self._live: dict[Hull, LiveHull] = {}
+        self._events: deque[Event] = deque()
+        self._stepping = False
+        self._idle: asyncio.Event | None = None
+        self._started = False
+
+    # Beginning and end
+
+    async def start(self, progress: Progress) -> list[str]:
+        """Take up the hulls of the storage. Returns what was lost or repaired there, in words.
+
+        Args:
+            progress: called with what has been read and what there is to read.
+
+        Raises:
+            StorageError: the storage cannot be used.
+        """
+        self._loop = asyncio.get_running_loop()
+        clock, threads = self._machine.clock, self._machine.threads
+        self._turns, self.reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
+        self.disk = threads.pool("disk", DISK_THREADS)
+        contents: Contents = await self.run(self.disk, partial(self._storage.open, progress))
+        self._core = Core(self._limits, contents.next_number, clock.monotonic(), immediate=self._storage.immediate)
+        progress(0, len(contents.hulls))
+        for done, row in enumerate(contents.hulls, start=1):
+            kept = await self.run(self.disk, partial(self._storage.read, row.number))
+            load = partial(HullState, self._limits, row.max_points, kept, now=clock.monotonic())
+            state = await self.run(self._turns, load)
+            unsaved = sum(len(record.inserts) + len(record.deletes) for record in kept.records)
+            self._core.restore(row, state, unsaved)
+            progress(done, len(contents.hulls))
+        self._commits = GroupCommit(
+            self._storage,
+            threads,
+            lambda error: self._from_thread(partial(self._commit_reported, error)),
+            lambda error: self._from_thread(partial(self._supervisor.died, "commits", error)),
+        )
+        self._recalls = Recalls(self._storage, partial(self.run, self.disk))
+        self._started = True
+        self._supervisor.every(TICK, "clock", self._tick)
+        return contents.notes
+
+    def keep_house(self, snapshot_points: int, sync_seconds: float | None) -> None:
+        """Begin the background work on the storage.
+
+        Args:
+            snapshot_points: how many points in batches make a snapshot due, at least.
+            sync_seconds: how often what was committed is made durable; None where commits themselves are.
+        """
+        house = Housekeeping(self, self._storage, self._machine.clock)
+        self._supervisor.every(house.CHECKPOINT_SECONDS, "checkpoint", house.checkpoint)
+        self._supervisor.every(house.SNAPSHOT_SECONDS, "snapshots", partial(house.snapshots, snapshot_points))
+        self._supervisor.every(house.SWEEP_SECONDS, "sweep", house.sweep)
+        if sync_seconds is not None:
+            self._supervisor.every(sync_seconds, "sync", house.sync)
+
+    async def close(self) -> None:
+        """Finish and commit what is under way, refuse what waits, and let go of the storage."""
+        if not self._started:
+            return
+        self.dispatch(Stopping())
+        self._idle = asyncio.Event()
+        self._notice_idle()
+        await self._idle.wait()
+        # Threads of the pools are joined in a thread of their own: the loop is still needed to end their work.
+        await asyncio.to_thread(self._join)
+
+    def _join(self) -> None:
+        self._commits.close()
+        for pool in (self._turns, self.reads, self.disk):
+            pool.shutdown()
+        self._storage.close()
+
+    # Hulls
+
+    def __len__(self) -> int:
+        return len(self._core.hulls)
+
+    def __iter__(self) -> Iterator[LiveHull]:
+        return iter([self._live_hull(hull) for hull in list(self._core.hulls.values())])
+
+    def get(self, name: str) -> LiveHull:
+        """The hull of that name, or raise HullNotFoundError."""
+        return self._live_hull(self._core.get(name))
+
+    def has(self, name: str) -> bool:
+        """Whether there is a hull of that name."""
+        return name in self._core.hulls
+
+    def page(self, prefixes: Sequence[str], after: str, size: int) -> tuple[list[LiveHull], bool]:
+        """At most `size` hulls whose names follow `after`, and whether there are more.
+
+        The names begin with one of the prefixes, which are sorted and none of which begins with another.
+        """
+        hulls: list[LiveHull] = []
+        for prefix in prefixes:
+            for name in self._core.hulls.irange(minimum=max(prefix, after)):
+                if not name.startswith(prefix):
+                    break
+                if name == after:
+                    continue
+                if len(hulls) == size:
+                    return hulls, True
+                hulls.append(self.get(name))
+        return hulls, False
+
+    async def create(self, name: str, max_points: int = 0) -> LiveHull:
+        """Make an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
+        hull: Hull = await self.ask(CreateHull(Waiter(), name, self._birth(), max_points))
+        return self._live_hull(hull)
+
+    async def delete(self, name: str) -> None:
+        """Remove the hull of that name, or raise HullNotFoundError or NotStoredError."""
+        await self.ask(DeleteHull(Waiter(), name))
+
+    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
+        """Apply a batch as the next revision of a hull, or raise what refuses it.
+
+        With `create`, a hull that is not there is made for it.
+        """
+        birth = self._birth() if create else None
+        applied: Applied = await self.ask(WriteBatch(Waiter(), name, write, birth, rows=write.rows))
+        return applied
+
+    def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:
+        """For many batches to one hull; `notify` is called when there is news of one.
+
+        Raises:
+            HullNotFoundError: there is no hull of that name, and none is to be created.
+        """
+        hull = self._core.get(name) if self.has(name) or not create else None
+        return BatchStream(self, name, hull, notify, self._birth)
+
+    # The core
+
+    def dispatch(self, event: Event) -> None:
+        """Hand an event to the core, and carry out what it asks for."""
+        if self._stepping:
+            self._events.append(event)
+            return
+        self._stepping = True
+        try:
+            while True:
+                for effect in self._core.step(event):
+                    self._carry_out(effect)
+                if not self._events:
+                    return
+                event = self._events.popleft()
+        except Exception as error:  # the core's own fault: nothing that it holds can be relied on any more
+            self._supervisor.died("core", error)
+            raise
+        finally:
+            self._stepping = False
+
+    async def ask(self, request: Request) -> Any:
+        """The result of a request to a Waiter, or its error. A caller that is cancelled stops waiting, and no more."""
+        waiter: Waiter = request.to
+        self.dispatch(request)
+        if not waiter.told:
+            waiter.future = self._loop.create_future()
+            try:
+                await waiter.future
+            except asyncio.CancelledError:
+                self.dispatch(Gone(request))
+                raise
+        if request.error is not None:
+            raise request.error.with_traceback(None)
+        return request.result
+
+    async def run(self, pool: Pool, function: Callable[[], Any]) -> Any:
+        """What a function returns, called in a pool. A caller that is cancelled stops waiting; the function runs on."""
+        return await asyncio.wrap_future(pool.submit(function))
+
+    def commit(self, changes: list[Any]) -> "asyncio.Future[None]":
+        """Commit steps of a snapshot or sweep among the batches of everybody; the future has what failed."""
+        done: asyncio.Future[None] = self._loop.create_future()
+
+        def tell(error: Exception | None) -> None:
+            if done.done():
+                return
+            if error is None:
+                done.set_result(None)
+            else:
+                done.set_exception(error)
+
+        self._commits.submit(changes, lambda error, _: self._from_thread(partial(tell, error)))
+        return done
+
+    def _carry_out(self, effect: Effect) -> None:
+        match effect:
+            case Told():
+                for request in effect.requests:
+                    request.to.tell(request)
+            case Commit():
+                self._commit(effect.ticket, effect.changes)
+            case Moved():
+                self._move(effect.hull)
+            case Compute():
+                self._compute(effect.ticket)
+            case Examine():
+                self._examine(effect)
+            case Retry():
+                self._supervisor.failed("examination", effect.reason)
+                self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))
+            case _:
+                assert_never(effect)
+        if self._idle is not None:
+            self._notice_idle()
+
+    def _move(self, hull: Hull) -> None:
+        live = self._live.get(hull)
+        if live is not None:
+            live.moved()
+            if hull.ended:
+                del self._live[hull]
+
+    def _commit(self, trip: Trip, changes: list[Any]) -> None:
+        if self._storage.immediate:
+            self._storage.commit(changes)
+            return
+
+        def done(error: Exception | None, unknown: bool) -> None:
+            event = Committed(trip) if error is None else Failed(trip, error, unknown)
+            self._from_thread(partial(self.dispatch, event))
+
+        self._commits.submit(changes, done)
+
+    def _compute(self, trip: Trip) -> None:
+        def ran(_: "Future[None]") -> None:
+            self._from_thread(partial(self.dispatch, Computed(trip)))
+
+        self._turns.submit(trip.run).add_done_callback(ran)
+
+    def _examine(self, effect: Examine) -> None:
+        """Decide what the storage has of the hull, in the committing thread, then read it in another."""
+        if not effect.settle:
+            self._read_for(effect)
+            return
+
+        def settled(error: Exception | None, _: bool) -> None:
+            event = None if error is None else NotExamined(effect.ticket, error)
+            self._from_thread(partial(self._read_for, effect) if event is None else partial(self.dispatch, event))
+
+        self._commits.settle(settled)
+
+    def _read_for(self, effect: Examine) -> None:
+        def examined() -> Event:
+            try:
+                if self._storage.row(effect.number) is None:
+                    return Examined(effect.ticket, None)
+                return Examined(effect.ticket, effect.load(self._storage.read(effect.number)))
+            except Exception as error:  # whatever it is, the hull's turn must not end with it
+                return NotExamined(effect.ticket, error)
+
+        def done(future: "Future[Event]") -> None:
+            self._from_thread(partial(self.dispatch, future.result()))
+
+        self.disk.submit(examined).add_done_callback(done)
+
+    def _from_thread(self, function: Callable[[], None]) -> None:
+        self._loop.call_soon_threadsafe(function)
+
+    def _commit_reported(self, error: BaseException | None) -> None:
+        if error is None:
+            self._supervisor.succeeded("commits")
+            if not any(True for _ in self._core.ill):
+                self._supervisor.succeeded("examination")
+        else:
+            self._supervisor.failed("commits", error)
+
+    def _notice_idle(self) -> None:
+        if self._idle is not None and not self._core.busy:
+            self._idle.set()
+
+    async def _tick(self) -> None:
+        self.dispatch(Tick(self._machine.clock.monotonic()))
+
+    def _birth(self) -> Birth:
+        return Birth(self._machine.token(), self._machine.clock.wall())
+
+    def _live_hull(self, hull: Hull) -> LiveHull:
+        live = self._live.get(hull)
+        if live is None:
+            live = LiveHull(self, hull, self._recalls)
+            if not hull.ended:
+                self._live[hull] = live
+        return live

@@ -1,0 +1,76 @@
+"""Background work on the storage: snapshots, so that a restart replays few batches; checkpoints, syncs and sweeps."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from ..state.errors import HullNotFoundError
+from ..storage.port import Storage
+from .threads import Clock
+
+if TYPE_CHECKING:
+    from .engine import Engine
+    from .live_hull import LiveHull
+
+# The disk is the traffic's: after a step of a snapshot or a sweep there is a rest this many times as long as it took.
+BREATH = 4.0
+
+
+class Housekeeping:
+    """The work; the supervisor calls each part again and again."""
+
+    CHECKPOINT_SECONDS = 0.25
+    SNAPSHOT_SECONDS = 1.0
+    SWEEP_SECONDS = 5.0
+
+    def __init__(self, engine: "Engine", storage: Storage, clock: Clock) -> None:
+        self._engine = engine
+        self._storage = storage
+        self._clock = clock
+
+    async def checkpoint(self) -> None:
+        """Let the storage tidy up."""
+        await self._engine.run(self._engine.disk, self._storage.checkpoint)
+
+    async def sync(self) -> None:
+        """Make durable what was committed."""
+        await self._engine.run(self._engine.disk, self._storage.sync)
+
+    async def sweep(self) -> None:
+        """Drop what deleted hulls have left."""
+        await self._carry_out(self._storage.sweep())
+
+    async def snapshots(self, least_points: int) -> None:
+        """Write a snapshot of every hull that is due, one after the other.
+
+        A hull is due once its batches since the last one hold as many points as it does itself, and at least so many.
+        """
+        failure: Exception | None = None
+        for hull in self._engine:
+            if hull.unsaved < max(least_points, hull.counts.points):
+                continue
+            try:
+                await self._snapshot(hull)
+            except HullNotFoundError:
+                continue
+            except Exception as error:  # the others get theirs all the same
+                failure = failure or error
+        if failure is not None:
+            raise failure
+
+    async def _snapshot(self, hull: "LiveHull") -> None:
+        unsaved = hull.unsaved
+        counts, (points, producers) = await hull.read(
+            lambda state: (state.hull.points(), state.producers()), rows=hull.counts.points
+        )
+        await self._carry_out(self._storage.snapshot(hull.number, counts.revision, points, producers))
+        hull.saved(unsaved)
+
+    async def _carry_out(self, steps: Iterator[Any]) -> None:
+        while True:
+            begun = self._clock.monotonic()
+            step = await self._engine.run(self._engine.disk, partial(next, steps, None))
+            if step is None:
+                return
+            await self._engine.commit([step])
+            await self._clock.sleep(BREATH * (self._clock.monotonic() - begun))

@@ -1,0 +1,115 @@
+"""The seams to the machine: time, threads, and the queue between the event loop and a thread.
+
+Everything in the engine that waits or runs beside the event loop goes through these, so that a test can put simulated
+time and threads in their place.
+"""
+
+import asyncio
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+T = TypeVar("T")
+
+
+class Clock:
+    """Time."""
+
+    def monotonic(self) -> float:
+        """Seconds on a clock that never goes back."""
+        return time.monotonic()
+
+    def wall(self) -> float:
+        """Seconds since 1970."""
+        return time.time()
+
+    async def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        await asyncio.sleep(seconds)
+
+
+class Inbox(Generic[T]):
+    """A queue into a thread, which takes all there is at once."""
+
+    def __init__(self) -> None:
+        self._turn = threading.Condition()
+        self._items: list[T] = []
+        self._closed = False
+
+    def put(self, item: T) -> None:
+        """Add an item; RuntimeError where the inbox is closed."""
+        with self._turn:
+            if self._closed:
+                raise RuntimeError("the inbox is closed")
+            self._items.append(item)
+            self._turn.notify()
+
+    def take(self) -> list[T]:
+        """Wait for items, and take all of them; none once the inbox is closed and empty."""
+        with self._turn:
+            self._turn.wait_for(lambda: self._items or self._closed)
+            items, self._items = self._items, []
+            return items
+
+    def close(self) -> None:
+        """Take no more items."""
+        with self._turn:
+            self._closed = True
+            self._turn.notify()
+
+
+class Pool(Protocol):
+    """Threads that functions run in."""
+
+    def submit(self, function: Callable[[], T], /) -> "Future[T]":
+        """Call the function in one of the threads."""
+
+    def shutdown(self) -> None:
+        """Wait for the functions under way."""
+
+
+class Threads:
+    """Makes threads."""
+
+    def pool(self, name: str, size: int) -> Pool:
+        """A pool of threads, all of them started: later there may be no room for one."""
+        pool = ThreadPoolExecutor(size, thread_name_prefix=name)
+        together = threading.Barrier(size + 1)
+        for _ in range(size):
+            pool.submit(together.wait)
+        together.wait()
+        return pool
+
+    def inbox(self) -> Inbox[T]:
+        """A queue into a thread."""
+        return Inbox()
+
+    def spawn(self, name: str, run: Callable[[], None], died: Callable[[BaseException], None]) -> "threading.Thread":
+        """Start a thread. What it raises goes to `died`, in that thread."""
+
+        def guarded() -> None:
+            try:
+                run()
+            except BaseException as error:
+                died(error)
+
+        thread = threading.Thread(target=guarded, name=name, daemon=True)
+        thread.start()
+        return thread
+
+
+def _token() -> str:
+    return secrets.token_hex(8)
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """All seams together."""
+
+    clock: Clock = field(default_factory=Clock)
+    threads: Threads = field(default_factory=Threads)
+    token: Callable[[], str] = _token

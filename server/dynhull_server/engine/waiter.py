@@ -1,0 +1,24 @@
+"""A caller that waits for one request."""
+
+from typing import TYPE_CHECKING
+
+from ..state.events import Request
+
+if TYPE_CHECKING:
+    import asyncio
+
+
+class Waiter:
+    """A caller that waits for one request."""
+
+    __slots__ = ("future", "told")
+
+    def __init__(self) -> None:
+        self.told = False
+        self.future: asyncio.Future[None] | None = None
+
+    def tell(self, _: Request) -> None:
+        """The request has been answered."""
+        self.told = True
+        if self.future is not None and not self.future.done():
+            self.future.set_result(None)

@@ -1,0 +1,447 @@
+"""The core of the server: names, the queue of each hull, and what becomes of commits. `step(event) -> effects`.
+
+It is synchronous and pure: no threads, clocks or I/O. Whoever drives it hands in one event at a time and carries out
+the effects after the step.
+
+Each name has a queue. What waits in it goes on one *trip* together: the requests run in the order they came, their
+changes are committed at once, and nobody is told anything before that. So whatever comes during a commit shares the
+next one, and no reader sees what could be taken back. A queue has one trip at a time, and the trip belongs to the
+server: a caller that goes away is not told, and nothing else changes.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+from sortedcontainers import SortedDict
+
+from .errors import (
+    DiskFullError,
+    HullNotFoundError,
+    LimitExceededError,
+    NotStoredError,
+    OutcomeUnknownError,
+    StoppingError,
+)
+from .events import (
+    Commit,
+    Committed,
+    Compute,
+    Computed,
+    CreateHull,
+    DeleteHull,
+    Effect,
+    Event,
+    Examine,
+    Examined,
+    Failed,
+    Gone,
+    Moved,
+    NotExamined,
+    ReadHull,
+    Request,
+    Retried,
+    Retry,
+    Stopping,
+    Tick,
+    Told,
+    WriteBatch,
+)
+from .hull import Hull
+from .hull_state import HullState
+from .limits import Limits
+from .records import HullRow
+from .trip import Trip
+
+# Requests for at most this many points together run at once: a tenth of a millisecond.
+SMALL = 128
+# Points that the requests of one trip look at together, at most, unless one request alone looks at more.
+TRIP_ROWS = 2**18
+# Seconds before the storage is examined again, the first time and at most.
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+
+
+class _Queue:
+    """The work of one name.
+
+    Attributes:
+        name: the name.
+        hull: the hull there is, as committed.
+        trip: what is under way.
+        waiting: what is not.
+        ill: why nothing can be done: a commit failed, and the storage cannot be read.
+        pause: seconds before it is read again.
+    """
+
+    __slots__ = ("hull", "ill", "name", "pause", "trip", "waiting")
+
+    def __init__(self, name: str, hull: Hull | None = None) -> None:
+        self.name = name
+        self.hull = hull
+        self.trip: Trip | None = None
+        self.waiting: list[Request] = []
+        self.ill: Exception | None = None
+        self.pause = FIRST_PAUSE
+
+    @property
+    def state(self) -> str:
+        """The state of the name: absent, there, creating, deleting or unknown."""
+        if self.ill is not None or (self.trip is not None and self.trip.failure is not None):
+            return "unknown"
+        if self.trip is None or self.trip.after is self.hull:
+            return "absent" if self.hull is None else "there"
+        return "deleting" if self.trip.after is None else "creating"
+
+
+class Core:
+    """All names of a server.
+
+    Args:
+        limits: on the state.
+        next_number: greater than the number of every hull there has ever been.
+        now: seconds on a clock that never goes back.
+        immediate: whether a Commit is done when it is carried out, and cannot fail: then nothing is said of it.
+    """
+
+    def __init__(self, limits: Limits, next_number: int = 1, now: float = 0.0, *, immediate: bool = False) -> None:
+        self._limits = limits
+        self._immediate = immediate
+        self._next_number = next_number
+        self._now = now
+        self._queues: dict[str, _Queue] = {}
+        self._hulls: SortedDict[str, Hull] = SortedDict()
+        self._creating = 0
+        self._trips = 0
+        self._stopping = False
+        self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
+            WriteBatch: self._asked,
+            ReadHull: self._asked,
+            CreateHull: self._asked,
+            DeleteHull: self._asked,
+            Gone: self._gone,
+            Computed: self._computed,
+            Committed: self._committed,
+            Failed: self._failed,
+            Examined: self._examined,
+            NotExamined: self._not_examined,
+            Retried: self._retried,
+            Tick: self._tick,
+            Stopping: self._stop,
+        }
+
+    def step(self, event: Event) -> list[Effect]:
+        """Take up an event. The effects are to be carried out in their order, before the next step."""
+        effects: list[Effect] = []
+        self._handlers[type(event)](event, effects)
+        return effects
+
+    # What is committed
+
+    @property
+    def hulls(self) -> "SortedDict[str, Hull]":
+        """The hulls by name."""
+        return self._hulls
+
+    def get(self, name: str) -> Hull:
+        """The hull of that name, or raise HullNotFoundError."""
+        hull: Hull | None = self._hulls.get(name)
+        if hull is None:
+            raise HullNotFoundError(name)
+        return hull
+
+    @property
+    def busy(self) -> bool:
+        """Whether any trip is under way."""
+        return self._trips > 0
+
+    @property
+    def ill(self) -> Iterator[tuple[str, Exception]]:
+        """The names about which nothing is known, and why."""
+        return ((queue.name, queue.ill) for queue in self._queues.values() if queue.ill is not None)
+
+    def state_of(self, name: str) -> str:
+        """The state of a name: absent, there, creating, deleting or unknown."""
+        queue = self._queues.get(name)
+        return "absent" if queue is None else queue.state
+
+    def restore(self, row: HullRow, state: HullState, unsaved: int) -> None:
+        """Take up a hull that was kept; before the first step."""
+        hull = self._hulls[row.name] = Hull(row, state, unsaved)
+        self._queues[row.name] = _Queue(row.name, hull)
+
+    # Requests
+
+    def _asked(self, request: CreateHull | DeleteHull | ReadHull | WriteBatch, effects: list[Effect]) -> None:
+        name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
+        queue = self._queues.get(name)
+        if queue is None:
+            queue = self._queues[name] = _Queue(name)
+        if queue.trip is None and not self._stopping and not request.abandoned:
+            if type(request) is ReadHull and request.rows <= SMALL:
+                self._read(queue, request)
+                effects.append(Told([request]))
+            else:
+                self._begin(queue, [request], request.rows, effects)
+            return
+        queue.waiting.append(request)
+        if self._stopping:
+            self._refuse_waiting(queue, StoppingError(), effects)
+        elif queue.ill is not None:
+            self._refuse_waiting(queue, _ill(queue.ill), effects)
+
+    def _read(self, queue: _Queue, request: ReadHull) -> None:
+        """A small read of a hull that nothing is done to needs no trip."""
+        hull = queue.hull
+        if hull is None or hull is not request.hull:
+            request.error = HullNotFoundError(queue.name)
+            self._rest(queue)
+            return
+        try:
+            request.result = hull.counts, request.function(hull.state)
+        except Exception as error:  # whatever it is, it belongs to the caller
+            request.error = error
+
+    def _gone(self, event: Gone, _: list[Effect]) -> None:
+        event.what.leave()
+
+    def _start(self, queue: _Queue, effects: list[Effect]) -> None:
+        """Begin a trip with what waits, if there is anything."""
+        requests, rows = self._take(queue)
+        if requests:
+            self._begin(queue, requests, rows, effects)
+        else:
+            self._rest(queue)
+
+    def _begin(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
+        hull = queue.hull
+        number, refusal = 0, None
+        if hull is None:
+            number, refusal = self._next_number, self._no_more_hulls()
+            self._next_number += 1
+            self._creating += 1
+        trip = queue.trip = Trip(queue.name, hull, requests, number, refusal, self._limits, self._now)
+        self._trips += 1
+        if rows > SMALL:
+            effects.append(Compute(trip))
+            return
+        trip.run()
+        self._ran(queue, trip, effects)
+
+    def _take(self, queue: _Queue) -> tuple[list[Request], int]:
+        """Requests for the next trip: as many as are bounded, and none behind a DeleteHull."""
+        waiting, queue.waiting = queue.waiting, []
+        requests: list[Request] = []
+        rows = 0
+        for i, request in enumerate(waiting):
+            if request.abandoned or (type(request) is WriteBatch and request.stream and request.stream.stopped):
+                continue
+            deletes = type(request) is DeleteHull
+            if requests and (deletes or rows + request.rows > TRIP_ROWS):
+                queue.waiting = waiting[i:]
+                break
+            requests.append(request)
+            rows += request.rows
+            if deletes:
+                queue.waiting = waiting[i + 1 :]
+                break
+        return requests, rows
+
+    def _no_more_hulls(self) -> Exception | None:
+        most = self._limits.max_hulls
+        return LimitExceededError("max_hulls", most) if len(self._hulls) + self._creating >= most else None
+
+    def _computed(self, event: Computed, effects: list[Effect]) -> None:
+        trip = event.ticket
+        self._ran(self._queues[trip.name], trip, effects)
+
+    def _ran(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+        if trip.torn:
+            self._failed(Failed(trip, MemoryError("a batch was applied in part"), unknown=False), effects)
+            return
+        changes = trip.changes()
+        if not changes:
+            self._end(queue, trip, effects)
+            return
+        effects.append(Commit(trip, changes))
+        if self._immediate:
+            self._keep(queue, trip, effects)
+
+    def _end(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+        """The trip is over: tell its callers, and begin the next one."""
+        requests = trip.requests
+        effects.append(Told(requests if len(requests) == 1 and not requests[0].abandoned else _present(requests)))
+        self._over(queue, trip)
+        if queue.waiting or queue.hull is None:
+            self._go_on(queue, effects)
+
+    def _over(self, queue: _Queue, trip: Trip) -> None:
+        queue.trip = None
+        queue.ill = None
+        queue.pause = FIRST_PAUSE
+        self._trips -= 1
+        if trip.before is None:
+            self._creating -= 1
+
+    def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
+        if self._stopping:
+            self._refuse_waiting(queue, StoppingError(), effects)
+        self._start(queue, effects)
+
+    def _rest(self, queue: _Queue) -> None:
+        """Forget the queue of a name without a hull."""
+        if queue.hull is None and queue.trip is None and not queue.waiting:
+            self._queues.pop(queue.name, None)
+
+    # Commits
+
+    def _committed(self, event: Committed, effects: list[Effect]) -> None:
+        self._keep(self._queues[event.ticket.name], event.ticket, effects)
+
+    def _keep(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+        """The changes of the trip are there: everybody may see them."""
+        before, after = trip.before, trip.after
+        queue.hull = after
+        if before is not None and after is None:
+            before.ended = True
+            del self._hulls[queue.name]
+            effects.append(Moved(before))
+        if after is not None:
+            if before is None:
+                self._hulls[queue.name] = after
+            after.counts = after.state.counts
+            after.unsaved += trip.unsaved
+            effects.append(Moved(after))
+        self._end(queue, trip, effects)
+
+    def _failed(self, event: Failed, effects: list[Effect]) -> None:
+        trip = event.ticket
+        trip.failure, trip.unknown = event.error, event.unknown
+        queue = self._queues[trip.name]
+        if event.unknown:
+            self._examine(trip, effects)
+            return
+        self._refuse_changes(trip, _not_stored(event.error), effects)
+        if trip.before is not None and trip.has_records:
+            self._examine(trip, effects)  # the batches are in its state
+        else:
+            self._again(queue, trip, effects)
+
+    def _refuse_changes(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
+        """Refuse the changes of the trip, and stop the streams they come from."""
+        refused: list[Request] = []
+        streams: set[int] = set()
+        for request in trip.requests:
+            if type(request) is ReadHull:
+                continue
+            stream = request.stream if type(request) is WriteBatch else None
+            told_already = stream is not None and id(stream) in streams
+            if not request.abandoned and not told_already:
+                request.result, request.error = None, error
+                refused.append(request)
+            request.abandoned = True
+            if stream is not None:
+                stream.stopped = True
+                streams.add(id(stream))
+        effects.append(Told(refused))
+
+    def _again(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+        """Nothing of the trip was kept: what it read must be read again."""
+        reads = [request for request in trip.requests if type(request) is ReadHull and not request.abandoned]
+        for request in reads:
+            request.result = request.error = None
+        self._over(queue, trip)
+        queue.waiting[:0] = reads
+        self._go_on(queue, effects)
+
+    # What the storage has
+
+    def _examine(self, trip: Trip, effects: list[Effect]) -> None:
+        hull = trip.before or trip.after
+        assert hull is not None  # a trip without a hull changes nothing
+        row = hull.row
+        load = partial(HullState, self._limits, row.max_points, now=self._now)
+        effects.append(Examine(trip, row.number, trip.unknown, load))
+
+    def _examined(self, event: Examined, effects: list[Effect]) -> None:
+        trip, found = event.ticket, event.state
+        queue = self._queues[trip.name]
+        if queue.trip is not trip:  # the server is stopping, and does not wait
+            return
+        if trip.unknown and trip.landed(found):
+            self._keep(queue, trip, effects)
+            return
+        if trip.before is not None:
+            if found is None:
+                self._not_examined(NotExamined(trip, LookupError("the storage does not know the hull")), effects)
+                return
+            trip.before.state = found
+        assert trip.failure is not None  # or it would not have been examined
+        if trip.unknown:
+            self._refuse_changes(trip, _not_stored(trip.failure), effects)
+        self._again(queue, trip, effects)
+
+    def _not_examined(self, event: NotExamined, effects: list[Effect]) -> None:
+        trip = event.ticket
+        queue = self._queues[trip.name]
+        if queue.trip is not trip:
+            return
+        queue.ill = event.error
+        if trip.unknown:
+            self._refuse_changes(trip, OutcomeUnknownError(str(event.error)), effects)
+        reads = [request for request in trip.requests if not request.abandoned]
+        trip.requests = []
+        queue.waiting[:0] = reads
+        if self._stopping:
+            self._abandon(queue, trip, effects)
+            return
+        self._refuse_waiting(queue, _ill(event.error), effects)
+        effects.append(Retry(trip, queue.pause, event.error))
+        queue.pause = min(2 * queue.pause, LONGEST_PAUSE)
+
+    def _retried(self, event: Retried, effects: list[Effect]) -> None:
+        if self._queues[event.ticket.name].trip is event.ticket:
+            self._examine(event.ticket, effects)
+
+    def _refuse_waiting(self, queue: _Queue, error: Exception, effects: list[Effect]) -> None:
+        waiting, queue.waiting = queue.waiting, []
+        refused: list[Request] = []
+        for request in waiting:
+            stream = request.stream if type(request) is WriteBatch else None
+            if request.abandoned or (stream is not None and stream.stopped):
+                continue
+            if stream is not None:
+                stream.stopped = True
+            request.error = error
+            refused.append(request)
+        effects.append(Told(refused))
+
+    # Time and the end
+
+    def _tick(self, event: Tick, _: list[Effect]) -> None:
+        self._now = event.now
+
+    def _stop(self, _: Stopping, effects: list[Effect]) -> None:
+        self._stopping = True
+        for queue in list(self._queues.values()):
+            if queue.ill is not None and queue.trip is not None:
+                self._abandon(queue, queue.trip, effects)
+            else:
+                self._refuse_waiting(queue, StoppingError(), effects)
+
+    def _abandon(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+        """The next start will find out what became of the trip."""
+        self._over(queue, trip)
+        self._refuse_waiting(queue, StoppingError(), effects)
+
+
+def _present(requests: list[Request]) -> list[Request]:
+    return [request for request in requests if not request.abandoned]
+
+
+def _not_stored(error: Exception) -> NotStoredError:
+    full = getattr(error, "full", False)
+    return DiskFullError(str(error)) if full else NotStoredError(str(error))
+
+
+def _ill(error: Exception) -> NotStoredError:
+    return NotStoredError(f"the hull's last commit failed, and the disk cannot be read ({error}): try again later")

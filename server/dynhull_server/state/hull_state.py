@@ -1,0 +1,160 @@
+"""One hull: its points, its revision, its producers, and the vertices that somebody has been told."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynhull import DynamicHull
+from dynhull.arrays import Points
+
+from .batch import Applied, Batch, apply_batch
+from .errors import LimitExceededError, PointMissingError
+from .history import History
+from .limits import Limits
+from .producers import Producers
+from .records import Kept, Record
+
+# Batches are replayed together up to this many points: as a set, which is many times faster.
+REPLAYED_TOGETHER = 65_536
+
+
+@dataclass(slots=True)
+class Write:
+    """A batch to come, of about `rows` points: `make` decodes it and raises what is wrong with it.
+
+    Without a `producer` it is not numbered. `owner` is the caller who answers for the producer.
+    """
+
+    make: Callable[[], Batch]
+    rows: int
+    producer: str = ""
+    sequence: int = 0
+    owner: str = ""
+
+
+@dataclass(slots=True)
+class Counts:
+    """How much a hull holds at a revision; `points` with multiplicity."""
+
+    revision: int
+    points: int
+    distinct: int
+
+
+class HullState:
+    """The points of a hull, and what follows from them.
+
+    Attributes:
+        hull: the points.
+        counts: as of the last batch.
+        torn: whether a batch has been applied in part, because memory ran out in the middle of it.
+    """
+
+    def __init__(self, limits: Limits, max_points: int, kept: Kept, now: float) -> None:
+        self._most_points = min(max_points or limits.max_points, limits.max_points)
+        self.torn = False
+        self.hull = replayed(kept)
+        self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct)
+        self._producers = Producers(limits.max_producers, limits.max_producers_per_caller, _last_sequences(kept), now)
+        self._vertices = self.hull.vertices()
+        self._vertices.setflags(write=False)
+        self._vertices_as_of = self.hull.changes
+        self._changed_at = self.counts.revision
+        self._history = History(limits.history_bytes, self._vertices, self.counts.revision)
+
+    @property
+    def vertex_count(self) -> int:
+        """The number of vertices when somebody last looked."""
+        return len(self._vertices)
+
+    def apply(self, write: Write, now: float) -> tuple[Applied, Record | None]:
+        """Apply a batch as the next revision; what it did, and what to keep: nothing of a duplicate.
+
+        Raises:
+            Exception: what refuses the batch; nothing has changed.
+        """
+        counts = self.counts
+        if write.producer and not self._producers.is_new(write.producer, write.sequence, write.owner, now):
+            return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True), None
+        batch = write.make()
+        if counts.points + batch.growth > self._most_points:
+            raise LimitExceededError("max_points", self._most_points)
+        self.torn = True
+        try:
+            applied = apply_batch(self.hull, batch, counts.revision + 1)
+        except PointMissingError:
+            self.torn = False
+            raise
+        if applied.hull_changed:
+            self._changed_at = applied.revision
+            self._history.changed(applied.revision)
+        if write.producer:
+            self._producers.applied(write.producer, write.sequence, write.owner, now)
+        self.counts = Counts(applied.revision, applied.points, self.hull.distinct)
+        lenient = applied.missing > 0
+        record = Record(applied.revision, batch.inserts, batch.deletes, write.producer, write.sequence, lenient)
+        self.torn = False
+        return applied, record
+
+    def vertices(self) -> Points:
+        """The vertices; the very same array for as long as the hull has not changed."""
+        if self._vertices_as_of != self.hull.changes:
+            self._vertices = self.hull.vertices()
+            self._vertices.setflags(write=False)
+            self._vertices_as_of = self.hull.changes
+            self._history.told(self._changed_at, self._vertices)
+        return self._vertices
+
+    def earlier_vertices(self, revision: int) -> Points | None:
+        """The vertices at an earlier revision, None where nobody was told them; raises RevisionForgottenError."""
+        return self._history.at(revision, self.counts.revision)
+
+    def last_sequence(self, producer: str) -> int:
+        """The last number of a producer that was applied, 0 where there is none."""
+        return self._producers.last(producer)
+
+    def producers(self) -> dict[str, int]:
+        """The last sequence number of each producer."""
+        return self._producers.state()
+
+
+EMPTY = Kept(0, np.empty((0, 2)), {}, [])
+
+
+def replayed(kept: Kept) -> DynamicHull:
+    """The hull that a snapshot and the batches after it make. O(n log n)."""
+    hull = DynamicHull(kept.points)
+    replay(hull, kept.records)
+    return hull
+
+
+def replay(hull: DynamicHull, records: Iterable[Record]) -> None:
+    """Apply batches again, many at a time."""
+    for group in _together(records):
+        inserts = np.concatenate([record.inserts for record in group])
+        deletes = np.concatenate([record.deletes for record in group])
+        ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
+        hull.apply(ops, np.concatenate([inserts, deletes]), missing="ignore" if group[0].lenient else "raise")
+
+
+def _last_sequences(kept: Kept) -> dict[str, int]:
+    last = dict(kept.producers)
+    for record in kept.records:
+        if record.producer:
+            last[record.producer] = record.sequence
+    return last
+
+
+def _together(records: Iterable[Record]) -> Iterable[list[Record]]:
+    """Records that may be applied as one set: none whose deletes depend on what was there at the time."""
+    group: list[Record] = []
+    rows = 0
+    for record in records:
+        if group and (record.lenient or group[-1].lenient or rows >= REPLAYED_TOGETHER):
+            yield group
+            group, rows = [], 0
+        group.append(record)
+        rows += len(record.inserts) + len(record.deletes)
+    if group:
+        yield group

@@ -1,0 +1,170 @@
+"""One trip of a hull's work: requests that run together, and whose changes are committed together."""
+
+from .errors import HullExistsError, HullNotFoundError
+from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch
+from .hull import Hull
+from .hull_state import EMPTY, HullState
+from .limits import Limits
+from .records import Append, Change, Create, Delete, HullRow, Record
+
+
+class Trip:
+    """Runs requests on a hull, in order. The hull as others see it does not change before the trip is committed.
+
+    Args:
+        name: the hull's name.
+        hull: the hull there is of that name.
+        requests: what is to be done.
+        number: for a hull that the trip may make.
+        refusal: why the trip may not make one; None where it may.
+        limits: for its state.
+        now: seconds on a clock that never goes back.
+
+    Attributes:
+        before: the hull before the trip; None where there was none.
+        after: the hull after it.
+        unsaved: points in the batches applied.
+        failure: why it could not be committed.
+        unknown: whether it may have been committed all the same.
+    """
+
+    __slots__ = (
+        "_limits",
+        "_now",
+        "_number",
+        "_records",
+        "_refusal",
+        "after",
+        "before",
+        "failure",
+        "name",
+        "requests",
+        "unknown",
+        "unsaved",
+    )
+
+    def __init__(
+        self,
+        name: str,
+        hull: Hull | None,
+        requests: list[Request],
+        number: int,
+        refusal: Exception | None,
+        limits: Limits,
+        now: float,
+    ) -> None:
+        self.name = name
+        self.before = self.after = hull
+        self.requests = requests
+        self.unsaved = 0
+        self.failure: Exception | None = None
+        self.unknown = False
+        self._number = number
+        self._refusal = refusal
+        self._limits = limits
+        self._now = now
+        self._records: list[Record] = []
+
+    def run(self) -> None:
+        """Do what is requested; results and errors are put into the requests."""
+        for request in self.requests:
+            try:
+                if type(request) is WriteBatch:
+                    self._write(request)
+                else:
+                    request.result = self._do(request)
+            except Exception as error:  # whatever it is, it belongs to the caller
+                request.error = error
+                if type(request) is WriteBatch and request.stream is not None:
+                    request.stream.stopped = True
+                if self.torn:  # what comes after would run on a part of a batch
+                    return
+
+    def changes(self) -> list[Change]:
+        """What has to be kept."""
+        before, after = self.before, self.after
+        if after is before:
+            return [Append(after.row.number, self._records)] if self._records and after is not None else []
+        changes: list[Change] = []
+        if after is not None:
+            changes.append(Create(after.row))
+        if self._records and after is not None:
+            changes.append(Append(after.row.number, self._records))
+        if before is not None and after is None:
+            changes.append(Delete(before.row.number))
+        return changes
+
+    @property
+    def has_records(self) -> bool:
+        """Whether any batch was applied."""
+        return bool(self._records) or self.torn
+
+    @property
+    def torn(self) -> bool:
+        """Whether a batch was applied in part: memory ran out in the middle of it."""
+        return self.after is not None and self.after.state.torn
+
+    def landed(self, found: HullState | None) -> bool:
+        """Whether the trip is committed, given what the storage has of the hull: all changes are kept, or none."""
+        if self.after is None:
+            return found is None
+        return found is not None and found.counts.revision >= self.after.state.counts.revision
+
+    def _do(self, request: Request) -> object:
+        match request:
+            case ReadHull():
+                return self._read(request)
+            case CreateHull():
+                if self.after is not None:
+                    raise HullExistsError(self.name)
+                self.after = self._new_hull(request)
+                return self.after
+            case DeleteHull():
+                if self.after is None:
+                    raise HullNotFoundError(self.name)
+                if self.after is not self.before:
+                    raise AssertionError("a hull is deleted in a trip of its own")
+                self.after = None
+                return None
+        raise AssertionError(f"no request: {request}")
+
+    def _write(self, request: WriteBatch) -> None:
+        stream = request.stream
+        if stream is not None and stream.stopped:
+            request.abandoned = True
+            return
+        hull = self.after
+        if hull is None or (stream is not None and stream.hull is not hull):
+            hull = self._hull_for(request)
+        request.result, record = hull.state.apply(request.write, self._now)
+        self.after = hull
+        if stream is not None:
+            stream.hull = hull
+        if record is not None:
+            self._records.append(record)
+            self.unsaved += len(record.inserts) + len(record.deletes)
+
+    def _hull_for(self, request: WriteBatch) -> Hull:
+        """The hull to write to, a new one where there is none."""
+        if request.stream is not None and request.stream.hull not in (None, self.after):
+            raise HullNotFoundError(self.name)
+        if self.after is not None:
+            return self.after
+        if request.birth is None:
+            raise HullNotFoundError(self.name)
+        return self._new_hull(request)
+
+    def _read(self, request: ReadHull) -> object:
+        hull = self.after
+        if hull is None or request.hull is not hull:
+            raise HullNotFoundError(self.name)
+        return hull.state.counts, request.function(hull.state)
+
+    def _new_hull(self, request: CreateHull | WriteBatch) -> Hull:
+        if self._refusal is not None:
+            raise self._refusal
+        birth = request.birth
+        assert birth is not None
+        most = request.max_points if type(request) is CreateHull else 0
+        row = HullRow(self._number, self.name, birth.uid, birth.created, most)
+        return Hull(row, HullState(self._limits, most, EMPTY, self._now))

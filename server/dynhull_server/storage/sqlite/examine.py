@@ -1,0 +1,340 @@
+"""Is everything there, and as it was written? And where does it lie?"""
+
+import json
+import sqlite3
+import struct
+from array import array
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...state.records import HullRow
+from ..port import DamagedError, FormatError, Progress
+from .encoding import checksum, hull_checksum, weight
+from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
+from .schema import APPLICATION_ID, FORMAT, PAGE_BYTES, SCHEMAS, found
+from .totals import Totals, read_totals
+
+MOST_MESSAGES = 5  # of SQLite's own, about one database
+PROGRESS_ROWS = 1000
+
+MISSING = 0  # no row has this number
+
+
+@dataclass(slots=True)
+class Findings:
+    """What an examination has found.
+
+    Attributes:
+        ledger: what is there.
+        fatal: what is lost for certain or perhaps, and cannot be told batch by batch.
+        notes: what is lost or repaired, in words that name it.
+        hulls: both, of each hull by its number.
+        repairs: what makes the database whole again.
+        both_totals: whether both copies of the totals are whole.
+    """
+
+    ledger: Ledger = field(default_factory=Ledger)
+    fatal: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    hulls: dict[int, list[str]] = field(default_factory=dict)
+    repairs: list[AnyStep] = field(default_factory=list)
+    both_totals: bool = True
+
+    def blame(self, hull: HullRows, text: str, *, fatal: bool) -> None:
+        """Something is wrong with a hull."""
+        self.hulls.setdefault(hull.row.number, []).append(text)
+        (self.fatal if fatal else self.notes).append(f"hull {hull.row.name!r}: {text}")
+
+
+@dataclass(slots=True)
+class _Scanned:
+    """One hull's rows, as they come."""
+
+    rows: HullRows
+    lasts: "array[int]" = field(default_factory=lambda: array("q"))
+    gaps: bool = False
+    damaged: dict[int, int] = field(default_factory=dict)  # weights by first revision
+    snapshots: dict[int, Snapshot] = field(default_factory=dict)
+
+
+def format_of(connection: sqlite3.Connection, database: Path) -> int:
+    """The format of a database, 0 where it is empty.
+
+    Raises:
+        FormatError: it is another program's, or a newer version's.
+    """
+    application, version, tables = found(connection)
+    if not tables and application == version == 0:
+        return 0
+    if application != APPLICATION_ID:
+        raise FormatError(f"{database} is the database of another program: choose another folder")
+    if version not in SCHEMAS:
+        raise FormatError(
+            f"{database} has format {version}, this server knows formats 1 to {FORMAT}: run the newer version of "
+            "dynhull that wrote it"
+        )
+    return version
+
+
+def examine(connection: sqlite3.Connection, version: int, progress: Progress) -> Findings:
+    """Compare everything that a database holds with what its checksums and totals say.
+
+    Args:
+        connection: inside a transaction, so that all is of one moment.
+        version: its format.
+        progress: called with rows done and rows in all.
+    """
+    findings = Findings()
+    try:
+        if found(connection)[2] != SCHEMAS[version]:
+            findings.fatal.append("the tables are not those of this format")
+            return findings
+        _check_structure(connection, version, findings)
+        _Examination(connection, version, findings, progress).run()
+    except sqlite3.Error as error:
+        findings.fatal.append(f"a part of the database cannot be read ({error})")
+    return findings
+
+
+def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
+    """Where everything lies, of a database that was whole when it was opened.
+
+    Raises:
+        DamagedError: it is not whole any more.
+    """
+    findings = Findings()
+    _Examination(connection, version, findings, lambda *_: None, contents=False).run()
+    if findings.fatal:
+        raise DamagedError("; ".join(findings.fatal))
+    return findings.ledger
+
+
+def _check_structure(connection: sqlite3.Connection, version: int, findings: Findings) -> None:
+    """Whether every page has one use, and is in order: SQLite looks at pages and cells."""
+    settings = {"page_size": PAGE_BYTES, "auto_vacuum": 0, "encoding": "UTF-8"}
+    for name, expected in settings.items():
+        if connection.execute(f"PRAGMA {name}").fetchone() != (expected,):
+            findings.fatal.append(f"the database's header is damaged ({name})")
+    # Format 1 reads by its indexes, so they have to agree with the tables.
+    check = "quick_check" if version == FORMAT else "integrity_check"
+    messages = [text for (text,) in connection.execute(f"PRAGMA {check}({MOST_MESSAGES})")]
+    if messages != ["ok"]:
+        findings.fatal.append("; ".join(" ".join(text.split()) for text in messages))
+
+
+class _Examination:
+    """Reads every row. Without `contents` payloads and points are left out, and believed."""
+
+    def __init__(
+        self,
+        connection: sqlite3.Connection,
+        version: int,
+        findings: Findings,
+        progress: Progress,
+        *,
+        contents: bool = True,
+    ) -> None:
+        self._contents = contents
+        self._connection = connection
+        self._version = version
+        self._findings = findings
+        self._ledger = findings.ledger
+        self._hulls: dict[int, _Scanned] = {}
+        self._progress = progress
+        self._done = self._all = 0
+        self._newest_snapshot = MISSING
+        self._next_number = 1
+
+    def run(self) -> None:
+        """Read everything once."""
+        totals = self._totals()
+        for row in self._hull_rows():
+            rows = self._ledger.hulls[row.number] = HullRows(row, hull_checksum(row))
+            self._hulls[row.number] = _Scanned(rows)
+        self._snapshots()
+        self._chunks()
+        self._batches()
+        self._compare(totals)
+        for scanned in self._hulls.values():
+            self._judge(scanned)
+
+    def _totals(self) -> Totals | None:
+        (batches,) = self._connection.execute("SELECT count(*) FROM batches").fetchone()
+        (chunks,) = self._connection.execute("SELECT count(*) FROM chunks").fetchone()
+        self._all = batches + chunks
+        self._progress(0, self._all)
+        if self._version < FORMAT:
+            return None
+        totals, self._findings.both_totals = read_totals(self._connection)
+        if totals is None:
+            self._findings.fatal.append(
+                "both copies of the totals are damaged, so that missing batches would go unseen"
+            )
+        elif not self._findings.both_totals:
+            self._findings.notes.append("one of the two copies of the totals was damaged: made anew from the other")
+        return totals
+
+    def _hull_rows(self) -> Iterator[HullRow]:
+        for row, whole in hull_rows(self._connection, self._version):
+            if not whole:
+                self._findings.fatal.append(f"the row of hull {row.number}, {row.name!r}, is damaged")
+            yield row
+
+    def _snapshots(self) -> None:
+        query = "SELECT id, hull, revision, chunks, state, checksum FROM snapshots ORDER BY id"
+        for id, number, revision, chunks, state, stored in self._connection.execute(query):
+            self._newest_snapshot = id
+            scanned = self._hulls.get(number)
+            if scanned is None:
+                self._ledger.dead["snapshots"].append(id)
+            elif _matches(stored, state, id, number, revision, chunks):
+                scanned.snapshots[id] = Snapshot(id, revision, array("q", [MISSING]) * chunks)
+            else:
+                scanned.rows.snapshots.append(Snapshot(id, revision if isinstance(revision, int) else 0))
+
+    def _chunks(self) -> None:
+        """Fill in where the snapshots' chunks lie."""
+        places = {id: snapshot.chunks for each in self._hulls.values() for id, snapshot in each.snapshots.items()}
+        column = "points" if self._contents else "NULL"
+        query = f"SELECT rowid, snapshot, number, checksum, {column} FROM chunks ORDER BY rowid"  # noqa: S608  (ours)
+        newest = MISSING
+        for id, snapshot, number, stored, data in self._counted(query):
+            newest = id
+            place = places.get(snapshot)
+            if place is None:
+                self._ledger.dead["chunks"].append(id)
+            elif not self._contents or _matches(stored, data, snapshot, number):
+                place[number] = id
+            if isinstance(snapshot, int):
+                self._newest_snapshot = max(self._newest_snapshot, snapshot)
+        self._ledger.chunk_ids = count(newest + 1)
+        self._ledger.snapshot_ids = count(self._newest_snapshot + 1)
+
+    def _batches(self) -> None:
+        column = "payload" if self._contents else "NULL"
+        query = f"SELECT rowid, hull, first, last, checksum, {column} FROM batches ORDER BY rowid"  # noqa: S608  (ours)
+        newest = MISSING
+        hulls, dead = self._hulls, self._ledger.dead["batches"]
+        for id, number, first, last, stored, payload in self._counted(query):
+            newest = id
+            scanned = hulls.get(number)
+            if scanned is None:
+                dead.append(id)
+                if isinstance(number, int):
+                    self._next_number = max(self._next_number, number + 1)
+                continue
+            try:
+                whole = not self._contents or checksum(payload, number, first, last) == stored
+                each = weight(stored, number, first, last)
+            except (TypeError, struct.error):
+                self._findings.fatal.append(f"a row of batches of hull {scanned.rows.row.name!r} is damaged")
+                continue
+            scanned.gaps |= first != scanned.rows.last + 1 and len(scanned.lasts) > 0
+            scanned.rows.append(first, last, id, each)
+            scanned.lasts.append(last)
+            if not whole:
+                scanned.damaged[first] = each
+        self._ledger.batch_ids = count(newest + 1)
+
+    def _counted(self, query: str) -> Iterator[tuple[Any, ...]]:
+        for row in self._connection.execute(query):
+            yield row
+            self._done += 1
+            if self._done % PROGRESS_ROWS == 0:
+                self._progress(self._done, self._all)
+
+    def _compare(self, totals: Totals | None) -> None:
+        """What there is with what there must be."""
+        hulls = self._ledger.hulls.values()
+        there = Totals(next_number=max([self._next_number, *(number + 1 for number in self._ledger.hulls)]))
+        there = there.plus(len(hulls), sum(len(hull.ids) for hull in hulls), sum(hull.sum for hull in hulls))
+        self._ledger.totals = totals or there
+        if totals is not None and (totals.hulls, totals.batches, totals.sum) != (there.hulls, there.batches, there.sum):
+            self._findings.fatal.append(
+                f"there must be {totals.hulls} hulls with {totals.batches} rows of batches, and there are {there.hulls} "
+                f"with {there.batches}, or others: rows are missing, or log and database do not belong together"
+            )
+        names = Counter(hull.row.name for hull in hulls)
+        self._findings.fatal += [f"{times} hulls are named {name!r}" for name, times in names.items() if times > 1]
+
+    def _judge(self, scanned: _Scanned) -> None:
+        """Can the hull's newest revision be read?"""
+        hull = scanned.rows
+        base = self._judge_snapshots(scanned)
+        if not (scanned.gaps or scanned.damaged) and (not hull.firsts or hull.firsts[0] <= base + 1):
+            hull.last = max(base, hull.last)
+            return
+        order = np.argsort(hull.firsts, kind="stable")
+        firsts, lasts, ids = (np.array(column, np.int64)[order] for column in (hull.firsts, scanned.lasts, hull.ids))
+        hull.firsts, hull.ids = array("q", firsts.tobytes()), array("q", ids.tobytes())
+        hull.last = max(base, int(lasts[-1]) if len(lasts) else 0)
+        needed = int(np.searchsorted(lasts, base, side="right"))
+        expected = np.append(base, lasts)[:-1] + 1
+        if needed < len(firsts) and firsts[needed] > base + 1:
+            self._findings.blame(hull, f"revisions {base + 1} to {firsts[needed] - 1} are missing", fatal=True)
+        for row in np.flatnonzero(firsts[1:] != expected[1:]) + 1:
+            text = f"revisions {expected[row]} to {firsts[row] - 1} are missing"
+            if firsts[row] < expected[row]:
+                text = f"revisions {firsts[row]} to {lasts[row - 1]} are there twice"
+            if row > needed:
+                self._findings.blame(hull, text, fatal=True)
+            else:
+                self._findings.blame(hull, f"{text}, which only looking back needs", fatal=False)
+        for row, first in enumerate(firsts.tolist()):
+            if first in scanned.damaged:
+                self._judge_damaged(scanned, row, needed, f"revisions {first} to {lasts[row]} are damaged")
+
+    def _judge_damaged(self, scanned: _Scanned, row: int, needed: int, text: str) -> None:
+        hull = scanned.rows
+        if row < needed:
+            self._findings.blame(hull, f"{text}, which only looking back needs", fatal=False)
+        elif row + 1 == len(hull.firsts):
+            first = hull.firsts[row]
+            self._findings.blame(hull, f"{text}: cut off at revision {first - 1}, the last whole batch", fatal=False)
+            self._findings.repairs.append(Cut(hull.row.number, scanned.damaged[first]))
+        else:
+            self._findings.blame(hull, f"{text}, and later ones are there", fatal=True)
+
+    def _judge_snapshots(self, scanned: _Scanned) -> int:
+        """The revision of the newest whole one, 0 where there is none."""
+        hull = scanned.rows
+        lost = hull.snapshots[:]
+        lost += [snapshot for snapshot in scanned.snapshots.values() if MISSING in snapshot.chunks]
+        hull.snapshots += scanned.snapshots.values()
+        hull.snapshots.sort(key=lambda snapshot: snapshot.revision)
+        for snapshot in lost:
+            text = f"the snapshot at revision {snapshot.revision} is damaged, and is left out"
+            self._findings.blame(hull, text, fatal=False)
+            self._findings.repairs.append(DropSnapshot(hull.row.number, snapshot))
+        return max((snapshot.revision for snapshot in hull.snapshots if snapshot not in lost), default=0)
+
+
+def hull_rows(connection: sqlite3.Connection, version: int) -> Iterator[tuple[HullRow, bool]]:
+    """The hulls, and whether each row is as it was written."""
+    if version == FORMAT:
+        for *values, stored in connection.execute("SELECT id, name, uid, created, max_points, checksum FROM hulls"):
+            row = HullRow(*values)
+            try:
+                yield row, hull_checksum(row) == stored
+            except (AttributeError, TypeError, struct.error):
+                yield HullRow(values[0], str(row.name), "", 0.0), False
+        return
+    for number, name, created, config in connection.execute("SELECT id, name, created, config FROM hulls"):
+        try:
+            told = json.loads(config)
+            yield HullRow(number, name, told["uid"], created, told["config"]["max_points"]), True
+        except (ValueError, TypeError, KeyError):
+            yield HullRow(number, str(name), "", 0.0), False
+
+
+def _matches(stored: object, payload: Any, *keys: Any) -> bool:
+    try:
+        return checksum(payload, *keys) == stored
+    except (TypeError, struct.error):
+        return False

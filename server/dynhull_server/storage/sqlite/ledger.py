@@ -1,0 +1,346 @@
+"""Where each hull's rows lie, and what there must be: kept in memory, beside the tables it is about."""
+
+from array import array
+from bisect import bisect_right, insort
+from collections.abc import Callable, Iterable, Sequence, Set
+from dataclasses import dataclass, field, replace
+from itertools import count
+from typing import Any, Self
+
+from ...state.records import Append, Change, Create, Delete, HullRow
+from ..port import NotCommittedError
+from .encoding import checksum, encode, hull_checksum, weight
+from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
+from .totals import Totals
+
+KEPT = 2  # snapshots a hull; the older one is there in case the newer is damaged
+
+# Tables that deleted hulls and unfinished snapshots leave rows in; what takes room in these.
+DROPPED = {"snapshots": "state", "batches": "payload", "chunks": "points"}
+
+Statement = tuple[str, tuple[Any, ...]]
+
+
+@dataclass(slots=True)
+class Snapshot:
+    """Where a snapshot lies; `chunks` are rows of its points."""
+
+    id: int
+    revision: int
+    chunks: Sequence[int] = ()
+
+
+@dataclass(slots=True)
+class HullRows:
+    """One hull's rows.
+
+    Attributes:
+        row: the hull's own.
+        sum: of the weights of its rows of batches, and the checksum of its own.
+        firsts: for each row of batches the first revision in it, in order.
+        ids: the rows.
+        last: the newest revision.
+        snapshots: in the order of their revisions.
+    """
+
+    row: HullRow
+    sum: int
+    firsts: "array[int]" = field(default_factory=lambda: array("q"))
+    ids: "array[int]" = field(default_factory=lambda: array("q"))
+    last: int = 0
+    snapshots: list[Snapshot] = field(default_factory=list)
+
+    @property
+    def oldest(self) -> int:
+        """The oldest revision that can be read back."""
+        if len(self.snapshots) >= KEPT:
+            return self.snapshots[-KEPT].revision
+        complete = not self.snapshots or (len(self.firsts) > 0 and self.firsts[0] == 1)
+        return 0 if complete else self.snapshots[0].revision
+
+    def copy(self) -> Self:
+        """As it is now."""
+        return replace(self, firsts=self.firsts[:], ids=self.ids[:], snapshots=self.snapshots[:])
+
+    def between(self, after: int, until: int) -> "array[int]":
+        """The rows with the revisions after one, until another."""
+        start = max(0, bisect_right(self.firsts, after + 1) - 1)
+        return self.ids[start : bisect_right(self.firsts, until)]
+
+    def superfluous(self) -> "array[int]":
+        """The rows that nothing which is kept is read from."""
+        if len(self.snapshots) < KEPT:
+            return array("q")
+        oldest = self.snapshots[-KEPT].revision
+        return self.ids[:] if self.last <= oldest else self.ids[: max(0, bisect_right(self.firsts, oldest + 1) - 1)]
+
+    def append(self, first: int, last: int, id: int, weight: int) -> None:
+        """A row of batches has come."""
+        self.firsts.append(first)
+        self.ids.append(id)
+        self.last = last
+        self.sum += weight
+
+    def drop(self, rows: int, weights: int) -> None:
+        """The oldest rows of batches have gone."""
+        del self.firsts[:rows], self.ids[:rows]
+        self.sum -= weights
+
+
+@dataclass(slots=True)
+class Ledger:
+    """All hulls' rows, as of the last commit.
+
+    Attributes:
+        totals: what there must be.
+        hulls: by number.
+        dead: by table, the rows that belong to nothing any more and are to be dropped.
+        batch_ids, chunk_ids, snapshot_ids: the next. None is used twice while the storage is open: then what was found
+            dead cannot be somebody's by the time it is dropped.
+    """
+
+    totals: Totals = Totals()
+    hulls: dict[int, HullRows] = field(default_factory=dict)
+    dead: "dict[str, array[int]]" = field(default_factory=lambda: {table: array("q") for table in DROPPED})
+    batch_ids: "count[int]" = field(default_factory=lambda: count(1))
+    chunk_ids: "count[int]" = field(default_factory=lambda: count(1))
+    snapshot_ids: "count[int]" = field(default_factory=lambda: count(1))
+
+    def go_on_from(self, before: "Ledger", under_way: Set[int]) -> None:
+        """Take the place of a ledger; chunks of snapshots that are `under_way` are not dead."""
+        for name in ("batch_ids", "chunk_ids", "snapshot_ids"):
+            setattr(self, name, count(max(next(getattr(self, name)), next(getattr(before, name)))))
+        self.dead["chunks"] = array("q", (id for id in self.dead["chunks"] if id not in under_way))
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Step: a piece of a snapshot."""
+
+    id: int
+    snapshot: int
+    number: int
+    points: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Step: a snapshot counts from here on."""
+
+    number: int
+    snapshot: Snapshot
+    state: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class DropSnapshot:
+    """Step: a hull's snapshot is gone; its chunks are dead."""
+
+    number: int
+    snapshot: Snapshot
+
+
+@dataclass(frozen=True, slots=True)
+class DropBatches:
+    """Step: a hull's oldest rows of batches are gone; `weights` is the sum of theirs."""
+
+    number: int
+    ids: "array[int]"
+    weights: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Step: a hull's newest row of batches, which is damaged, is gone."""
+
+    number: int
+    weight: int
+
+
+@dataclass(frozen=True, slots=True)
+class DropDead:
+    """Step: the first of the dead rows of a table are gone."""
+
+    table: str
+    ids: "array[int]"
+
+
+AnyStep = Chunk | Finish | DropSnapshot | DropBatches | Cut | DropDead
+
+
+class Group:
+    """Changes that are committed together: what the database is to do, and what the ledger will say then.
+
+    The ledger stays as it is until `adopt`: nobody sees what is not committed.
+
+    Attributes:
+        statements: for the database, the totals last.
+    """
+
+    def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
+        self._ledger = ledger
+        self._totals = ledger.totals
+        # What the group has made of the hulls it has to do with so far.
+        self._now: dict[int, _Now] = {}
+        self._effects: list[Callable[[], object]] = []
+        self.statements: list[Statement] = []
+        for change in changes:
+            self._take(change)
+        self._totals = replace(self._totals, commits=self._totals.commits + 1)
+        self.statements.append((UPDATE_TOTALS, self._totals.row))
+
+    def adopt(self) -> None:
+        """It is committed."""
+        for effect in self._effects:
+            effect()
+        self._ledger.totals = self._totals
+
+    def _take(self, change: Change | AnyStep) -> None:
+        match change:
+            case Append():
+                self._append(change)
+            case Create():
+                self._create(change.row)
+            case Delete():
+                self._delete(change.number)
+            case Chunk():
+                sum = checksum(change.points, change.snapshot, change.number)
+                values = change.id, change.snapshot, change.number, sum, change.points
+                self.statements.append((INSERT_CHUNK, values))
+            case Finish():
+                self._finish(change)
+            case DropSnapshot():
+                self._drop_snapshot(change)
+            case DropBatches():
+                self._drop_batches(change)
+            case Cut():
+                self._cut(change)
+            case DropDead():
+                self._drop_dead(change)
+
+    def _hull(self, number: int) -> "_Now | None":
+        """A hull as the group has made it so far, None where there is none."""
+        now = self._now.get(number)
+        if now is None and (rows := self._ledger.hulls.get(number)):
+            now = self._now[number] = _Now(rows, len(rows.ids), rows.sum, rows.last)
+        return None if now is None or now.deleted else now
+
+    def _create(self, row: HullRow) -> None:
+        if self._hull(row.number):
+            raise NotCommittedError(f"there is a hull {row.number} already")
+        sum = hull_checksum(row)
+        rows = HullRows(row, sum)
+        self._now[row.number] = _Now(rows, 0, sum, 0)
+        next_number = max(self._totals.next_number, row.number + 1)
+        self._totals = replace(self._totals.plus(1, 0, sum), next_number=next_number)
+        self.statements.append((INSERT_HULL, (row.number, row.name, row.uid, row.created, row.max_points, sum)))
+        self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
+
+    def _append(self, change: Append) -> None:
+        now = self._hull(change.number)
+        if now is None:
+            raise NotCommittedError(f"there is no hull {change.number}")
+        first, last = change.records[0].revision, change.records[-1].revision
+        if first != now.last + 1 or last - first + 1 != len(change.records):
+            raise NotCommittedError(
+                f"revisions {first} to {last} of hull {now.rows.row.name} do not follow revision {now.last}"
+            )
+        payload = encode(change.records)
+        keys = change.number, first, last
+        stored = checksum(payload, *keys)
+        sum = weight(stored, *keys)
+        id = next(self._ledger.batch_ids)
+        now.batches, now.sum, now.last = now.batches + 1, now.sum + sum, last
+        self._totals = self._totals.plus(0, 1, sum)
+        self.statements.append((INSERT_BATCH, (id, *keys, stored, payload)))
+        self._effects.append(lambda: now.rows.append(first, last, id, sum))
+
+    def _delete(self, number: int) -> None:
+        """Its batches and snapshots stay for `sweep`: a large hull's would hold up every commit behind this one."""
+        now = self._hull(number)
+        if now is None:
+            raise NotCommittedError(f"there is no hull {number}")
+        now.deleted = True
+        self._totals = self._totals.plus(-1, -now.batches, -now.sum)
+        self.statements.append(("DELETE FROM hulls WHERE id = ?", (number,)))
+
+        def bury() -> None:
+            rows, dead = self._ledger.hulls.pop(number), self._ledger.dead
+            dead["batches"] += rows.ids
+            dead["snapshots"].extend(snapshot.id for snapshot in rows.snapshots)
+            for snapshot in rows.snapshots:
+                dead["chunks"].extend(snapshot.chunks)
+
+        self._effects.append(bury)
+
+    def _finish(self, step: Finish) -> None:
+        now = self._hull(step.number)
+        snapshot = step.snapshot
+        if now is None:  # deleted meanwhile
+            self._effects.append(lambda: self._ledger.dead["chunks"].extend(snapshot.chunks))
+            return
+        keys = snapshot.id, step.number, snapshot.revision, len(snapshot.chunks)
+        self.statements.append((INSERT_SNAPSHOT, (*keys, step.state, checksum(step.state, *keys))))
+        self._effects.append(lambda: insort(now.rows.snapshots, snapshot, key=lambda each: each.revision))
+
+    def _drop_snapshot(self, step: DropSnapshot) -> None:
+        now = self._hull(step.number)
+        if now is None or step.snapshot not in now.rows.snapshots:
+            return
+
+        def drop() -> None:
+            now.rows.snapshots.remove(step.snapshot)
+            self._ledger.dead["chunks"].extend(step.snapshot.chunks)
+
+        self.statements.append(("DELETE FROM snapshots WHERE id = ?", (step.snapshot.id,)))
+        self._effects.append(drop)
+
+    def _drop_batches(self, step: DropBatches) -> None:
+        now = self._hull(step.number)
+        count = len(step.ids)
+        if now is None or now.rows.ids[:count] != step.ids:
+            return
+        now.batches, now.sum = now.batches - count, now.sum - step.weights
+        self._totals = self._totals.plus(0, -count, -step.weights)
+        self._delete_rows("batches", step.ids)
+        self._effects.append(lambda: now.rows.drop(count, step.weights))
+
+    def _cut(self, step: Cut) -> None:
+        rows = self._ledger.hulls[step.number]
+
+        def cut() -> None:
+            rows.last = rows.firsts.pop() - 1
+            rows.ids.pop()
+            rows.sum -= step.weight
+
+        self._totals = self._totals.plus(0, -1, -step.weight)
+        self._delete_rows("batches", rows.ids[-1:])
+        self._effects.append(cut)
+
+    def _drop_dead(self, step: DropDead) -> None:
+        dead = self._ledger.dead[step.table]
+        count = len(step.ids)
+        if dead[:count] != step.ids:
+            return
+        self._delete_rows(step.table, step.ids)
+
+        def drop() -> None:
+            if dead[:count] == step.ids:
+                del dead[:count]
+
+        self._effects.append(drop)
+
+    def _delete_rows(self, table: str, ids: "array[int]") -> None:
+        sql = f"DELETE FROM {table} WHERE rowid = ?"  # noqa: S608  (ours)
+        self.statements += [(sql, (id,)) for id in ids]
+
+
+@dataclass(slots=True)
+class _Now:
+    """A hull in the middle of a group: its rows as they will be, `rows` as they are."""
+
+    rows: HullRows
+    batches: int
+    sum: int
+    last: int
+    deleted: bool = False

@@ -1,0 +1,154 @@
+"""Is the write-ahead log whole? SQLite itself drops everything after a damaged frame, and does not say so.
+
+The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. A frame counts where both of its salts are
+those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit there may lie
+
+* frames of an earlier use of the file: both of their salts are others;
+* one commit that did not finish, when the process or the power failed, or when the disk was full: nobody was told of it.
+
+Everything else is damage. A single salt that differs is, too: SQLite would take the rest for an earlier use of the file.
+"""
+
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+
+from ..durability import Durability
+from ..port import DamagedError
+from .disk import Disk
+from .totals import MODES, STOPPED, Totals
+
+HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
+CHECKED_BYTES = 24  # of the header
+MAGIC = (0x377F0682, 0x377F0683)  # checksums over little-endian, over big-endian words
+
+# After a power failure, what was not synced may have holes, and whole commits behind them.
+UNSYNCED = (MODES[Durability.INTERVAL], MODES[Durability.NONE])
+
+Words = npt.NDArray[np.uint32]
+
+
+def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
+    """What was lost at the end of the log, in words; None where it is whole, or where there need not be one.
+
+    Args:
+        disk: where it is.
+        path: the log.
+        own: the totals in the database's own file, as of the last checkpoint.
+
+    Raises:
+        DamagedError: the log is not what was written, and acknowledged batches are lost.
+    """
+    size = disk.size(path) or 0
+    in_use = own is not None and own.mode != STOPPED
+    if size < HEADER_BYTES + FRAME_HEADER_BYTES:
+        if in_use:
+            raise DamagedError(
+                f"{path} is missing or cut short, and the database beside it is incomplete without it: put it back, "
+                "or restore a backup"
+            )
+        return None
+    with disk.open(path) as file:
+        header = file.read(HEADER_BYTES)
+        magic, _, page_bytes, _, *salts, sum0, sum1 = struct.unpack(">8I", header)
+        order = "<u4" if magic == MAGIC[0] else ">u4"
+        state = _checksum((0, 0), header[:CHECKED_BYTES], order)
+        if magic not in MAGIC or state != (sum0, sum1):
+            if own is not None and not in_use:
+                return None  # just begun: nobody was told of anything in it
+            raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: restore a backup")
+        damage = _damage(_frames(file, page_bytes), (salts[0], salts[1]), state, order)
+    if damage is None:
+        return None
+    frame, commits, others_follow = damage
+    if others_follow and (own is None or own.mode not in UNSYNCED):
+        raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: restore a backup")
+    return (
+        f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most {commits or 1} of "
+        "the newest commits; whoever wrote them was not told that they were kept, unless the disk lost them afterwards"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A page as of some commit; `commit` is not 0 in the last frame of one."""
+
+    header: bytes
+    page: bytes
+
+    @property
+    def commit(self) -> int:
+        return int.from_bytes(self.header[4:8])
+
+    @property
+    def salts(self) -> tuple[int, int]:
+        return int.from_bytes(self.header[8:12]), int.from_bytes(self.header[12:16])
+
+    @property
+    def sums(self) -> tuple[int, int]:
+        return int.from_bytes(self.header[16:20]), int.from_bytes(self.header[20:24])
+
+
+def _frames(file: IO[bytes], page_bytes: int) -> Iterator[_Frame]:
+    while len(frame := file.read(FRAME_HEADER_BYTES + page_bytes)) >= FRAME_HEADER_BYTES:
+        yield _Frame(frame[:FRAME_HEADER_BYTES], frame[FRAME_HEADER_BYTES:].ljust(page_bytes, b"\0"))
+
+
+def _damage(
+    frames: Iterable[_Frame], salts: tuple[int, int], state: tuple[int, int], order: str
+) -> tuple[int, int, bool] | None:
+    """The first damaged frame, how many commits end in it and behind it, and whether others follow the first of these.
+
+    The frames behind the damaged one are taken for whole where their checksums run on from the one before.
+    """
+    damaged: int | None = None
+    commits = 0
+    others_follow = False
+    for number, frame in enumerate(frames, start=1):
+        same = [one == other for one, other in zip(frame.salts, salts, strict=True)]
+        if not any(same):
+            break  # of an earlier use of the file
+        whole = all(same) and _checksum(state, frame.header[:8] + frame.page, order) == frame.sums
+        state = frame.sums
+        if damaged is None and whole:
+            continue
+        if damaged is None:
+            damaged = number
+        else:
+            others_follow |= whole and commits > 0
+        commits += frame.commit != 0 and (whole or number == damaged)
+    return None if damaged is None else (damaged, commits, others_follow)
+
+
+def _checksum(state: tuple[int, int], data: bytes, order: str) -> tuple[int, int]:
+    """SQLite's running checksum: for each pair of words (x, y): s += x + t, then t += y + s, modulo 2**32.
+
+    The recurrence is linear, so the result is a sum of words times fixed factors.
+    """
+    words = np.frombuffer(data, order).astype(np.uint32)
+    x, y = words[::2], words[1::2]
+    ss, st, ts, tt = _powers(len(x) + 1)
+    # The pair k of n passes through the matrix ((1, 1), (1, 2)) n - k times: y enters after its first row.
+    s, t = (np.uint32(word) for word in state)
+    with np.errstate(over="ignore"):
+        new_s = ss[-1] * s + st[-1] * t + np.sum(ss[-2::-1] * x + st[-2::-1] * (x + y), dtype=np.uint32)
+        new_t = ts[-1] * s + tt[-1] * t + np.sum(ts[-2::-1] * x + tt[-2::-1] * (x + y), dtype=np.uint32)
+    return int(new_s), int(new_t)
+
+
+@cache
+def _powers(count: int) -> tuple[Words, Words, Words, Words]:
+    """The entries of the matrix's powers 0 to count - 1."""
+    a, b, c, d = 1, 0, 0, 1
+    rows = []
+    for _ in range(count):
+        rows.append((a, b, c, d))
+        a, b, c, d = (value & 0xFFFFFFFF for value in (a + c, b + d, a + 2 * c, b + 2 * d))
+    ss, st, ts, tt = np.array(rows, np.uint32).T
+    return ss, st, ts, tt

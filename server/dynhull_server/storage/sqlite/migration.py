@@ -1,0 +1,36 @@
+"""How a database comes to have the tables of today's format. Each function runs inside a transaction."""
+
+import sqlite3
+
+from .encoding import hull_checksum
+from .ledger import Ledger
+from .schema import INSERT_HULL, TABLES, stamp
+from .totals import Totals, renew_totals
+
+
+def make_tables(connection: sqlite3.Connection) -> None:
+    """The tables of an empty database."""
+    for sql in TABLES.values():
+        connection.execute(sql)
+    renew_totals(connection, Totals())
+    stamp(connection)
+
+
+def migrate(connection: sqlite3.Connection, ledger: Ledger) -> None:
+    """Bring a database of format 1 to this one. Batches and snapshots stay where they are.
+
+    Args:
+        connection: to the database.
+        ledger: what was found in it.
+    """
+    for index in ("batches_by_revision", "chunks_by_number"):
+        connection.execute(f"DROP INDEX {index}")
+    connection.execute("DROP TABLE hulls")
+    for table in ("hulls", "totals"):
+        connection.execute(TABLES[table])
+    rows = (hull.row for hull in ledger.hulls.values())
+    connection.executemany(
+        INSERT_HULL, ((row.number, row.name, row.uid, row.created, row.max_points, hull_checksum(row)) for row in rows)
+    )
+    renew_totals(connection, ledger.totals)
+    stamp(connection)

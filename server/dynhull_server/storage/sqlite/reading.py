@@ -1,0 +1,149 @@
+"""Reading hulls beside commits, also while there are no file descriptors left."""
+
+import json
+import sqlite3
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from threading import Condition
+
+import numpy as np
+
+from dynhull.arrays import Points
+
+from ...state.records import Kept, Record
+from ..port import DamagedError
+from .encoding import checksum, decode, points_from
+from .ledger import HullRows, Snapshot
+
+ROWS_A_QUERY = 1000
+KEPT_OPEN = 4
+
+
+class Readers:
+    """Connections for reading. Some are always open; more are opened where they can be.
+
+    Args:
+        connect: opens one.
+
+    Raises:
+        sqlite3.Error: the first ones cannot be opened.
+    """
+
+    def __init__(self, connect: Callable[[], sqlite3.Connection]) -> None:
+        self._connect = connect
+        self._returned = Condition()
+        self._idle: list[sqlite3.Connection] = []
+        try:
+            for _ in range(KEPT_OPEN):
+                self._idle.append(connect())
+        except BaseException:
+            self.close()
+            raise
+
+    @contextmanager
+    def lend(self) -> Iterator[sqlite3.Connection]:
+        """A connection, in no transaction before and after."""
+        connection = self._take()
+        try:
+            yield connection
+        finally:
+            if connection.in_transaction:
+                connection.execute("ROLLBACK")
+            with self._returned:
+                self._idle.append(connection)
+                spare = self._idle.pop(0) if len(self._idle) > KEPT_OPEN else None
+                self._returned.notify()
+            if spare is not None:
+                spare.close()
+
+    def close(self) -> None:
+        """Close those that nobody has."""
+        for connection in self._idle:
+            connection.close()
+        self._idle = []
+
+    def _take(self) -> sqlite3.Connection:
+        with self._returned:
+            if self._idle:
+                return self._idle.pop()
+        try:
+            return self._connect()
+        except sqlite3.Error:  # no descriptors: wait for one that is open
+            with self._returned:
+                self._returned.wait_for(lambda: self._idle)
+                return self._idle.pop()
+
+
+def begin(connection: sqlite3.Connection) -> None:
+    """Fix what the connection sees, until the end of its transaction."""
+    connection.execute("BEGIN")
+    connection.execute("SELECT id FROM totals").fetchone()
+
+
+def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kept:
+    """A hull as it was at revision `until`, or at the last one before.
+
+    Args:
+        connection: inside the transaction that `hull` was copied in.
+        hull: where its rows lie.
+        until: a revision.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    try:
+        kept = _newest_snapshot(connection, hull, until)
+        ids = hull.between(kept.revision, until)
+        for records in _batches(connection, hull, ids):
+            kept.records += [record for record in records if kept.revision < record.revision <= until]
+    except sqlite3.Error as error:
+        raise DamagedError(f"hull {hull.row.name!r} cannot be read ({error}): restore a backup") from error
+    expected = kept.revision
+    for record in kept.records:
+        expected += 1
+        if record.revision != expected:
+            raise DamagedError(f"hull {hull.row.name!r}: revision {expected} is missing: restore a backup")
+    return kept
+
+
+def rows_by_id(connection: sqlite3.Connection, columns: str, table: str, ids: "array[int]") -> Iterator[Sequence[int]]:
+    """Some columns of rows, in the order of their numbers; those that are not there are left out."""
+    # Numbers as JSON: one query for many rows. A cross join is carried out from left to right.
+    sql = f"SELECT {columns} FROM json_each(?) AS id CROSS JOIN {table} ON {table}.rowid = id.value"  # noqa: S608  (ours)
+    for start in range(0, len(ids), ROWS_A_QUERY):
+        yield from connection.execute(sql, (json.dumps(ids[start : start + ROWS_A_QUERY].tolist()),))
+
+
+def _newest_snapshot(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kept:
+    for snapshot in reversed(hull.snapshots):
+        if snapshot.revision <= until:
+            kept = _snapshot(connection, hull.row.number, snapshot)
+            if kept is not None:
+                return kept
+    return Kept(0, np.empty((0, 2)), {}, [])
+
+
+def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -> Kept | None:
+    """A snapshot, None where it is damaged."""
+    query = "SELECT state, checksum FROM snapshots WHERE id = ? AND hull = ? AND revision = ? AND chunks = ?"
+    keys = snapshot.id, number, snapshot.revision, len(snapshot.chunks)
+    row = connection.execute(query, keys).fetchone()
+    if row is None or checksum(row[0], *keys) != row[1]:
+        return None
+    parts: list[Points] = [np.empty((0, 2))]
+    found = rows_by_id(connection, "number, checksum, points", "chunks", array("q", snapshot.chunks))
+    for expected, (number, stored, data) in enumerate(found):
+        if number != expected or checksum(data, snapshot.id, number) != stored:
+            return None
+        parts.append(points_from(data))
+    if len(parts) != len(snapshot.chunks) + 1:
+        return None
+    return Kept(snapshot.revision, np.concatenate(parts), json.loads(row[0] or "{}"), [])
+
+
+def _batches(connection: sqlite3.Connection, hull: HullRows, ids: "array[int]") -> Iterable[Iterable[Record]]:
+    for first, last, stored, payload in rows_by_id(connection, "first, last, checksum, payload", "batches", ids):
+        if checksum(payload, hull.row.number, first, last) != stored:
+            raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
+        yield decode(payload, first)

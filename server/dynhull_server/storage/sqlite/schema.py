@@ -1,0 +1,85 @@
+"""The tables, and how older folders come to have them."""
+
+import sqlite3
+
+APPLICATION_ID = 0x64796E68  # "dynh"
+FORMAT = 2
+PAGE_BYTES = 8192  # a batch of many points spans few pages, and wastes half of one
+
+TABLES = {
+    "batches": """CREATE TABLE batches (
+    hull INTEGER NOT NULL,
+    first INTEGER NOT NULL,
+    last INTEGER NOT NULL,
+    checksum INTEGER NOT NULL,
+    payload BLOB NOT NULL
+)""",
+    "snapshots": """CREATE TABLE snapshots (
+    id INTEGER PRIMARY KEY,
+    hull INTEGER NOT NULL,
+    revision INTEGER NOT NULL,
+    chunks INTEGER NOT NULL,
+    state BLOB NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+    "chunks": """CREATE TABLE chunks (
+    snapshot INTEGER NOT NULL,
+    number INTEGER NOT NULL,
+    checksum INTEGER NOT NULL,
+    points BLOB NOT NULL
+)""",
+    "hulls": """CREATE TABLE hulls (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL,
+    uid TEXT NOT NULL,
+    created REAL NOT NULL,
+    max_points INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+    "totals": """CREATE TABLE totals (
+    id INTEGER PRIMARY KEY,
+    commits INTEGER NOT NULL,
+    hulls INTEGER NOT NULL,
+    batches INTEGER NOT NULL,
+    sum INTEGER NOT NULL,
+    next_number INTEGER NOT NULL,
+    mode INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+}
+
+# Format 1 had a blob for what hulls were told at their creation, no totals, and indexes.
+FORMAT_1 = {
+    "hulls": """CREATE TABLE hulls (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL UNIQUE,
+    created REAL NOT NULL,
+    config BLOB NOT NULL
+)""",
+    "sqlite_autoindex_hulls_1": None,
+    "batches": TABLES["batches"],
+    "batches_by_revision": "CREATE UNIQUE INDEX batches_by_revision ON batches (hull, first)",
+    "snapshots": TABLES["snapshots"],
+    "chunks": TABLES["chunks"],
+    "chunks_by_number": "CREATE UNIQUE INDEX chunks_by_number ON chunks (snapshot, number)",
+}
+SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {1: FORMAT_1, FORMAT: TABLES}
+
+INSERT_HULL = "INSERT INTO hulls (id, name, uid, created, max_points, checksum) VALUES (?, ?, ?, ?, ?, ?)"
+INSERT_BATCH = "INSERT INTO batches (rowid, hull, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
+INSERT_CHUNK = "INSERT INTO chunks (rowid, snapshot, number, checksum, points) VALUES (?, ?, ?, ?, ?)"
+INSERT_SNAPSHOT = "INSERT INTO snapshots (id, hull, revision, chunks, state, checksum) VALUES (?, ?, ?, ?, ?, ?)"
+UPDATE_TOTALS = "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_number=?, mode=?, checksum=?"
+
+
+def found(connection: sqlite3.Connection) -> tuple[int, int, dict[str, str | None]]:
+    """Application id, format and tables of a database."""
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    return application, version, dict(connection.execute("SELECT name, sql FROM sqlite_schema"))
+
+
+def stamp(connection: sqlite3.Connection) -> None:
+    """Say whose database it is, and of which format."""
+    connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+    connection.execute(f"PRAGMA user_version = {FORMAT}")

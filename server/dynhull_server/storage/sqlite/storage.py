@@ -1,0 +1,392 @@
+"""The storage on SQLite: the port's methods, and what the folder needs for them.
+
+Outcomes. A commit that fails before its COMMIT has written no frame with a commit mark, and is rolled back. At COMMIT
+itself SQLite writes the frames in order, the one with the mark last, so a write that fails leaves no whole mark either.
+Everything else that COMMIT may fail with (a sync, no memory, shared memory that cannot grow) can come after the mark: a
+crash now would make the next recovery find the commit, though this process does not see it. `settle` decides it with a
+commit of its own. That one is written either behind the frames in question, if they are part of the log as SQLite sees it
+now, or over them. In the second case the first of them is gone, and with it all: checksums run on from frame to frame, so
+none behind it can be valid. Once it is durable, the outcome is what can be read.
+"""
+
+import json
+import sqlite3
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import IO
+
+from dynhull.arrays import Points
+
+from ...state.records import Change, HullRow, Kept
+from ..durability import Durability
+from ..port import (
+    NEWEST,
+    Contents,
+    DamagedError,
+    LockedError,
+    NotCommittedError,
+    Progress,
+    Step,
+    StorageError,
+)
+from .disk import Access, Disk
+from .encoding import point_bytes, weight
+from .examine import Findings, examine, format_of, load
+from .folder import Folder
+from .ledger import (
+    DROPPED,
+    KEPT,
+    Chunk,
+    DropBatches,
+    DropDead,
+    DropSnapshot,
+    Finish,
+    Group,
+    Ledger,
+    Snapshot,
+)
+from .reading import Readers, begin, read_hull, rows_by_id
+from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
+from .migration import make_tables, migrate
+from .totals import MODES, STOPPED, read_totals, renew_totals
+
+CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays the ones behind it by little
+DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # a step
+
+CHECKPOINT_BYTES = 16 * 2**20  # of log, before it is copied into the database
+LONGEST_LOG_BYTES = 64 * 2**20  # kept when the log is begun anew
+PATIENCE_MS = 10  # for writers and readers, before the log is begun anew; meanwhile no commit begins
+
+SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durability.NONE: "OFF"}
+
+# A write failed: there is no whole frame with a commit mark.
+NOTHING_WRITTEN = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE)
+
+
+class SQLiteStorage:
+    """Hulls in a folder.
+
+    Args:
+        path: the folder, made where it is missing.
+        durability: what a commit promises.
+        disk: what it is on.
+    """
+
+    immediate = False
+
+    def __init__(self, path: Path, durability: Durability = Durability.SYNC, disk: Disk | None = None) -> None:
+        self._folder = Folder(path, disk or Disk())
+        self._durability = durability
+        self._ledger = Ledger()
+        self._visible = Lock()  # held while what is committed and what the ledger says may differ
+        self._unsettled = False
+        self._writer: sqlite3.Connection | None = None
+        self._housekeeping = Lock()
+        self._log_in_doubt = False
+        self._under_way: dict[int, set[int]] = {}  # chunks of snapshots that are being written
+        self._open = ExitStack()
+
+    # Opening and closing
+
+    def open(self, progress: Progress) -> Contents:
+        """Examine the folder, repair what can be, and take it up."""
+        self._folder.disk.make(self._folder.path)
+        with ExitStack() as stack:
+            stack.enter_context(self._folder.held())
+            try:
+                notes = self._folder.check_log()
+                findings, version = self._examined(progress)
+                if findings.fatal:
+                    raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
+                stack.callback(self._disconnect)
+                self._take_up(findings, version)
+                self._checkpointer = stack.enter_context(closing(self._folder.connect(Access.WRITE)))
+                self._begin_log_anew()
+                self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
+                self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
+            except sqlite3.OperationalError as error:
+                raise StorageError(f"{self._folder.database} cannot be opened: {error}") from error
+            except sqlite3.Error as error:
+                raise DamagedError(
+                    f"{self._folder.database} is no readable database ({error}): restore a backup"
+                ) from error
+            self._open = stack.pop_all()
+        rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
+        return Contents(rows, self._ledger.totals.next_number, notes + [self._word(note) for note in findings.notes])
+
+    def close(self) -> None:
+        """Let others have the folder."""
+        if not self._unsettled and self._writer is not None:
+            # Where there is no room for it, the folder is taken for a killed server's, and its log stays.
+            with suppress(sqlite3.Error, StorageError):
+                self._writer.execute("PRAGMA synchronous = FULL")
+                self._write(Group(self._in_mode(STOPPED), []))
+        self._open.close()
+
+    # Committing
+
+    def commit(self, changes: Sequence[Change | Step]) -> None:
+        """Keep all of the changes or none."""
+        if self._unsettled:
+            raise StorageError("the outcome of the commit before is not known yet")
+        self._write(Group(self._ledger, changes))  # type: ignore[arg-type]  # steps are ours
+
+    def settle(self) -> None:
+        """Decide what became of the last commit; see the top of this file."""
+        if not self._unsettled:
+            return
+        self._disconnect()
+        connection = self._writer = self._connect_writer()
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("BEGIN IMMEDIATE")
+        totals, _ = read_totals(connection)
+        if totals is None:
+            raise DamagedError(f"{self._folder.database}: the totals are damaged: restore a backup")
+        connection.execute(UPDATE_TOTALS, replace(totals, commits=totals.commits + 1).row)
+        connection.execute("COMMIT")
+        self._set_synchronous(connection)
+        connection.execute("BEGIN")
+        ledger = load(connection)
+        connection.execute("COMMIT")
+        with self._visible:
+            ledger.go_on_from(self._ledger, set().union(*self._under_way.values()))
+            self._ledger = ledger
+            self._unsettled = False
+
+    def _write(self, group: Group) -> None:
+        connection = self._writer
+        try:
+            if connection is None:
+                connection = self._writer = self._connect_writer()
+            connection.execute("BEGIN IMMEDIATE")
+            for sql, values in group.statements:
+                connection.execute(sql, values)
+        except BaseException as error:
+            self._roll_back()
+            if isinstance(error, sqlite3.Error | OSError | MemoryError):
+                raise _not_committed(error) from error
+            raise
+        with self._visible:
+            self._unsettled = True
+            try:
+                connection.execute("COMMIT")
+            except sqlite3.Error as error:
+                if getattr(error, "sqlite_errorcode", None) not in NOTHING_WRITTEN:
+                    raise
+                self._roll_back()
+                self._unsettled = False
+                raise _not_committed(error) from error
+            group.adopt()
+            self._unsettled = False
+
+    def _roll_back(self) -> None:
+        """Leave no transaction open, whatever it takes."""
+        if self._writer is None:
+            return
+        try:
+            if self._writer.in_transaction:
+                self._writer.execute("ROLLBACK")
+        except (sqlite3.Error, MemoryError):
+            self._disconnect()
+
+    # Reading
+
+    def row(self, number: int) -> HullRow | None:
+        """The hull of that number, None where there is none."""
+        with self._visible:
+            hull = self._settled().hulls.get(number)
+            return None if hull is None else hull.row
+
+    def read(self, number: int, until: int = NEWEST) -> Kept:
+        """A hull as it was at a revision."""
+        with self._readers.lend() as connection:
+            with self._visible:
+                hull = self._settled().hulls[number].copy()
+                begin(connection)
+            return read_hull(connection, hull, until)
+
+    def oldest(self, number: int) -> int:
+        """The oldest revision that `read` can go back to."""
+        with self._visible:
+            return self._settled().hulls[number].oldest
+
+    def _settled(self) -> Ledger:
+        if self._unsettled:
+            raise StorageError("the outcome of the last commit is not known yet")
+        return self._ledger
+
+    # Snapshots, and what they and deleted hulls leave behind
+
+    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
+        """Write a snapshot, then drop what it makes superfluous."""
+        starts = range(0, len(points), CHUNK_POINTS)
+        ids = [next(self._ledger.chunk_ids) for _ in starts]
+        snapshot = Snapshot(next(self._ledger.snapshot_ids), revision, array("q", ids))
+        self._under_way[snapshot.id] = set(ids)
+        try:
+            for i, (id, start) in enumerate(zip(ids, starts, strict=True)):
+                yield Chunk(id, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
+            yield Finish(number, snapshot, json.dumps(dict(producers)).encode())
+        finally:
+            del self._under_way[snapshot.id]
+        yield from self._trim(number)
+
+    def _trim(self, number: int) -> Iterator[Step]:
+        while (hull := self._ledger.hulls.get(number)) and len(hull.snapshots) > KEPT:
+            yield DropSnapshot(number, hull.snapshots[0])
+        yield from self._drop_dead("chunks", "points")
+        while (hull := self._ledger.hulls.get(number)) and (ids := hull.superfluous()):
+            rows = self._few(ids, "first, last, checksum", "batches", "payload")
+            weights = sum(weight(stored, number, first, last) for first, last, stored in rows)
+            yield DropBatches(number, ids[: len(rows)], weights)
+
+    def sweep(self) -> Iterator[Step]:
+        """Drop what deleted hulls and unfinished snapshots have left."""
+        self._look_for_dead_chunks()
+        for table, column in DROPPED.items():
+            yield from self._drop_dead(table, column)
+
+    def _drop_dead(self, table: str, column: str) -> Iterator[Step]:
+        while ids := self._ledger.dead[table][:DROPPED_ROWS]:
+            yield DropDead(table, ids[: max(1, len(self._few(ids, "NULL", table, column)))])
+
+    def _look_for_dead_chunks(self) -> None:
+        """Snapshots that were given up have left some, too."""
+        with self._readers.lend() as connection:
+            rows = connection.execute("SELECT rowid, snapshot FROM chunks").fetchall()
+        with self._visible:
+            live = {snapshot.id for hull in self._ledger.hulls.values() for snapshot in hull.snapshots}
+            live |= self._under_way.keys()
+            self._ledger.dead["chunks"] = array("q", (id for id, snapshot in rows if snapshot not in live))
+
+    def _few(self, ids: "array[int]", columns: str, table: str, sized: str) -> list[Sequence[int]]:
+        """Some columns of the first of the rows: as many as fit into a step, at least one."""
+        taken: list[Sequence[int]] = []
+        size = 0
+        with self._readers.lend() as connection:
+            for *row, length in rows_by_id(connection, f"{columns}, length({sized})", table, ids[:DROPPED_ROWS]):
+                size += length
+                if taken and size > DROPPED_BYTES:
+                    break
+                taken.append(row)
+        return taken
+
+    # Housekeeping
+
+    def sync(self) -> None:
+        """Make durable what was committed."""
+        with self._housekeeping:
+            if self._log_in_doubt:
+                # After a sync that failed, the next may succeed without the pages that the first one lost.
+                if self._copy_log("FULL") != (0, 0):
+                    raise StorageError("the log is in use: it is made durable later")
+                self._log_in_doubt = False
+                return
+            try:
+                self._folder.disk.sync(self._log)
+            except BaseException:
+                self._log_in_doubt = True
+                raise
+
+    def checkpoint(self) -> None:
+        """Copy the log into the database beside commits, when it is long, then begin it anew.
+
+        One that grows makes every commit wait where the file system writes its own journal.
+        """
+        if (self._folder.disk.size(self._folder.log) or 0) > CHECKPOINT_BYTES:
+            with self._housekeeping:
+                for mode in ("PASSIVE", "RESTART"):  # for the second, little is left to copy
+                    self._copy_log(mode)
+
+    def bytes_used(self) -> int:
+        """What the database and its log take on the disk."""
+        return sum(self._folder.disk.size(file) or 0 for file in (self._folder.database, self._folder.log))
+
+    def _copy_log(self, mode: str) -> tuple[int, int]:
+        """Copy it into the database. Returns whether somebody was in the way, and how many pages are left."""
+        busy, pages, copied = self._checkpointer.execute(f"PRAGMA wal_checkpoint({mode})").fetchone()
+        return busy, pages - copied
+
+    # Opening
+
+    def _examined(self, progress: Progress) -> tuple[Findings, int]:
+        """What is there, and its format; nothing is changed."""
+        if not self._folder.disk.size(self._folder.database):
+            return Findings(), 0
+        with closing(self._folder.connect(Access.READ)) as connection:
+            connection.execute("BEGIN")
+            version = format_of(connection, self._folder.database)
+            return (examine(connection, version, progress) if version else Findings()), version
+
+    def _take_up(self, findings: Findings, version: int) -> None:
+        """Bring the database to today's format and repair it, and say in it that somebody works on it."""
+        connection = self._writer = self._connect_writer()
+        connection.execute("PRAGMA synchronous = FULL")
+        self._ledger = findings.ledger
+        connection.execute("BEGIN IMMEDIATE")
+        if version == 0:
+            make_tables(connection)
+        elif version < FORMAT:
+            migrate(connection, findings.ledger)
+        elif not findings.both_totals:
+            renew_totals(connection, findings.ledger.totals)
+        connection.execute("COMMIT")
+        self._write(Group(self._in_mode(MODES[self._durability]), findings.repairs))
+        self._set_synchronous(connection)
+
+    def _in_mode(self, mode: int) -> Ledger:
+        self._ledger.totals = replace(self._ledger.totals, mode=mode)
+        return self._ledger
+
+    def _begin_log_anew(self) -> None:
+        """So that the database's own file says who works on it, and nothing that failed lies behind the log's end."""
+        busy, _ = self._copy_log("RESTART")
+        if busy:
+            raise LockedError(f"somebody reads {self._folder.database}: wait until they are done")
+        self._checkpointer.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
+
+    def _connect_writer(self) -> sqlite3.Connection:
+        connection = self._folder.connect(Access.WRITE)
+        try:
+            connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA wal_autocheckpoint = 0")
+            connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG_BYTES}")
+            connection.execute("PRAGMA secure_delete = OFF")
+            self._set_synchronous(connection)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _connect_reader(self) -> sqlite3.Connection:
+        """Reads once, so that its files are open."""
+        connection = self._folder.connect(Access.WRITE)
+        try:
+            connection.execute("SELECT id FROM totals").fetchone()
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _set_synchronous(self, connection: sqlite3.Connection) -> None:
+        connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS[self._durability]}")
+
+    def _disconnect(self) -> None:
+        """Also ends a transaction."""
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+    def _word(self, note: str) -> str:
+        return f"{self._folder.database}: {note}"
+
+
+def _not_committed(error: BaseException) -> NotCommittedError:
+    if getattr(error, "sqlite_errorcode", None) in NOTHING_WRITTEN:
+        return NotCommittedError("the disk is full: make room, and writes are taken again", full=True)
+    return NotCommittedError(f"nothing was written: {str(error) or type(error).__name__}")

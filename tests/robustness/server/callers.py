@@ -1,0 +1,271 @@
+"""Callers that go away: in every call, at every moment, many on one name, while others go on and the server is killed.
+
+    python tests/robustness/server/callers.py --calls 10000 --kills 5
+
+Batches are single points, each another one on a parabola, so the count of a point says whether its batch is there.
+
+* Of the hulls that nobody deletes: an acknowledged batch is there once, over every kill; a refused one is not; one
+  whose caller went away is there once or not at all, and stays as it was seen.
+* Of the hulls that are created and deleted all the time: at the end each can be created, written, read and deleted.
+* Others write to another hull meanwhile: every one of their batches is acknowledged.
+"""
+
+import argparse
+import asyncio
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from itertools import count
+from pathlib import Path
+
+import grpc
+import numpy as np
+
+from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+COMMAND = str(Path(sys.executable).with_name("dynhull"))
+KEPT = ["kept/a", "kept/b", "kept/c", "kept/d"]
+CHURNED = ["churned/a", "churned/b", "churned/c"]
+STEADY = "steady"
+CALLERS = 24
+PATIENCE = 30.0  # seconds, for anything that must happen
+LONGEST_STAY = 0.02  # seconds until a caller goes away
+# Otherwise a channel to a new server waits for the pause that one to the killed server has begun.
+OWN = [("grpc.use_local_subchannel_pool", 1)]
+STREAMED = 4  # batches of a stream
+# What says that nothing was applied.
+REFUSED = {
+    grpc.StatusCode.NOT_FOUND,
+    grpc.StatusCode.ALREADY_EXISTS,
+    grpc.StatusCode.RESOURCE_EXHAUSTED,
+    grpc.StatusCode.FAILED_PRECONDITION,
+}
+
+
+class BrokenPromiseError(AssertionError):
+    """The server did what it says it never does."""
+
+
+def require(condition: object, what: str) -> None:
+    if not condition:
+        raise BrokenPromiseError(what)
+
+
+def batch_of(number: int) -> batch_pb2.Batch:
+    batch = batch_pb2.Batch()
+    batch.inserts.packed = np.array([number, float(number) ** 2]).tobytes()
+    return batch
+
+
+class Server:
+    def __init__(self, data: Path) -> None:
+        self.data = data
+        self.port = 0
+        self.log = data.with_name("server.log")
+
+    def start(self) -> None:
+        command = [COMMAND, "serve", "--port", str(self.port), "--data", str(self.data), "--create-on-write"]
+        command += ["--snapshot-points", "500", "--log-level", "warning"]
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+        line = self.process.stdout.readline()
+        require("serving on" in line, f"the server did not start: {self.log.read_text()}")
+        self.port = int(line.rsplit(":", 1)[1])
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+class Model:
+    """What is known of each batch: True, it must be there; False, it must not; None, nobody knows."""
+
+    def __init__(self) -> None:
+        self.numbers = count(1)
+        self.batches: dict[str, dict[int, bool | None]] = {name: {} for name in (*KEPT, STEADY)}
+
+    def new(self, name: str) -> int:
+        number = next(self.numbers)
+        self.batches.get(name, {})[number] = None
+        return number
+
+    def told(self, name: str, number: int, applied: bool) -> None:
+        if name in self.batches:
+            self.batches[name][number] = applied
+
+
+class Callers:
+    def __init__(self, server: Server, seed: int) -> None:
+        self._server = server
+        self._random = random.Random(seed)
+        self._model = Model()
+        self.calls = self.gone = self.acknowledged = self.steady = 0
+        self.outcomes: Counter[str] = Counter()
+
+    async def run(self, calls: int, kills: int) -> None:
+        for life in range(kills + 1):
+            self._server.start()
+            async with grpc.aio.insecure_channel(f"127.0.0.1:{self._server.port}", OWN) as channel:
+                stub = HullServiceStub(channel)
+                await self._check(stub)
+                end = calls * (life + 1) // (kills + 1)
+                steady = asyncio.create_task(self._write_steadily(stub))
+                async with asyncio.TaskGroup() as group:
+                    for _ in range(CALLERS):
+                        group.create_task(self._call_until(stub, end))
+                steady.cancel()
+                await asyncio.gather(steady, return_exceptions=True)
+                if not steady.cancelled() and (error := steady.exception()) is not None:
+                    raise error
+                if life < kills:
+                    burst = [asyncio.create_task(self._call_until(stub, end + 2 * CALLERS)) for _ in range(CALLERS)]
+                    await asyncio.sleep(self._random.uniform(0, 0.03))
+                    self._server.kill()
+                    await asyncio.gather(*burst, return_exceptions=True)
+                else:
+                    await self._check(stub)
+                    await self._probe(stub)
+        self._server.process.send_signal(signal.SIGTERM)
+        require(self._server.process.wait(PATIENCE) == 0, "the server did not end in peace")
+
+    async def _call_until(self, stub: HullServiceStub, calls: int) -> None:
+        while self.calls < calls:
+            self.calls += 1
+            name = self._random.choice(KEPT * 2 + CHURNED * 3)
+            make = self._random.choice([self._apply, self._apply, self._stream, self._create, self._read, self._watch])
+            if name in CHURNED and self._random.random() < 0.3:
+                make = self._delete
+            doing = asyncio.create_task(make(stub, name))
+            if self._random.random() < 0.8:
+                await asyncio.wait([doing], timeout=self._random.random() ** 3 * LONGEST_STAY)
+                self.gone += not doing.done()
+                doing.cancel()
+            try:
+                await asyncio.wait_for(doing, PATIENCE)
+            except asyncio.CancelledError:
+                self.outcomes["gone"] += 1
+            except TimeoutError:
+                raise BrokenPromiseError(f"{make.__name__} {name} was not answered") from None
+            except grpc.RpcError as error:
+                self.outcomes[error.code().name] += 1
+                require("see the server's log" not in error.details(), f"{make.__name__} {name}: {error.details()}")
+
+    async def _apply(self, stub: HullServiceStub, name: str) -> None:
+        number = self._model.new(name)
+        try:
+            await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(number)))
+        except grpc.RpcError as error:
+            if error.code() in REFUSED:
+                self._model.told(name, number, applied=False)
+            raise
+        self._model.told(name, number, applied=True)
+        self.acknowledged += 1
+
+    async def _stream(self, stub: HullServiceStub, name: str) -> None:
+        numbers = [self._model.new(name) for _ in range(STREAMED)]
+
+        async def requests():
+            for number in numbers:
+                yield pb.StreamRequest(name=name, batch=batch_of(number))
+
+        call = stub.Stream(requests())
+        try:
+            done = iter(numbers)
+            async for _ in call:
+                self._model.told(name, next(done), applied=True)
+                self.acknowledged += 1
+        finally:
+            call.cancel()
+
+    async def _create(self, stub: HullServiceStub, name: str) -> None:
+        await stub.CreateHull(pb.CreateHullRequest(name=name))
+
+    async def _delete(self, stub: HullServiceStub, name: str) -> None:
+        await stub.DeleteHull(pb.DeleteHullRequest(name=name))
+
+    async def _read(self, stub: HullServiceStub, name: str) -> None:
+        await stub.GetHull(pb.GetHullRequest(name=name))
+
+    async def _watch(self, stub: HullServiceStub, name: str) -> None:
+        call = stub.Watch(pb.WatchRequest(name=name))
+        try:
+            async for _ in call:
+                return
+        finally:
+            call.cancel()
+
+    async def _write_steadily(self, stub: HullServiceStub) -> None:
+        while True:
+            number = self._model.new(STEADY)
+            await stub.Apply(pb.ApplyRequest(name=STEADY, batch=batch_of(number)), timeout=PATIENCE)
+            self._model.told(STEADY, number, applied=True)
+            self.steady += 1
+
+    async def _check(self, stub: HullServiceStub) -> None:
+        for name, batches in self._model.batches.items():
+            numbers = list(batches)
+            xy = np.array([[number, float(number) ** 2] for number in numbers]).reshape(-1, 2)
+            query = pb.CountRequest(name=name)
+            query.points.packed = xy.tobytes()
+            try:
+                counts = list((await stub.Count(query, timeout=PATIENCE)).counts)
+            except grpc.RpcError as error:
+                require(error.code() == grpc.StatusCode.NOT_FOUND, f"{name}: {error.details()}")
+                counts = [0] * len(numbers)
+            for number, times in zip(numbers, counts, strict=True):
+                known = batches[number]
+                require(times <= 1, f"{name}: batch {number} is there {times} times")
+                require(known is not True or times == 1, f"{name}: batch {number} was acknowledged and is lost")
+                require(known is not False or times == 0, f"{name}: batch {number} was refused and is there")
+                batches[number] = times == 1
+
+    async def _probe(self, stub: HullServiceStub) -> None:
+        """No zombies: every name can be deleted, created, written, read and deleted."""
+        for name in CHURNED:
+            try:
+                await stub.DeleteHull(pb.DeleteHullRequest(name=name), timeout=PATIENCE)
+            except grpc.RpcError as error:
+                require(error.code() == grpc.StatusCode.NOT_FOUND, f"{name}: {error.details()}")
+            await stub.CreateHull(pb.CreateHullRequest(name=name), timeout=PATIENCE)
+            await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(1)), timeout=PATIENCE)
+            hull = (await stub.GetHull(pb.GetHullRequest(name=name), timeout=PATIENCE)).hull
+            require((hull.revision, hull.point_count) == (1, 1), f"{name} holds another hull's points: {hull}")
+            await stub.DeleteHull(pb.DeleteHullRequest(name=name), timeout=PATIENCE)
+
+
+def callers(folder: Path, calls: int, kills: int, seed: int) -> str:
+    """Make the calls. Returns the counts; raises BrokenPromiseError with what was broken."""
+    server = Server(folder / "data")
+    run = Callers(server, seed)
+    try:
+        asyncio.run(run.run(calls, kills))
+    except BaseException:
+        print(server.log.read_text(), file=sys.stderr)
+        raise
+    finally:
+        server.process.kill()
+        server.process.wait()
+    return (
+        f"calls: {run.calls}, their callers went away in {run.gone}; kills: {kills}; batches acknowledged: "
+        f"{run.acknowledged}, and {run.steady} of a steady writer; lost: 0, doubled: 0, zombies: 0; "
+        f"other ends: {dict(run.outcomes.most_common())}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Callers that go away while a model watches.")
+    parser.add_argument("--calls", type=int, default=10_000, help="how many (default 10,000)")
+    parser.add_argument("--kills", type=int, default=5, help="how often the server is killed meanwhile (default 5)")
+    parser.add_argument("--seed", type=int, default=0, help="what the calls depend on (default 0)")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        print(callers(Path(folder), options.calls, options.kills, options.seed))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,305 @@
+"""Flip bits of data folders, one at a time, and see whether the storage ever loses an acknowledged batch in silence.
+
+    python tests/robustness/storage/flips.py [--flips 20000] [--seed 0] [--processes 2] [--folder /dev/shm]
+
+Folders of killed and of stopped servers. Every bit of the headers: of the database, of the log, of its frames, of all
+pages; then bits at random, anywhere. After each flip the folder is opened and compared with what was acknowledged; where
+it opens, one more batch is committed, and the folder opened again: damage may strike later.
+
+harmless: everything is there. repaired: a note says what was lost or mended. refused: a StorageError says why. Whatever
+else happens is a fault, and makes the exit code 1.
+"""
+
+import argparse
+import random
+import shutil
+import struct
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from multiprocessing import Pool
+from pathlib import Path
+
+import numpy as np
+
+from dynhull_server.state.records import Append, Create, Delete, HullRow, Kept, Record
+from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.port import StorageError
+from dynhull_server.storage.sqlite.folder import DATABASE
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+LOG = f"{DATABASE}-wal"
+NOTHING = np.empty((0, 2))
+
+HARMLESS, REPAIRED, REFUSED, SILENT, TRACEBACK = "harmless", "repaired", "refused", "silent losses", "tracebacks"
+FAULTS = SILENT, TRACEBACK
+
+# In a database: the file's header, and that of a page that is no part of an overflow chain.
+FILE_HEADER_BYTES, PAGE_HEADER_BYTES = 100, 12
+TREE_PAGES = (2, 5, 10, 13)
+LOG_HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
+
+Acknowledged = dict[int, list[Record]]
+
+
+@dataclass(frozen=True)
+class Flip:
+    """One bit of one file of one folder."""
+
+    folder: str
+    file: str
+    bit: int
+
+
+def record(number: int, revision: int, points: int = 3) -> Record:
+    """The batch that made a revision of a hull: always the same."""
+    rng = np.random.default_rng([number, revision])
+    deletes = rng.random((revision % 3, 2))
+    return Record(revision, rng.random((points, 2)), deletes, f"writer {revision % 4}", revision, revision % 5 == 0)
+
+
+def no_progress(done: int, total: int) -> None:
+    """Nobody watches."""
+
+
+class Builder:
+    """Fills a folder, and remembers what was acknowledged."""
+
+    def __init__(self, path: Path, durability: Durability) -> None:
+        self.storage = SQLiteStorage(path, durability)
+        self.storage.open(no_progress)
+        self.acknowledged: Acknowledged = {}
+
+    def create(self, number: int) -> None:
+        """A hull."""
+        row = HullRow(number, f"hull {number}", f"{number:016x}", 1.7e9 + number, number * 100)
+        self.storage.commit([Create(row)])
+        self.acknowledged[number] = []
+
+    def append(self, counts: dict[int, int], points: int = 3) -> None:
+        """Batches for hulls in one commit."""
+        changes = []
+        for number, count in counts.items():
+            revision = len(self.acknowledged[number])
+            changes.append(Append(number, [record(number, revision + i + 1, points) for i in range(count)]))
+        self.storage.commit(changes)
+        for change in changes:
+            self.acknowledged[change.number] += change.records
+
+    def snapshot(self, number: int, points: int) -> None:
+        """As of now."""
+        revision = len(self.acknowledged[number])
+        for step in self.storage.snapshot(number, revision, snapshot_points(number, revision, points), {"a": revision}):
+            self.storage.commit([step])
+
+    def delete(self, number: int, *, sweep: bool = True) -> None:
+        """A hull, and what it leaves."""
+        self.storage.commit([Delete(number)])
+        del self.acknowledged[number]
+        for step in self.storage.sweep() if sweep else ():
+            self.storage.commit([step])
+
+
+def snapshot_points(number: int, revision: int, count: int = 0) -> np.ndarray:
+    """The points that a hull is said to have at a revision. The first says how many."""
+    points = np.random.default_rng([number, revision, 7]).random((count, 2))
+    if count:
+        points[0] = count
+    return points
+
+
+def fill(builder: Builder) -> None:
+    """A bit of everything."""
+    for number in range(1, 6):
+        builder.create(number)
+    for turn in range(5):
+        builder.append({number: 1 + (turn + number) % 3 for number in (1, 2, 3, 4)})
+        if turn in (1, 2, 3):
+            builder.snapshot(1, 700)
+        if turn == 2:
+            builder.snapshot(2, 50)
+    builder.append({2: 1}, 1500)
+    builder.delete(3)
+    builder.append({1: 2})
+
+
+def build(root: Path) -> dict[str, Acknowledged]:
+    """Folders by name, and what was acknowledged in each."""
+    built = {}
+    for name, durability in (("killed", Durability.SYNC), ("killed-interval", Durability.INTERVAL)):
+        builder = Builder(root / "work", durability)
+        fill(builder)
+        built[name] = copied(builder, root / name)
+        builder.storage.close()
+        if name == "killed":
+            shutil.copytree(root / "work", root / "stopped")
+            built["stopped"] = builder.acknowledged
+        shutil.rmtree(root / "work")
+    # Most of it in the database, some of it in a log with frames of an earlier use behind it.
+    builder = Builder(root / "work", Durability.SYNC)
+    fill(builder)
+    builder.storage._copy_log("RESTART")  # as `checkpoint` does when the log is long
+    builder.append({1: 2})
+    builder.create(6)
+    builder.append({6: 1})
+    builder.delete(4, sweep=False)
+    built["checkpointed"] = copied(builder, root / "checkpointed")
+    builder.storage.close()
+    shutil.rmtree(root / "work")
+    return built
+
+
+def copied(builder: Builder, target: Path) -> Acknowledged:
+    """The folder as a killed process leaves it."""
+    shutil.copytree(builder.storage._folder.path, target)
+    return {number: list(records) for number, records in builder.acknowledged.items()}
+
+
+def headers(root: Path) -> Iterator[Flip]:
+    """Every bit of every header."""
+    for folder in sorted(path.name for path in root.iterdir()):
+        database = (root / folder / DATABASE).read_bytes()
+        page_bytes = struct.unpack(">H", database[16:18])[0]
+        spans = [(DATABASE, 0, FILE_HEADER_BYTES)]
+        for start in range(0, len(database), page_bytes):
+            first = start + (FILE_HEADER_BYTES if start == 0 else 0)
+            if database[first] in TREE_PAGES:
+                spans.append((DATABASE, first, PAGE_HEADER_BYTES))
+        log = root / folder / LOG
+        if log.exists():
+            spans.append((LOG, 0, LOG_HEADER_BYTES))
+            frames = range(LOG_HEADER_BYTES, log.stat().st_size, FRAME_HEADER_BYTES + page_bytes)
+            spans += [(LOG, start, FRAME_HEADER_BYTES) for start in frames]
+        for file, start, length in spans:
+            yield from (Flip(folder, file, bit) for bit in range(start * 8, (start + length) * 8))
+
+
+def anywhere(root: Path, count: int, seed: int) -> Iterator[Flip]:
+    """Bits at random: every folder as often as the others, every bit of it too."""
+    rng = random.Random(seed)
+    folders = sorted(root.iterdir())
+    sizes = {folder: [(file.name, file.stat().st_size) for file in sorted(folder.iterdir())] for folder in folders}
+    for i in range(count):
+        folder = folders[i % len(folders)]
+        names, weights = zip(*sizes[folder], strict=True)
+        (file,) = rng.choices(names, weights)
+        yield Flip(folder.name, file, rng.randrange(8 * dict(sizes[folder])[file]))
+
+
+def outcome(root: Path, acknowledged: Acknowledged, flip: Flip, scratch: Path) -> tuple[str, str]:
+    """What one flip does, and in which words."""
+    shutil.copytree(root / flip.folder, scratch)
+    path = scratch / flip.file
+    content = bytearray(path.read_bytes())
+    content[flip.bit // 8] ^= 1 << flip.bit % 8
+    path.write_bytes(content)
+    words: list[str] = []
+    try:
+        expected = dict(acknowledged)
+        grown = None
+        for _ in range(2):
+            storage = SQLiteStorage(scratch, Durability.NONE)
+            contents = storage.open(no_progress)
+            words += contents.notes
+            try:
+                differs = difference(storage, expected)
+                if differs and not words:
+                    return SILENT, differs
+                if grown is None:
+                    numbers = [row.number for row in contents.hulls]
+                    if not numbers:
+                        return REPAIRED, "; ".join(words)
+                    grown = min(numbers)
+                    last = storage.read(grown).last_revision
+                    new = record(grown, last + 1)
+                    storage.commit([Append(grown, [new])])
+                    expected[grown] = [*expected[grown][:last], new]
+            finally:
+                storage.close()
+    except StorageError as error:
+        return (REFUSED, str(error)) if str(error) else (TRACEBACK, repr(error))
+    except Exception as error:
+        return TRACEBACK, repr(error)
+    finally:
+        shutil.rmtree(scratch)
+    return (REPAIRED, "; ".join(words)) if words else (HARMLESS, "")
+
+
+def difference(storage: SQLiteStorage, acknowledged: Acknowledged) -> str:
+    """How the storage differs from what was acknowledged; empty where it does not."""
+    for number, records in acknowledged.items():
+        row = storage.row(number)
+        if row is None or row != HullRow(number, f"hull {number}", f"{number:016x}", 1.7e9 + number, number * 100):
+            return f"hull {number} is {row}"
+        kept = storage.read(number)
+        if not same(number, kept, records):
+            return f"hull {number} ends at {kept.last_revision}, not at {len(records)}, or differs"
+    return ""
+
+
+def same(number: int, kept: Kept, records: list[Record]) -> bool:
+    """Whether a hull is as it was acknowledged."""
+    points = snapshot_points(number, kept.revision, len(kept.points))
+    return (
+        kept.last_revision == len(records)
+        and np.array_equal(kept.points, points)
+        and kept.producers == ({"a": kept.revision} if kept.revision else {})
+        and all(map(equal, kept.records, records[kept.revision :]))
+    )
+
+
+def equal(one: Record, other: Record) -> bool:
+    """Field by field."""
+    return (
+        (one.revision, one.producer, one.sequence, one.lenient)
+        == (other.revision, other.producer, other.sequence, other.lenient)
+        and np.array_equal(one.inserts, other.inserts)
+        and np.array_equal(one.deletes, other.deletes)
+    )
+
+
+def tried(work: tuple[Path, Path, Acknowledged, Flip, int]) -> tuple[Flip, str, str]:
+    """In a process of the pool."""
+    root, scratch, acknowledged, flip, number = work
+    return flip, *outcome(root, acknowledged, flip, scratch / str(number))
+
+
+def run(folder: Path, count: int, seed: int, processes: int, every: int = 1) -> tuple[Counter[str], list[str]]:
+    """Outcomes counted, and what the faults were. Of the headers' bits one in `every`."""
+    root, scratch = folder / "folders", folder / "scratch"
+    root.mkdir()
+    scratch.mkdir()
+    built = build(root)
+    flips = [*list(headers(root))[::every], *anywhere(root, count, seed)]
+    work = ((root, scratch, built[flip.folder], flip, number) for number, flip in enumerate(flips))
+    counts: Counter[str] = Counter()
+    faults = []
+    with Pool(processes) as pool:
+        for flip, what, words in pool.imap_unordered(tried, work, chunksize=16):
+            counts[what] += 1
+            if what in FAULTS:
+                faults.append(f"{what}: {flip}: {words}")
+    return counts, faults
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Flip bits of data folders; count what the storage makes of it.")
+    parser.add_argument("--flips", type=int, default=20_000, help="at random, beside those of the headers")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--every", type=int, default=1, help="of the headers' bits, try one in so many")
+    parser.add_argument("--folder", type=Path, default=None, help="where to work; in memory is quickest")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=options.folder) as folder:
+        counts, faults = run(Path(folder), options.flips, options.seed, options.processes, options.every)
+    print(f"{counts.total():,} flips")
+    for what in (HARMLESS, REPAIRED, REFUSED, SILENT, TRACEBACK):
+        print(f"{what:14}{counts[what]:>8,}")
+    print(*faults, sep="\n")
+    sys.exit(1 if faults else 0)
+
+
+if __name__ == "__main__":
+    main()

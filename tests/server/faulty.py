@@ -1,0 +1,49 @@
+"""Runs the command that follows, with a storage that fails while a file of that name is in the folder given first.
+
+commit: a commit raises an I/O error after it has been kept. settle: what became of it cannot be decided. checkpoint:
+an I/O error. impossible: a checkpoint raises what it never should. thread: the committing thread ends.
+"""
+
+import errno
+import runpy
+import sys
+from pathlib import Path
+
+from dynhull_server.engine import supervisor
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+FAULTS = Path(sys.argv[1])
+
+
+def fails(name: str, error: BaseException) -> None:
+    if (FAULTS / name).exists():
+        raise error
+
+
+def no_disk() -> OSError:
+    return OSError(errno.EIO, "Input/output error")
+
+
+class Faulty(SQLiteStorage):
+    def commit(self, changes):
+        fails("thread", SystemExit())
+        super().commit(changes)
+        fails("commit", no_disk())
+
+    def settle(self):
+        fails("settle", no_disk())
+        super().settle()
+
+    def checkpoint(self):
+        fails("checkpoint", no_disk())
+        fails("impossible", ZeroDivisionError("never"))
+        super().checkpoint()
+
+
+if __name__ == "__main__":
+    from dynhull_server import app
+
+    app.SQLiteStorage = Faulty
+    supervisor.PATIENCE = 1.0
+    sys.argv = sys.argv[2:]
+    runpy.run_path(sys.argv[0], run_name="__main__")

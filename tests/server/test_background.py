@@ -1,0 +1,152 @@
+"""Nothing dies in silence: what fails in the background is tried again, counted, and makes the server unwell."""
+
+import os
+import resource
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import grpc
+import numpy as np
+import pytest
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from metrics import scrape
+from patience import PATIENCE, wait_until
+from server_process import Server, server_process
+
+from dynhull_client import DynhullError, HullClient, OutcomeUnknownError, UnavailableError
+
+FAULTY = str(Path(__file__).with_name("faulty.py"))
+SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.HealthCheckResponse.NOT_SERVING
+
+
+@contextmanager
+def faulty_server(folder: Path, *options: str, **expected: object) -> Iterator[tuple[Server, Path]]:
+    """A server and the folder in which a file named after a fault brings it about."""
+    faults = folder / "faults"
+    faults.mkdir()
+    wrap = [sys.executable, FAULTY, str(faults)]
+    with server_process("--data", str(folder / "data"), *options, wrap=wrap, **expected) as server:
+        yield server, faults
+
+
+def health(address: str) -> int:
+    with grpc.insecure_channel(address) as channel:
+        request = health_pb2.HealthCheckRequest(service="dynhull.v1.HullService")
+        return health_pb2_grpc.HealthStub(channel).Check(request).status
+
+
+def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_path: Path) -> None:
+    with (
+        faulty_server(tmp_path, "--metrics-port", "0", complaints="unwell: health is NOT_SERVING") as (server, faults),
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("a")
+        metrics = server.process.stdout.readline().split()[-1].removeprefix("http://").removesuffix("/metrics")
+        (faults / "checkpoint").touch()
+        wait_until(lambda: health(server.address) == NOT_SERVING)
+        counted = scrape(metrics)
+        assert counted['dynhull_background_failures_total{work="checkpoint"}'] >= 2
+        assert counted['dynhull_background_unwell{work="checkpoint"}'] == 1
+        assert counted['dynhull_background_failing_seconds{work="checkpoint"}'] > 1
+        assert counted['dynhull_background_unwell{work="snapshots"}'] == 0
+        assert client.apply("a", insert=[[1, 2]]).revision == 1  # it does what it can
+        (faults / "checkpoint").unlink()
+        wait_until(lambda: health(server.address) == SERVING)
+        assert scrape(metrics)['dynhull_background_unwell{work="checkpoint"}'] == 0
+
+
+def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Path) -> None:
+    with faulty_server(tmp_path, complaints="this is a bug") as (server, faults):
+        (faults / "impossible").touch()
+        wait_until(lambda: health(server.address) == NOT_SERVING)
+        (faults / "impossible").unlink()
+        wait_until(lambda: health(server.address) == SERVING)
+
+
+def test_the_process_ends_with_its_committing_thread(tmp_path: Path) -> None:
+    died = "background work has died"
+    with (
+        faulty_server(tmp_path, complaints=died, code=os.EX_SOFTWARE) as (server, faults),
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("a")
+        (faults / "thread").touch()
+        with pytest.raises(DynhullError):
+            client.apply("a", insert=[[1, 2]], timeout=PATIENCE)
+        server.process.wait(PATIENCE)
+
+
+def test_an_outcome_is_unknown_until_the_disk_can_be_read(tmp_path: Path) -> None:
+    with (
+        faulty_server(tmp_path, complaints="Input/output error") as (server, faults),
+        HullClient(server.address, retries=0) as client,
+    ):
+        client.create_hull("a")
+        client.apply("a", insert=[[0, 0]])
+        (faults / "settle").touch()
+        (faults / "commit").touch()
+        with pytest.raises(OutcomeUnknownError, match="unknown until the disk can be read again"):
+            client.apply("a", insert=[[1, 1]])
+        with pytest.raises(UnavailableError):
+            client.get_hull("a", min_revision=1)
+        with pytest.raises(UnavailableError):
+            client.apply("a", insert=[[2, 2]])
+        (faults / "commit").unlink()
+        (faults / "settle").unlink()
+        wait_until(lambda: readable(client))
+        assert client.count("a", [[0, 0], [1, 1], [2, 2]]).counts.tolist() == [1, 1, 0]  # it had been kept
+
+
+def readable(client: HullClient) -> bool:
+    try:
+        client.get_hull("a")
+    except UnavailableError:
+        return False
+    return True
+
+
+def test_a_writer_finds_out_and_goes_on(tmp_path: Path) -> None:
+    points = np.random.default_rng(5).normal(size=(30, 4, 2))
+    with (
+        faulty_server(tmp_path, complaints="Input/output error") as (server, faults),
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("a")
+        with client.writer("a", producer="p", batch_points=4, linger=0.0) as writer:
+            for i, each in enumerate(points):
+                if i == 10:
+                    (faults / "settle").touch()
+                    (faults / "commit").touch()
+                    threading.Timer(0.5, lambda: [(faults / name).unlink() for name in ("commit", "settle")]).start()
+                writer.put(insert=each)
+        assert client.last_sequence("a", "p") == client.get_hull("a").info.revision
+        assert set(client.count("a", points.reshape(-1, 2)).counts.tolist()) == {1}
+
+
+def test_without_descriptors_what_was_acknowledged_stays_and_all_goes_on_afterwards(tmp_path: Path) -> None:
+    data = str(tmp_path / "data")
+    points = np.random.default_rng(6).normal(size=(600, 5, 2))
+    with (
+        server_process("--data", data, "--snapshot-points", "1000", killed=True) as server,
+        HullClient(server.address) as client,
+    ):
+        pid = server.process.pid
+        before = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+        client.create_hull("a")
+        client.apply("a", insert=points[0])
+        used = max(int(each.name) for each in Path(f"/proc/{pid}/fd").iterdir())
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (used, before[1]))
+        for i, each in enumerate(points[1:500], start=1):  # more than makes a snapshot due
+            client.apply("a", insert=each, producer="p", sequence=i)
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, before)
+        for i, each in enumerate(points[500:], start=500):
+            client.apply("a", insert=each, producer="p", sequence=i)
+        assert health(server.address) == SERVING
+        server.process.send_signal(signal.SIGKILL)
+    with server_process("--data", data) as server, HullClient(server.address) as client:
+        assert client.get_hull("a").info.points == 5 * 600
+        assert client.verify("a").equal

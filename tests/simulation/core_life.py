@@ -1,0 +1,374 @@
+"""One life of a server that is the core and the group commit alone: no event loop, no threads.
+
+What the engine does with threads are actors here: one commits, one reads the disk, one computes, one lets pauses pass;
+and what they have done is news, which the core hears of one event at a time.
+"""
+
+from asyncio import CancelledError
+from collections import deque
+from collections.abc import Callable, Coroutine, Generator
+from functools import partial
+from typing import Any
+
+from dynhull.arrays import Points
+from dynhull_server.engine.batch_stream import BatchStream
+from dynhull_server.engine.group_commit import GroupCommit
+from dynhull_server.state.batch import Applied
+from dynhull_server.state.core import Core
+from dynhull_server.state.errors import HullNotFoundError, HullReplacedError, RefusedError, StoppingError
+from dynhull_server.state.events import (
+    Birth,
+    Commit,
+    Committed,
+    Compute,
+    Computed,
+    CreateHull,
+    DeleteHull,
+    Effect,
+    Event,
+    Examine,
+    Examined,
+    Failed,
+    Gone,
+    Moved,
+    NotExamined,
+    ReadHull,
+    Request,
+    Retried,
+    Retry,
+    Stopping,
+    Tick,
+    Told,
+    WriteBatch,
+)
+from dynhull_server.state.hull_state import HullState, Write
+from dynhull_server.state.limits import Limits
+from dynhull_server.state.trip import Trip
+from dynhull_server.storage.port import Storage
+
+from .clients import Client, content
+from .model import Model
+from .plan import Operation
+from .schedule import Schedule
+
+DAY = 90_000.0
+
+Condition = Callable[[], object]
+
+
+class Wait:
+    """Awaited by a client: goes on at a turn at which the condition holds."""
+
+    def __init__(self, condition: Condition) -> None:
+        self._condition = condition
+
+    def __await__(self) -> Generator[Condition, None, None]:
+        yield self._condition
+
+
+class Answer:
+    """A caller of the core."""
+
+    __slots__ = ("told",)
+
+    def __init__(self) -> None:
+        self.told = False
+
+    def tell(self, _: Request) -> None:
+        self.told = True
+
+    def is_told(self) -> bool:
+        return self.told
+
+
+class NoThreads:
+    """Threads for GroupCommit: its thread runs when there is work, and until there is none."""
+
+    def __init__(self) -> None:
+        self.items: list[Any] = []
+        self.run: Callable[[], None] = lambda: None
+
+    def inbox(self) -> "NoThreads":
+        return self
+
+    def spawn(self, _: str, run: Callable[[], None], __: object) -> "NoThreads":
+        self.run = run
+        return self
+
+    def put(self, item: Any) -> None:
+        self.items.append(item)
+
+    def take(self) -> list[Any]:
+        items, self.items = self.items, []
+        return items
+
+
+class CoreServer:
+    """Drives a Core as Engine does, an event a turn."""
+
+    def __init__(self, limits: Limits, storage: Storage, model: Model, schedule: Schedule) -> None:
+        self.model = model
+        self.schedule = schedule
+        self._limits = limits
+        self._storage = storage
+        contents = storage.open(lambda *_: None)
+        self.core = Core(limits, contents.next_number)
+        for row in contents.hulls:
+            kept = storage.read(row.number)
+            self.core.restore(row, HullState(limits, row.max_points, kept, now=0.0), len(kept.records))
+        threads: Any = NoThreads()
+        self._commits = GroupCommit(storage, threads, lambda _: None, lambda _: None)
+        self._events: deque[Event] = deque()
+        self._stepping = False
+        self._now = 0.0
+        self._news: deque[Callable[[], None]] = deque()
+        self._examining: deque[Examine] = deque()
+        self._computing: deque[Trip] = deque()
+        self._pauses: deque[Trip] = deque()
+        self._clients: list[ClientActor] = []
+        schedule.actor("commits", lambda: threads.items, lambda: threads.run())
+        schedule.actor("news", lambda: self._news, lambda: self._news.popleft()())
+        schedule.actor("disk", lambda: self._examining, self._examine)
+        schedule.actor("turns", lambda: self._computing, self._compute)
+        schedule.actor("pauses", lambda: self._pauses, lambda: self.dispatch(Retried(self._pauses.popleft())))
+
+    # Events
+
+    def dispatch(self, event: Event) -> None:
+        """Hand an event to the core, and carry out what it asks for."""
+        self._events.append(event)
+        if self._stepping:
+            return
+        self._stepping = True
+        while self._events:
+            for effect in self.core.step(self._events.popleft()):
+                self._carry_out(effect)
+        self._stepping = False
+
+    def _carry_out(self, effect: Effect) -> None:
+        match effect:
+            case Told():
+                for request in effect.requests:
+                    self.schedule.note((type(request).__name__, str(request.error)))
+                    request.to.tell(request)
+            case Commit():
+                self._commit(effect.ticket, effect.changes)
+            case Compute():
+                self._computing.append(effect.ticket)
+            case Examine():
+                self._examining.append(effect)
+            case Retry():
+                self._pauses.append(effect.ticket)
+            case Moved():
+                self.schedule.note((effect.hull.uid, effect.hull.counts.revision))
+
+    def _commit(self, trip: Trip, changes: list[Any]) -> None:
+        if self._storage.immediate:
+            self._storage.commit(changes)
+            self._events.append(Committed(trip))
+            return
+
+        def done(error: Exception | None, unknown: bool) -> None:
+            event = Committed(trip) if error is None else Failed(trip, error, unknown)
+            self._news.append(partial(self.dispatch, event))
+
+        self._commits.submit(changes, done)
+
+    def _compute(self) -> None:
+        trip = self._computing.popleft()
+        trip.run()
+        self._news.append(partial(self.dispatch, Computed(trip)))
+
+    def _examine(self) -> None:
+        effect = self._examining.popleft()
+        event: Event
+        try:
+            if effect.settle:
+                self._storage.settle()
+            row = self._storage.row(effect.number)
+            event = Examined(effect.ticket, effect.load(self._storage.read(effect.number)) if row else None)
+        except Exception as error:
+            event = NotExamined(effect.ticket, error)
+        self._news.append(partial(self.dispatch, event))
+
+    # What clients ask for
+
+    async def _ask(self, request: Request) -> Any:
+        self.dispatch(request)
+        if not request.to.told:
+            try:
+                await Wait(request.to.is_told)
+            except CancelledError:
+                self.dispatch(Gone(request))
+                raise
+        if request.error is not None:
+            raise request.error.with_traceback(None)
+        return request.result
+
+    def _birth(self) -> Birth:
+        return Birth(self.model.uid(), 0.0)
+
+    async def create(self, name: str, max_points: int) -> str:
+        uid: str = (await self._ask(CreateHull(Answer(), name, self._birth(), max_points))).uid
+        return uid
+
+    async def delete(self, name: str) -> None:
+        await self._ask(DeleteHull(Answer(), name))
+
+    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
+        birth = self._birth() if create else None
+        applied: Applied = await self._ask(WriteBatch(Answer(), name, write, birth, rows=write.rows))
+        return applied
+
+    def stream(self, name: str, *, create: bool) -> BatchStream:
+        hull = self.core.get(name) if name in self.core.hulls or not create else None
+        driver: Any = self
+        return BatchStream(driver, name, hull, lambda: None, self._birth)
+
+    async def news(self, stream: BatchStream) -> None:
+        await Wait(lambda: stream.applied or stream.refusal is not None)
+
+    async def vertices(self, name: str, rows: int) -> tuple[str, int, Points]:
+        hull = self.core.get(name)
+        counts, vertices = await self._ask(ReadHull(Answer(), hull, HullState.vertices, rows=rows))
+        return hull.uid, counts.revision, vertices
+
+    async def recall(self, name: str, uid: str, revision: int) -> Points | None:
+        hull = self.core.get(name)
+        if hull.uid != uid:
+            raise HullReplacedError(name, hull.uid)
+        _, vertices = await self._ask(ReadHull(Answer(), hull, lambda state: state.earlier_vertices(revision)))
+        found: Points | None = vertices
+        return found
+
+    async def last(self, name: str, producer: str) -> int:
+        hull = self.core.get(name)
+        _, last = await self._ask(ReadHull(Answer(), hull, lambda state: state.last_sequence(producer)))
+        return int(last)
+
+    async def special(self, client: Client, op: Operation) -> None:
+        """A snapshot, as housekeeping takes it, or a day that passes."""
+        if op["do"] == "day":
+            self.model.days = True
+            self._now += DAY
+            self.dispatch(Tick(self._now))
+            return
+        try:
+            hull = self.core.get(op["name"])
+            read = ReadHull(Answer(), hull, lambda state: (state.hull.points(), state.producers()))
+            counts, (points, producers) = await self._ask(read)
+        except (RefusedError, StoppingError) as error:
+            client.refused(self.model.ask(op["name"]), error, (HullNotFoundError,))
+            return
+        for step in self._storage.snapshot(hull.row.number, counts.revision, points, producers):
+            failed: list[Exception | None] = []
+            self._commits.submit([step], partial(_remember, failed))
+            await Wait(partial(len, failed))
+            if failed[0] is not None:
+                return
+
+    # Its life
+
+    def client(self, client: Client, operations: list[Operation]) -> None:
+        """A client comes."""
+        actor = ClientActor(client, operations)
+        self._clients.append(actor)
+        self.schedule.actor(client.producer, actor.ready, actor.act)
+
+    def waiting(self) -> list[str]:
+        """Who has not been answered, and what has not ended."""
+        waiting = [actor.client.producer for actor in self._clients if actor.waiting]
+        return [*waiting, "the core"] if self.core.busy else waiting
+
+    def probe(self, probe: Coroutine[Any, Any, None]) -> None:
+        """Run a probe to its end."""
+        condition: Condition | None = None
+        while True:
+            try:
+                condition = probe.send(None)
+            except StopIteration:
+                return
+            while not condition():
+                if not self.schedule.turn():
+                    raise self.model.finds("a probe waits for ever")
+
+    def check(self) -> None:
+        """Compare what is in memory with the truth."""
+        compare(self.core, self.model)
+
+    def kill(self) -> None:
+        """Nothing more happens."""
+        for actor in self._clients:
+            actor.abandon()
+
+    def stop(self) -> None:
+        """Begin nothing more; then nothing may be left under way."""
+        self.model.stopping = True
+        self.dispatch(Stopping())
+        self.schedule.rest()
+
+
+def compare(core: Core, model: Model) -> None:
+    """Compare what a core holds with the truth."""
+    if list(core.hulls) != sorted(model.alive):
+        raise model.finds(f"in memory there are the hulls {list(core.hulls)}, kept are {sorted(model.alive)}")
+    for name, hull in core.hulls.items():
+        truth, state = model.alive[name], hull.state
+        if hull.row != truth.row:
+            raise model.finds(f"in memory there is {hull.row}, kept is {truth.row}")
+        held = (hull.counts.revision, state.counts.revision, content(state.hull.points()))
+        if held != (truth.revision, truth.revision, truth.contents[-1]):
+            raise model.finds(f"{name} is {held} in memory, kept is {truth.revision, truth.contents[-1]}")
+        if not model.days and state.producers() != truth.producers:
+            raise model.finds(f"producers in memory: {state.producers()}, kept: {truth.producers}")
+        if core.state_of(name) != "there":
+            raise model.finds(f"{name} is {core.state_of(name)} at rest")
+
+
+def _remember(failed: list[Exception | None], error: Exception | None, _: bool) -> None:
+    failed.append(error)
+
+
+class ClientActor:
+    """A client, its turns: it begins an operation, hears an answer, or goes away."""
+
+    def __init__(self, client: Client, operations: list[Operation]) -> None:
+        self.client = client
+        self._left = deque(operations)
+        self._work: Coroutine[Condition, None, None] | None = None
+        self._condition: Condition | None = None
+        self._leave: int | None = None
+
+    def ready(self) -> object:
+        if self._condition is None:
+            return self._left
+        return self._leave is not None or self._condition()
+
+    def act(self) -> None:
+        if self._condition is None:
+            op = self._left.popleft()
+            self._leave = op.get("leave")
+            self._work = self.client.do(op)  # type: ignore[assignment]
+            self._advance()
+        elif self._condition():
+            self._advance()
+        elif self._leave:
+            self._leave -= 1
+        else:
+            self._advance(CancelledError())
+
+    @property
+    def waiting(self) -> bool:
+        return self._condition is not None
+
+    def abandon(self) -> None:
+        """The server has been killed: nobody waits any more."""
+        if self._work is not None:
+            self._work.close()
+
+    def _advance(self, gone: CancelledError | None = None) -> None:
+        assert self._work is not None
+        try:
+            self._condition = self._work.send(None) if gone is None else self._work.throw(gone)
+        except (StopIteration, CancelledError):
+            self._work = self._condition = None

@@ -1,0 +1,106 @@
+"""What happens in a simulated run, as data: lives of a server, what clients do in each, what fails, and how a life ends.
+
+A plan is a dictionary that JSON can hold, so that one that found something can be shrunk and kept. The schedule, that is
+who comes when, is drawn from the plan's seed and nothing else.
+
+    {"seed": 7, "layer": "core", "limits": {...},
+     "lives": [{"clients": [[operation, ...], ...], "end": "kill", "after": 40}, ...],
+     "faults": [{"at": "commit", "nth": 3, "kind": "ghost", "calls": 1}, ...]}
+
+An operation names what to do and to which hull; with `leave` its caller goes away after so many turns of waiting.
+"""
+
+import random
+from typing import Any
+
+Plan = dict[str, Any]
+Operation = dict[str, Any]
+
+NAMES = ("a", "b", "c")
+
+# What can be asked for, and how often.
+CORE = {"write": 40, "stream": 14, "read": 12, "delete": 10, "create": 8, "recall": 5, "snapshot": 5, "last": 4, "day": 1}
+SHELL = {"write": 34, "stream": 14, "read": 10, "delete": 9, "create": 8, "recall": 12, "last": 3, "watch": 6, "rest": 8}
+
+# How a commit fails: surely not done; done or not though it raised; and not decided before it is settled.
+COMMIT_FAULTS = ("nothing", "full", "lost", "ghost", "memory", "ghost memory", "later lost", "later ghost")
+# How everything else fails.
+OTHER_FAULTS = ("os", "memory")
+CORE_PLACES = ("commit",) * 6 + ("read", "settle", "row")
+SHELL_PLACES = (*CORE_PLACES, "oldest", "snapshot", "sweep", "checkpoint", "sync")
+
+ENDS = ("kill", "kill", "stop")
+
+
+def random_plan(seed: int, layer: str) -> Plan:
+    """A plan that anything may be in."""
+    draw = random.Random(seed)
+    names = NAMES[: draw.randint(1, 3)]
+    immediate = draw.random() < 0.03
+    return {
+        "seed": seed,
+        "layer": layer,
+        "storage": "immediate" if immediate else "memory",
+        "limits": {
+            "max_hulls": draw.choice((1, 2, 10, 10, 10)),
+            "max_points": draw.choice((3, 100, 100, 100)),
+            "max_producers": draw.choice((1, 10, 10)),
+            "max_producers_per_caller": draw.choice((1, 10, 10)),
+            "history_bytes": draw.choice((0, 700, 1_000_000)),
+        },
+        "lives": [_life(draw, names, layer) for _ in range(draw.choice((1, 1, 2, 3)))],
+        "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
+    }
+
+
+def _life(draw: random.Random, names: tuple[str, ...], layer: str) -> dict[str, Any]:
+    clients = [
+        [_operation(draw, names, layer) for _ in range(draw.randint(1, 4))] for _ in range(draw.choice((1, 2, 2, 3, 4)))
+    ]
+    life: dict[str, Any] = {"clients": clients, "end": draw.choice(ENDS)}
+    if draw.random() < 0.5:
+        life["after"] = int(draw.expovariate(1 / 25))
+    return life
+
+
+def _operation(draw: random.Random, names: tuple[str, ...], layer: str) -> Operation:
+    weights = CORE if layer == "core" else SHELL
+    do = draw.choices(list(weights), list(weights.values()))[0]
+    op: Operation = {"do": do, "name": draw.choice(names)}
+    if do in ("write", "stream"):
+        op["create"] = draw.random() < 0.7
+        op["numbered"] = draw.random() < 0.5
+        op["rows"] = draw.choice((1, 1, 1, 200, 200, 200_000))
+        if draw.random() < 0.2:
+            op["delete"] = draw.choice(("strict", "lenient"))
+        if draw.random() < 0.03:
+            op["torn"] = draw.randint(1, 4)
+        if do == "stream":
+            op["batches"] = draw.randint(1, 5)
+            op["window"] = draw.randint(1, 5)
+        elif draw.random() < 0.05:
+            op["shared"] = True
+    elif do == "delete":
+        if draw.random() < 0.01:
+            op["crowd"] = 400
+    elif do == "create":
+        op["max_points"] = draw.choice((0, 0, 2))
+    elif do == "rest":
+        op["seconds"] = 10 ** draw.uniform(-3, 0.8)
+    elif do in ("recall", "watch"):
+        op["back"] = draw.randint(0, 3)
+    elif do == "read":
+        op["rows"] = draw.choice((1, 1, 200))
+    if draw.random() < 0.2:
+        op["leave"] = int(draw.expovariate(1 / 3))
+    return op
+
+
+def _fault(draw: random.Random, layer: str) -> dict[str, Any]:
+    at = draw.choice(CORE_PLACES if layer == "core" else SHELL_PLACES)
+    return {
+        "at": at,
+        "nth": 1 + int(draw.expovariate(1 / 4)),
+        "kind": draw.choice(COMMIT_FAULTS if at == "commit" else OTHER_FAULTS),
+        "calls": draw.choice((1, 1, 1, 2, 5)),
+    }

@@ -1,0 +1,89 @@
+"""Plays a plan: its lives one after the other on one storage, each with a look at all promises at its end."""
+
+import traceback
+from dataclasses import dataclass
+from typing import Any
+
+from dynhull_server.state.limits import Limits
+from dynhull_server.storage.memory import MemoryStorage
+
+from .clients import Client, probe
+from .core_life import CoreServer
+from .model import Finding, Model
+from .plan import Plan
+from .schedule import Schedule
+from .store import FaultyStorage
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a plan: how many lives, a hash of all that happened, and the promise that was broken, if any."""
+
+    lives: int
+    trace: int
+    finding: str | None
+    where: str = ""
+
+    @property
+    def kind(self) -> str:
+        """The finding without its numbers, to compare it with another one."""
+        return "".join(letter for letter in self.finding or "" if not letter.isdigit())[:40]
+
+
+def play(plan: Plan) -> Outcome:
+    """Play a plan to its end, or to the first broken promise."""
+    limits = Limits(**plan["limits"])
+    model, schedule = Model(limits), Schedule(plan["seed"])
+    immediate = plan["storage"] == "immediate"
+    storage = FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=immediate)
+    lives = 0
+    where = ""
+    try:
+        for life in plan["lives"]:
+            lives += 1
+            _live(life, limits, model, schedule, storage)
+        _live({"clients": [], "end": "kill"}, limits, model, schedule, storage)
+    except Finding:
+        where = traceback.format_exc()
+    except Exception as error:  # the server's own code has failed
+        model.finds(f"{type(error).__name__}: {error}")
+        where = traceback.format_exc()
+    return Outcome(lives, schedule.trace, model.finding, where)
+
+
+def _live(life: dict[str, Any], limits: Limits, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:
+    schedule.clear()
+    model.new_life()
+    storage.calm = True
+    server = CoreServer(limits, storage, model, schedule)
+    server.check()
+    storage.calm = False
+    for number, operations in enumerate(life["clients"]):
+        server.client(Client(number, server, model), operations)
+    if "after" in life:
+        for _ in range(life["after"]):
+            if not schedule.turn():
+                break
+    else:
+        schedule.rest()
+        _look(server, model, schedule, storage)
+    if life["end"] == "stop":
+        server.stop()
+        if server.waiting():
+            raise model.finds(f"after the end these wait: {server.waiting()}")
+    storage.dead = True
+    server.kill()
+
+
+def _look(server: CoreServer, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:
+    """Everything is as it should be, and works, once all clients have been answered and nothing fails any more."""
+    if server.waiting():
+        raise model.finds(f"these wait for ever: {server.waiting()}")
+    storage.calm = True
+    server.check()
+    names = sorted({*model.alive, "a"})
+    anew = schedule.random.choice(names)
+    for name in names:
+        server.probe(probe(server, model, name, anew=name == anew))
+    server.check()
+    storage.calm = False

@@ -1,0 +1,153 @@
+"""A storage that fails when the plan says so, and reports to the model what it has kept."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from dynhull.arrays import Points
+from dynhull_server.state.records import HullRow, Kept
+from dynhull_server.storage.port import NEWEST, Contents, NotCommittedError, Progress, Step, Storage
+
+from .model import Model
+
+ERRORS: dict[str, type[Exception]] = {"os": OSError, "memory": MemoryError}
+
+
+class FaultyStorage:
+    """Stands before another storage. It outlives the servers: each life opens it anew.
+
+    Args:
+        inner: keeps the hulls, and never fails.
+        model: hears of everything that is kept.
+        faults: what fails: the nth call of a method and the `calls` - 1 after it.
+        immediate: whether commits take no time; then nothing may fail.
+
+    Attributes:
+        calm: whether nothing fails any more.
+        dead: whether the server has been killed: its remains cannot touch the storage.
+        give_way: called where another thread may go on: before a commit or read, and after it.
+    """
+
+    def __init__(self, inner: Storage, model: Model, faults: Sequence[dict[str, Any]], *, immediate: bool) -> None:
+        self.immediate = immediate
+        self.calm = self.dead = False
+        self.give_way: Callable[[], None] = lambda: None
+        self._inner = inner
+        self._model = model
+        self._faults = {
+            (fault["at"], fault["nth"] + more): fault["kind"] for fault in faults for more in range(fault["calls"])
+        }
+        self._calls: Counter[str] = Counter()
+        self._undecided: tuple[Sequence[Any], bool] | None = None
+
+    def _fault(self, place: str) -> str | None:
+        if self.dead:
+            raise SystemExit("a killed server's remains come to the storage")
+        self._calls[place] += 1
+        kind = None if self.calm else self._faults.get((place, self._calls[place]))
+        if kind is not None:
+            self._model.faulty = True
+        return kind
+
+    def _fail(self, place: str) -> None:
+        kind = self._fault(place)
+        if kind is not None:
+            raise ERRORS[kind](f"{place} fails, as planned")
+
+    def open(self, progress: Progress) -> Contents:
+        """Decide what was left undecided, and take up everything."""
+        self.dead = False
+        self._decide()
+        return self._inner.open(progress)
+
+    def commit(self, changes: Sequence[Any]) -> None:
+        """Keep the changes, and fail before, instead or afterwards."""
+        self.give_way()
+        kind = self._fault("commit")
+        self._decide()
+        match kind:
+            case None:
+                self._keep(changes)
+            case "nothing":
+                raise NotCommittedError("the commit fails, as planned")
+            case "full":
+                raise NotCommittedError("the disk is full, as planned", full=True)
+            case "later lost" | "later ghost":
+                self._undecided = changes, kind == "later ghost"
+                raise OSError("the commit fails, as planned")
+            case _:
+                if kind.startswith("ghost"):
+                    self._keep(changes)
+                raise (MemoryError if kind.endswith("memory") else OSError)("the commit fails, as planned")
+        self.give_way()
+
+    def _keep(self, changes: Sequence[Any]) -> None:
+        self._model.landed(changes)
+        try:
+            self._inner.commit(changes)
+        except Exception as error:
+            raise self._model.finds(f"the storage was asked for the impossible: {changes}: {error!r}") from error
+
+    def _decide(self) -> None:
+        if self._undecided is not None:
+            changes, kept = self._undecided
+            self._undecided = None
+            if kept:
+                self._keep(changes)
+
+    def settle(self) -> None:
+        """Decide what was left undecided."""
+        self._fail("settle")
+        self._decide()
+
+    def row(self, number: int) -> HullRow | None:
+        """The row of a hull."""
+        self._fail("row")
+        return self._inner.row(number)
+
+    def read(self, number: int, until: int = NEWEST) -> Kept:
+        """A hull."""
+        self.give_way()
+        self._fail("read")
+        kept = self._inner.read(number, until)
+        self.give_way()
+        return kept
+
+    def oldest(self, number: int) -> int:
+        """The oldest revision of a hull."""
+        self._fail("oldest")
+        return self._inner.oldest(number)
+
+    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
+        """Steps, each of which may fail."""
+        for step in self._inner.snapshot(number, revision, points, producers):
+            self.give_way()
+            self._fail("snapshot")
+            yield step
+
+    def sweep(self) -> Iterator[Step]:
+        """Steps, each of which may fail."""
+        self._fail("sweep")
+        for step in self._inner.sweep():
+            self.give_way()
+            self._fail("sweep")
+            yield step
+
+    def sync(self) -> None:
+        """Fails, perhaps."""
+        self.give_way()
+        self._fail("sync")
+        self._inner.sync()
+
+    def checkpoint(self) -> None:
+        """Fails, perhaps."""
+        self.give_way()
+        self._fail("checkpoint")
+        self._inner.checkpoint()
+
+    def bytes_used(self) -> int:
+        """What it takes."""
+        return self._inner.bytes_used()
+
+    def close(self) -> None:
+        """The next life opens it again."""
