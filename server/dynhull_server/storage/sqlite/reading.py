@@ -92,6 +92,8 @@ def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kep
     Raises:
         DamagedError: a row is damaged or missing.
     """
+    if until < hull.oldest:
+        raise DamagedError(f"revision {until} of hull {hull.row.name!r} is not kept any more")
     try:
         kept = _newest_snapshot(connection, hull, until)
         ids = hull.between(kept.revision, until)
