@@ -15,7 +15,7 @@ from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import migrate
 from .reading import read_hull
 from .schema import FORMAT
-from .totals import STOPPED, renew_totals
+from .totals import STOPPED, Totals, renew_totals
 
 PAGES_A_STEP = 256
 
@@ -61,7 +61,7 @@ def check(path: Path, progress: Progress) -> Report:
         StorageError: it holds no hulls, or cannot be read at all.
     """
     with _opened(path) as opened:
-        findings = examine(opened.connection, opened.version, progress)
+        findings = examine(opened.connection, opened.version, opened.own, progress)
         return _report(findings, opened.notes)
 
 
@@ -126,11 +126,13 @@ class _Opened:
         connection: to it.
         version: its format.
         notes: what was lost at the end of its log.
+        own: the totals in its own file, None where a server works on it.
     """
 
     connection: sqlite3.Connection
     version: int
     notes: list[str]
+    own: Totals | None
 
 
 def _claim(target: Path) -> bool:
@@ -159,9 +161,10 @@ def _opened(path: Path) -> Iterator[_Opened]:
     folder = Folder(path, Disk())
     with ExitStack() as stack:
         notes: list[str] = []
+        own = None
         # A log that is being written to cannot be examined, and need not be: its server has read it.
         if stack.enter_context(folder.alone()):
-            notes = folder.check_log()
+            notes, own = folder.check_log()
         if not folder.disk.size(folder.database):
             raise StorageError(f"{path} holds no hulls: there is no {DATABASE} in it")
         # Without a log nothing needs to be written beside the database to read it.
@@ -172,7 +175,7 @@ def _opened(path: Path) -> Iterator[_Opened]:
             version = format_of(connection, folder.database)
             if version == 0:
                 raise StorageError(f"{path} holds no hulls")
-            yield _Opened(connection, version, notes)
+            yield _Opened(connection, version, notes, own)
         except sqlite3.Error as error:
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
@@ -181,7 +184,7 @@ def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
     """Make a folder of today's format that nobody works on out of copied pages, and examine it."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("BEGIN IMMEDIATE")
-    findings = examine(connection, opened.version, lambda *_: None)
+    findings = examine(connection, opened.version, opened.own, lambda *_: None)
     report = _report(findings, opened.notes)
     if report.fatal:
         raise DamagedError(f"it is damaged, so it was not copied: {'; '.join(report.fatal)}")

@@ -82,12 +82,15 @@ def format_of(connection: sqlite3.Connection, database: Path) -> int:
     return version
 
 
-def examine(connection: sqlite3.Connection, version: int, progress: Progress) -> Findings:
+def examine(
+    connection: sqlite3.Connection, version: int, own: Totals | None, progress: Progress
+) -> Findings:
     """Compare everything that a database holds with what its checksums and totals say.
 
     Args:
         connection: inside a transaction, so that all is of one moment.
         version: its format.
+        own: the totals in the database's own file, without its log; None where they are not known.
         progress: called with rows done and rows in all.
     """
     findings = Findings()
@@ -97,6 +100,8 @@ def examine(connection: sqlite3.Connection, version: int, progress: Progress) ->
             return findings
         _check_structure(connection, version, findings)
         _Examination(connection, version, findings, progress).run()
+        if own is not None and own.commits > findings.ledger.totals.commits:
+            findings.fatal.append("log and database do not belong together: the database has later commits than its log")
     except sqlite3.Error as error:
         findings.fatal.append(f"a part of the database cannot be read ({error})")
     return findings

@@ -108,18 +108,20 @@ def _damage(
     The frames behind the damaged one are taken for whole where their checksums run on from the one before.
     """
     damaged: int | None = None
+    foreign: int | None = None
     commits = 0
     others_follow = False
     for number, frame in enumerate(frames, start=1):
         same = [one == other for one, other in zip(frame.salts, salts, strict=True)]
         if not any(same):
-            break  # of an earlier use of the file
+            foreign = foreign or number
+            continue
         whole = all(same) and _checksum(state, frame.header[:8] + frame.page, order) == frame.sums
         state = frame.sums
-        if damaged is None and whole:
+        if damaged is None and foreign is None and whole:
             continue
         if damaged is None:
-            damaged = number
+            damaged = foreign or number
         else:
             others_follow |= whole and commits > 0
         commits += frame.commit != 0 and (whole or number == damaged)

@@ -52,7 +52,7 @@ from .ledger import (
 from .reading import Readers, begin, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
 from .migration import make_tables, migrate
-from .totals import MODES, STOPPED, read_totals, renew_totals
+from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
 CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays the ones behind it by little
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # a step
@@ -98,8 +98,8 @@ class SQLiteStorage:
         with ExitStack() as stack:
             stack.enter_context(self._folder.held())
             try:
-                notes = self._folder.check_log()
-                findings, version = self._examined(progress)
+                notes, own = self._folder.check_log()
+                findings, version = self._examined(own, progress)
                 if findings.fatal:
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
@@ -313,14 +313,14 @@ class SQLiteStorage:
 
     # Opening
 
-    def _examined(self, progress: Progress) -> tuple[Findings, int]:
+    def _examined(self, own: Totals | None, progress: Progress) -> tuple[Findings, int]:
         """What is there, and its format; nothing is changed."""
         if not self._folder.disk.size(self._folder.database):
             return Findings(), 0
         with closing(self._folder.connect(Access.READ)) as connection:
             connection.execute("BEGIN")
             version = format_of(connection, self._folder.database)
-            return (examine(connection, version, progress) if version else Findings()), version
+            return (examine(connection, version, own, progress) if version else Findings()), version
 
     def _take_up(self, findings: Findings, version: int) -> None:
         """Bring the database to today's format and repair it, and say in it that somebody works on it."""
