@@ -1,7 +1,7 @@
 """The port: what the engine asks of a storage, whatever is behind it.
 
-Calls block until they are done. One thread commits; reads come from any thread, at any time. A storage starts no threads
-of its own: the engine calls `sync` and `checkpoint`, and carries out the steps of `snapshot` and `sweep`.
+Calls block until they are done. One thread commits; reads come from any thread, at any time. A storage starts no
+threads of its own: the engine calls `sync` and `checkpoint`, and carries out the steps of `snapshot` and `sweep`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -84,7 +84,7 @@ class Storage(Protocol):
     def commit(self, changes: Sequence["Change | Step"]) -> None:
         """Keep all of the changes or none, as durably as was promised.
 
-        A change applies to what the ones before it have made. A step of a hull that was deleted meanwhile changes nothing.
+        A change applies to what the ones before it have made. A step of a hull that was deleted changes nothing.
 
         Raises:
             NotCommittedError: none was kept, and none will be found later. Also where a hull is there that is to be

@@ -82,9 +82,7 @@ def format_of(connection: sqlite3.Connection, database: Path) -> int:
     return version
 
 
-def examine(
-    connection: sqlite3.Connection, version: int, own: Totals | None, progress: Progress
-) -> Findings:
+def examine(connection: sqlite3.Connection, version: int, own: Totals | None, progress: Progress) -> Findings:
     """Compare everything that a database holds with what its checksums and totals say.
 
     Args:
@@ -101,7 +99,9 @@ def examine(
         _check_structure(connection, version, findings)
         _Examination(connection, version, findings, progress).run()
         if own is not None and own.commits > findings.ledger.totals.commits:
-            findings.fatal.append("log and database do not belong together: the database has later commits than its log")
+            findings.fatal.append(
+                "log and database do not belong together: the database has later commits than its log"
+            )
     except sqlite3.Error as error:
         findings.fatal.append(f"a part of the database cannot be read ({error})")
     return findings
@@ -193,29 +193,29 @@ class _Examination:
 
     def _snapshots(self) -> None:
         query = "SELECT id, hull, revision, chunks, state, checksum FROM snapshots ORDER BY id"
-        for id, number, revision, chunks, state, stored in self._connection.execute(query):
-            self._newest_snapshot = id
+        for place, number, revision, chunks, state, stored in self._connection.execute(query):
+            self._newest_snapshot = place
             scanned = self._hulls.get(number)
             if scanned is None:
-                self._ledger.dead["snapshots"].append(id)
-            elif _matches(stored, state, id, number, revision, chunks):
-                scanned.snapshots[id] = Snapshot(id, revision, array("q", [MISSING]) * chunks)
+                self._ledger.dead["snapshots"].append(place)
+            elif _matches(stored, state, place, number, revision, chunks):
+                scanned.snapshots[place] = Snapshot(place, revision, array("q", [MISSING]) * chunks)
             else:
-                scanned.rows.snapshots.append(Snapshot(id, revision if isinstance(revision, int) else 0))
+                scanned.rows.snapshots.append(Snapshot(place, revision if isinstance(revision, int) else 0))
 
     def _chunks(self) -> None:
         """Fill in where the snapshots' chunks lie."""
-        places = {id: snapshot.chunks for each in self._hulls.values() for id, snapshot in each.snapshots.items()}
+        chunks = {key: snapshot.chunks for each in self._hulls.values() for key, snapshot in each.snapshots.items()}
         column = "points" if self._contents else "NULL"
         query = f"SELECT rowid, snapshot, number, checksum, {column} FROM chunks ORDER BY rowid"  # noqa: S608  (ours)
         newest = MISSING
-        for id, snapshot, number, stored, data in self._counted(query):
-            newest = id
-            place = places.get(snapshot)
-            if place is None:
-                self._ledger.dead["chunks"].append(id)
+        for place, snapshot, number, stored, data in self._counted(query):
+            newest = place
+            places = chunks.get(snapshot)
+            if places is None:
+                self._ledger.dead["chunks"].append(place)
             elif not self._contents or _matches(stored, data, snapshot, number):
-                place[number] = id
+                places[number] = place
             if isinstance(snapshot, int):
                 self._newest_snapshot = max(self._newest_snapshot, snapshot)
         self._ledger.chunk_ids = count(newest + 1)
@@ -226,11 +226,11 @@ class _Examination:
         query = f"SELECT rowid, hull, first, last, checksum, {column} FROM batches ORDER BY rowid"  # noqa: S608  (ours)
         newest = MISSING
         hulls, dead = self._hulls, self._ledger.dead["batches"]
-        for id, number, first, last, stored, payload in self._counted(query):
-            newest = id
+        for place, number, first, last, stored, payload in self._counted(query):
+            newest = place
             scanned = hulls.get(number)
             if scanned is None:
-                dead.append(id)
+                dead.append(place)
                 if isinstance(number, int):
                     self._next_number = max(self._next_number, number + 1)
                 continue
@@ -241,7 +241,7 @@ class _Examination:
                 self._findings.fatal.append(f"a row of batches of hull {scanned.rows.row.name!r} is damaged")
                 continue
             scanned.gaps |= first != scanned.rows.last + 1 and len(scanned.lasts) > 0
-            scanned.rows.append(first, last, id, each)
+            scanned.rows.append(first, last, place, each)
             scanned.lasts.append(last)
             if not whole:
                 scanned.damaged[first] = each
@@ -283,7 +283,7 @@ class _Examination:
         expected = np.append(base, lasts)[:-1] + 1
         if needed < len(firsts) and firsts[needed] > base + 1:
             self._findings.blame(hull, f"revisions {base + 1} to {firsts[needed] - 1} are missing", fatal=True)
-        for row in np.flatnonzero(firsts[1:] != expected[1:]) + 1:
+        for row in (np.flatnonzero(firsts[1:] != expected[1:]) + 1).tolist():
             text = f"revisions {expected[row]} to {firsts[row] - 1} are missing"
             if firsts[row] < expected[row]:
                 text = f"revisions {firsts[row]} to {lasts[row - 1]} are there twice"

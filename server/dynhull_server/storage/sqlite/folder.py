@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ..port import DamagedError, FormatError, LockedError
 from .disk import Access, Disk
-from .examine import format_of
 from .log import check_log
 from .totals import Totals, read_totals
 
@@ -44,7 +43,8 @@ class Folder:
         lock = self.disk.lock(self.path / LOCK)
         if lock is None:
             raise LockedError(
-                f"another server, or a command, works on {self.path}: stop it first, or choose another folder with --data"
+                f"another server, or a command, works on {self.path}: stop it first, or choose another folder "
+                "with --data"
             )
         with lock:
             yield

@@ -1,7 +1,7 @@
 """Is the write-ahead log whole? SQLite itself drops everything after a damaged frame, and does not say so.
 
-The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. A frame counts where both of its salts are
-those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit there may lie
+The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. A frame counts where both of its salts
+are those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit may lie
 
 * frames of an earlier use of the file: both of their salts are others;
 * one commit that did not finish, when the process or the power failed, or when the disk was full: nobody was told of it.
@@ -70,8 +70,8 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
     if others_follow and (own is None or own.mode not in UNSYNCED):
         raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: restore a backup")
     return (
-        f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most {commits or 1} of "
-        "the newest commits; whoever wrote them was not told that they were kept, unless the disk lost them afterwards"
+        f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most "
+        f"{commits or 1} of the newest commits; whoever wrote them was not told that they were kept, unless the disk lost them afterwards"
     )
 
 

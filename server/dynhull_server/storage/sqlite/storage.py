@@ -4,9 +4,9 @@ Outcomes. A commit that fails before its COMMIT has written no frame with a comm
 itself SQLite writes the frames in order, the one with the mark last, so a write that fails leaves no whole mark either.
 Everything else that COMMIT may fail with (a sync, no memory, shared memory that cannot grow) can come after the mark: a
 crash now would make the next recovery find the commit, though this process does not see it. `settle` decides it with a
-commit of its own. That one is written either behind the frames in question, if they are part of the log as SQLite sees it
-now, or over them. In the second case the first of them is gone, and with it all: checksums run on from frame to frame, so
-none behind it can be valid. Once it is durable, the outcome is what can be read.
+commit of its own. That one is written either behind the frames in question, if they are part of the log as SQLite sees
+it now, or over them. In the second case the first of them is gone, and with it all: checksums run on from frame to
+frame, so none behind it can be valid. Once it is durable, the outcome is what can be read.
 """
 
 import json
@@ -17,7 +17,6 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
-from typing import IO
 
 from dynhull.arrays import Points
 
@@ -49,9 +48,9 @@ from .ledger import (
     Ledger,
     Snapshot,
 )
+from .migration import make_tables, migrate
 from .reading import Readers, begin, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
-from .migration import make_tables, migrate
 from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
 CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays the ones behind it by little
@@ -228,8 +227,8 @@ class SQLiteStorage:
         snapshot = Snapshot(next(self._ledger.snapshot_ids), revision, array("q", ids))
         self._under_way[snapshot.id] = set(ids)
         try:
-            for i, (id, start) in enumerate(zip(ids, starts, strict=True)):
-                yield Chunk(id, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
+            for i, (place, start) in enumerate(zip(ids, starts, strict=True)):
+                yield Chunk(place, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
             yield Finish(number, snapshot, json.dumps(dict(producers)).encode())
         finally:
             del self._under_way[snapshot.id]
@@ -261,7 +260,7 @@ class SQLiteStorage:
         with self._visible:
             live = {snapshot.id for hull in self._ledger.hulls.values() for snapshot in hull.snapshots}
             live |= self._under_way.keys()
-            self._ledger.dead["chunks"] = array("q", (id for id, snapshot in rows if snapshot not in live))
+            self._ledger.dead["chunks"] = array("q", (place for place, snapshot in rows if snapshot not in live))
 
     def _few(self, ids: "array[int]", columns: str, table: str, sized: str) -> list[Sequence[int]]:
         """Some columns of the first of the rows: as many as fit into a step, at least one."""
