@@ -1,4 +1,4 @@
-"""`dynhull backup`, `dynhull restore`, `dynhull export`: data folders as files."""
+"""`dynhull backup`, `dynhull restore`, `dynhull check`, `dynhull export`: data folders as files."""
 
 import json
 import sys
@@ -57,7 +57,7 @@ def check(
     with _told(), progress_bar("rows") as progress:
         report = copies.check(data, progress)
     for hull in report.hulls:
-        typer.echo(f"{hull.name}: {hull.summary}: {'; '.join(hull.problems) or 'whole'}")
+        typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
     for problem in [*report.notes, *report.fatal]:
         typer.echo(problem, err=True)
     if report.fatal:

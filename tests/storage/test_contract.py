@@ -1,5 +1,6 @@
 """What every storage promises, whatever is behind it."""
 
+import io
 import itertools
 import sqlite3
 import threading
@@ -12,6 +13,7 @@ from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NEWEST, DamagedError, NotCommittedError
 from dynhull_server.storage.sqlite.disk import Disk
+from dynhull_server.storage.sqlite.folder import DATABASE
 from dynhull_server.storage.sqlite.storage import CHUNK_POINTS, SQLiteStorage
 
 NOTHING = np.empty((0, 2))
@@ -24,32 +26,25 @@ class MemoryDisk(Disk):
     def __init__(self):
         self._name = f"file:/simulated-{next(SIMULATED)}?vfs=memdb"
         self._keep = sqlite3.connect(self._name, uri=True, check_same_thread=False)
-        self._locked = False
 
     def make(self, folder):
-        pass
+        """There are no folders."""
 
-    def lock(self, file):
-        return None if self._locked else self
-
-    def __enter__(self):
-        self._locked = True
-        return self
-
-    def __exit__(self, *_):
-        self._locked = False
+    def lock(self, _):
+        return io.StringIO()
 
     def size(self, file):
-        (pages,) = self._keep.execute("PRAGMA page_count").fetchone()
-        return pages if file.suffix == ".db" and "unfinished" not in file.name else None
+        if file.name != DATABASE:
+            return None
+        return self._keep.execute("PRAGMA page_count").fetchone()[0]
 
-    def open(self, file):
-        return open("/dev/null", "rb")
+    def open(self, _):
+        return io.BytesIO()
 
     def sync(self, file):
-        pass
+        """There is nothing more durable."""
 
-    def connect(self, database, access):
+    def connect(self, *_):
         return sqlite3.connect(self._name, uri=True, isolation_level=None, check_same_thread=False)
 
 

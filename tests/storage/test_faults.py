@@ -244,9 +244,11 @@ def test_reading_and_writing_need_no_new_descriptors(storage):
     taken = []
     try:
         resource.setrlimit(resource.RLIMIT_NOFILE, (256, hard))
-        with pytest.raises(OSError, match="Too many open files"):
-            while True:
+        while len(taken) < 256:
+            try:
                 taken.append(os.open("/dev/null", os.O_RDONLY))
+            except OSError:
+                break
         results = []
         threads = [threading.Thread(target=lambda: results.append(storage.read(1).last_revision)) for _ in range(16)]
         for thread in threads:

@@ -83,7 +83,7 @@ def test_another_programs_database_is_refused(folder):
     with pytest.raises(FormatError, match="another program"):
         opened(folder)
     (folder / DATABASE).write_bytes(b"not a database at all" * 100)
-    with pytest.raises(DamagedError, match="no readable database .*: restore a backup"):
+    with pytest.raises(DamagedError, match=r"no readable database .*: restore a backup"):
         opened(folder)
 
 
@@ -186,6 +186,24 @@ def test_a_damaged_end_is_cut_at_the_last_whole_batch(folder):
     storage.close()
 
 
+def test_a_damaged_end_that_a_snapshot_reaches_into_is_cut_at_the_snapshot(folder):
+    storage, _ = opened(folder)
+    fill(storage, 3)
+    storage.commit([Append(1, records(4, 8))])
+    snapshot(storage, 6)
+    storage.close()
+    flip(folder / DATABASE, record(8).inserts.tobytes())
+    storage, contents = opened(folder)
+    assert "revisions 4 to 8 are damaged: cut off at revision 6" in contents.notes[0]
+    assert storage.read(1).last_revision == 6
+    append(storage, 7, 9)
+    same(storage.read(1).records, records(7, 9))
+    storage.close()
+    storage, _ = opened(folder)
+    same(storage.read(1).records, records(7, 9))
+    storage.close()
+
+
 def test_a_damaged_snapshot_gives_way_to_the_one_before(folder):
     storage, _ = opened(folder)
     fill(storage, 10)
@@ -262,7 +280,7 @@ def test_a_damaged_header_of_the_log_is_refused(crash, byte):
     content = bytearray((crash / LOG).read_bytes())
     content[byte] ^= 1
     (crash / LOG).write_bytes(content)
-    with pytest.raises(DamagedError, match="the header of .* is damaged"):
+    with pytest.raises(DamagedError, match=r"the header of .* is damaged"):
         opened(crash)
 
 

@@ -27,12 +27,12 @@ class HullReport:
     Attributes:
         name: its name.
         summary: what there is of it.
-        problems: what is wrong with it; empty where nothing is.
+        whole: whether all of it is as it was written.
     """
 
     name: str
     summary: str
-    problems: list[str]
+    whole: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,5 +204,5 @@ def _report(findings: Findings, notes: list[str]) -> Report:
         summary = f"revision {hull.last}, {len(hull.ids)} rows of batches"
         if hull.snapshots:
             summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
-        reports.append(HullReport(hull.row.name, summary, findings.hulls.get(hull.row.number, [])))
+        reports.append(HullReport(hull.row.name, summary, hull.row.number not in findings.damaged))
     return Report(reports, notes + findings.notes, findings.fatal)

@@ -151,9 +151,10 @@ class DropBatches:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Step: a hull's newest row of batches, which is damaged, is gone."""
+    """Step: a hull's newest row of batches, which is damaged, is gone; it ends at revision `last`."""
 
     number: int
+    last: int
     weight: int
 
 
@@ -309,7 +310,8 @@ class Group:
         rows = self._ledger.hulls[step.number]
 
         def cut() -> None:
-            rows.last = rows.firsts.pop() - 1
+            rows.last = step.last
+            rows.firsts.pop()
             rows.ids.pop()
             rows.sum -= step.weight
 

@@ -4,9 +4,9 @@ The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. 
 are those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit may lie
 
 * frames of an earlier use of the file: both of their salts are others;
-* one commit that did not finish, when the process or the power failed, or when the disk was full: nobody was told of it.
+* one commit that did not finish, because the process, the power or the room ended: nobody was told of it.
 
-Everything else is damage. A single salt that differs is, too: SQLite would take the rest for an earlier use of the file.
+Everything else is damage. One salt that differs alone is, too: SQLite would take the rest for an earlier use.
 """
 
 import struct
@@ -71,7 +71,8 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
         raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: restore a backup")
     return (
         f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most "
-        f"{commits or 1} of the newest commits; whoever wrote them was not told that they were kept, unless the disk lost them afterwards"
+        f"{commits or 1} of the newest commits; whoever wrote them was not told that they were kept, unless the disk "
+        "lost them afterwards"
     )
 
 

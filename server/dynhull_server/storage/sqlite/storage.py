@@ -58,6 +58,7 @@ DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # a step
 
 CHECKPOINT_BYTES = 16 * 2**20  # of log, before it is copied into the database
 LONGEST_LOG_BYTES = 64 * 2**20  # kept when the log is begun anew
+START_PATIENCE_MS = 1000  # for readers, at the start
 PATIENCE_MS = 10  # for writers and readers, before the log is begun anew; meanwhile no commit begins
 
 SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durability.NONE: "OFF"}
@@ -104,7 +105,7 @@ class SQLiteStorage:
                 stack.callback(self._disconnect)
                 self._take_up(findings, version)
                 self._checkpointer = stack.enter_context(closing(self._folder.connect(Access.WRITE)))
-                self._begin_log_anew()
+                self._begin_log_anew(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
                 self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
             except sqlite3.OperationalError as error:
@@ -239,8 +240,10 @@ class SQLiteStorage:
             yield DropSnapshot(number, hull.snapshots[0])
         yield from self._drop_dead("chunks", "points")
         while (hull := self._ledger.hulls.get(number)) and (ids := hull.superfluous()):
-            rows = self._few(ids, "first, last, checksum", "batches", "payload")
-            weights = sum(weight(stored, number, first, last) for first, last, stored in rows)
+            rows = self._few(ids, "batches.rowid, first, last, checksum", "batches", "payload")
+            if any(place != row[0] for place, row in zip(ids, rows, strict=False)) or not rows:
+                raise DamagedError(f"{self._folder.database}: a row of batches of hull {number} is missing")
+            weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
             yield DropBatches(number, ids[: len(rows)], weights)
 
     def sweep(self) -> Iterator[Step]:
@@ -278,18 +281,19 @@ class SQLiteStorage:
 
     def sync(self) -> None:
         """Make durable what was committed."""
-        with self._housekeeping:
-            if self._log_in_doubt:
-                # After a sync that failed, the next may succeed without the pages that the first one lost.
-                if self._copy_log("FULL") != (0, 0):
-                    raise StorageError("the log is in use: it is made durable later")
-                self._log_in_doubt = False
-                return
-            try:
-                self._folder.disk.sync(self._log)
-            except BaseException:
-                self._log_in_doubt = True
-                raise
+        if self._log_in_doubt:
+            # After a sync that failed, the next may succeed without the pages that the first one lost.
+            with self._housekeeping:
+                busy, left = self._copy_log("FULL")
+            if busy or left:
+                raise StorageError("the log is in use: it is made durable later")
+            self._log_in_doubt = False
+            return
+        try:
+            self._folder.disk.sync(self._log)
+        except BaseException:
+            self._log_in_doubt = True
+            raise
 
     def checkpoint(self) -> None:
         """Copy the log into the database beside commits, when it is long, then begin it anew.
@@ -341,10 +345,12 @@ class SQLiteStorage:
         self._ledger.totals = replace(self._ledger.totals, mode=mode)
         return self._ledger
 
-    def _begin_log_anew(self) -> None:
+    def _begin_log_anew(self, own: Totals | None) -> None:
         """So that the database's own file says who works on it, and nothing that failed lies behind the log's end."""
+        self._checkpointer.execute(f"PRAGMA busy_timeout = {START_PATIENCE_MS}")
         busy, _ = self._copy_log("RESTART")
-        if busy:
+        # A backup may have begun before the server that was here stopped: then the file says it already.
+        if busy and (own is None or own.mode == STOPPED):
             raise LockedError(f"somebody reads {self._folder.database}: wait until they are done")
         self._checkpointer.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
 
