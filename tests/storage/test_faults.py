@@ -35,12 +35,14 @@ class FaultyDisk(Disk):
     def __init__(self):
         self.statement, self.error, self.late = "", None, False
         self.no_sync = self.no_connection = False
+        self.connections_left = 10**6
 
     def fail(self, statement, error, *, late=False):
         self.statement, self.error, self.late = statement, error, late
 
     def connect(self, database, access):
-        if self.no_connection:
+        self.connections_left -= 1
+        if self.no_connection or self.connections_left < 0:
             raise failure(sqlite3.SQLITE_CANTOPEN)
         disk = self
 
@@ -277,4 +279,56 @@ def test_a_start_without_descriptors_is_refused_and_can_be_tried_again(folder, d
     disk.no_connection = False
     storage = SQLiteStorage(folder, disk=disk)
     storage.open(no_progress)
+    storage.close()
+
+
+@pytest.mark.parametrize("connections", range(1, 10))
+@pytest.mark.parametrize("state", ["new", "stopped", "killed"])
+def test_a_start_that_fails_half_way_can_be_tried_again(tmp_path, disk, state, connections):
+    folder = tmp_path / "data"
+    if state != "new":
+        storage, _ = opened(folder)
+        fill(storage, 3)
+        crash = killed(folder, tmp_path / "crash")
+        storage.close()
+        folder = crash if state == "killed" else folder
+    disk.connections_left = connections
+    try:
+        storage = SQLiteStorage(folder, disk=disk)
+        storage.open(no_progress)
+        storage.close()
+    except StorageError:
+        assert connections < 9
+    storage, contents = opened(folder)
+    assert contents.notes == []
+    if state != "new":
+        same(storage.read(1).records, records(1, 3))
+    storage.close()
+
+
+@pytest.mark.parametrize("statement", ["UPDATE totals", "COMMIT"])
+@pytest.mark.parametrize("error", [failure(FULL), failure(sqlite3.SQLITE_IOERR_FSYNC)], ids=str)
+def test_a_folder_that_could_not_be_closed_well_is_whole(folder, disk, statement, error):
+    storage = SQLiteStorage(folder, disk=disk)
+    storage.open(no_progress)
+    fill(storage, 3)
+    disk.fail(statement, error)
+    storage.close()
+    storage, contents = opened(folder)
+    same(storage.read(1).records, records(1, 3))
+    assert contents.notes == []
+    storage.close()
+
+
+def test_a_folder_is_closed_while_an_outcome_is_unknown(folder, disk):
+    storage = SQLiteStorage(folder, disk=disk)
+    storage.open(no_progress)
+    fill(storage, 3)
+    disk.fail("COMMIT", failure(sqlite3.SQLITE_IOERR_FSYNC))
+    with pytest.raises(sqlite3.OperationalError):
+        append(storage, 4, 4)
+    storage.close()
+    storage, contents = opened(folder)
+    same(storage.read(1).records, records(1, 3))
+    assert contents.notes == []
     storage.close()

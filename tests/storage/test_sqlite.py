@@ -175,7 +175,7 @@ def test_a_damaged_end_is_cut_at_the_last_whole_batch(folder):
     flip(folder / DATABASE, record(9).inserts.tobytes())
     storage, contents = opened(folder)
     assert contents.notes == [
-        f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: cut off at revision 8, the last whole batch"
+        f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: cut off at revision 8, the last whole one"
     ]
     same(storage.read(1).records, records(1, 8))
     append(storage, 9, 9)

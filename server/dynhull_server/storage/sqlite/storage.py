@@ -99,7 +99,7 @@ class SQLiteStorage:
             stack.enter_context(self._folder.held())
             try:
                 notes, own = self._folder.check_log()
-                findings, version = self._examined(own, progress)
+                findings, version = self._examined(stack, own, progress)
                 if findings.fatal:
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
@@ -125,6 +125,7 @@ class SQLiteStorage:
             with suppress(sqlite3.Error, StorageError):
                 self._writer.execute("PRAGMA synchronous = FULL")
                 self._write(Group(self._in_mode(STOPPED), []))
+                self._guard.close()
         self._open.close()
 
     # Committing
@@ -149,6 +150,8 @@ class SQLiteStorage:
         connection.execute(UPDATE_TOTALS, replace(totals, commits=totals.commits + 1).row)
         connection.execute("COMMIT")
         self._set_synchronous(connection)
+        with self._housekeeping:
+            self._copy_log("RESTART")  # if it can be: else what failed stays behind the log's end for a while
         connection.execute("BEGIN")
         ledger = load(connection)
         connection.execute("COMMIT")
@@ -316,14 +319,30 @@ class SQLiteStorage:
 
     # Opening
 
-    def _examined(self, own: Totals | None, progress: Progress) -> tuple[Findings, int]:
-        """What is there, and its format; nothing is changed."""
+    def _examined(self, stack: ExitStack, own: Totals | None, progress: Progress) -> tuple[Findings, int]:
+        """What is there, and its format; nothing is changed, but that a database is made where there is none.
+
+        The last connection that is closed drops the log, but not if it only reads. A log that is gone while the
+        database's own file says that it is in use is taken for lost. So the connection that reads here outlives all
+        others, unless the database says that it is not in use any more.
+        """
         if not self._folder.disk.size(self._folder.database):
-            return Findings(), 0
-        with closing(self._folder.connect(Access.READ)) as connection:
-            connection.execute("BEGIN")
-            version = format_of(connection, self._folder.database)
-            return (examine(connection, version, own, progress) if version else Findings()), version
+            self._make_database()
+        connection = self._guard = stack.enter_context(closing(self._folder.connect(Access.READ)))
+        version = format_of(connection, self._folder.database)
+        if version == 0:  # a server was killed before it had made the tables
+            self._make_database()
+            version = FORMAT
+        connection.execute("BEGIN")
+        findings = examine(connection, version, own, progress)
+        connection.execute("ROLLBACK")
+        return findings, version
+
+    def _make_database(self) -> None:
+        with closing(self._connect_writer()) as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            make_tables(connection)
+            connection.execute("COMMIT")
 
     def _take_up(self, findings: Findings, version: int) -> None:
         """Bring the database to today's format and repair it, and say in it that somebody works on it."""
@@ -331,9 +350,7 @@ class SQLiteStorage:
         connection.execute("PRAGMA synchronous = FULL")
         self._ledger = findings.ledger
         connection.execute("BEGIN IMMEDIATE")
-        if version == 0:
-            make_tables(connection)
-        elif version < FORMAT:
+        if version < FORMAT:
             migrate(connection, findings.ledger)
         elif not findings.both_totals:
             renew_totals(connection, findings.ledger.totals)
@@ -370,7 +387,7 @@ class SQLiteStorage:
 
     def _connect_reader(self) -> sqlite3.Connection:
         """Reads once, so that its files are open."""
-        connection = self._folder.connect(Access.WRITE)
+        connection = self._folder.connect(Access.READ)
         try:
             connection.execute("SELECT id FROM totals").fetchone()
         except BaseException:
