@@ -10,6 +10,7 @@ import pytest
 from folders import (
     DATABASE,
     FORMAT_1,
+    LOG,
     append,
     fill,
     flip,
@@ -144,6 +145,22 @@ def test_a_damaged_backup_is_not_restored(paths):
     flip(copy / DATABASE, record(4).inserts.tobytes())
     refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones are there")
     assert not new.exists()
+
+
+def test_what_is_left_is_restored_where_loss_is_accepted(paths, tmp_path):
+    data, _, new = paths
+    storage, _ = opened(data)
+    fill(storage, 5)
+    storage.close()
+    storage, _ = opened(data)
+    append(storage, 6, 9)
+    crash = killed(data, tmp_path / "crash")
+    storage.close()
+    (crash / LOG).unlink()
+    refused("restore", crash, "--data", new, says="dynhull restore --accept-loss")
+    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hulls")
+    assert "done without what is lost" in finished.stderr
+    assert served(new, 5).notes == []
 
 
 KILLED = """

@@ -65,7 +65,7 @@ def check(path: Path, progress: Progress) -> Report:
         return _report(findings, opened.notes)
 
 
-def copy(source: Path, target: Path, progress: Progress) -> Report:
+def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = False) -> Report:
     """Make a folder with all that another holds, its log included, as of one moment. Returns what is in the copy.
 
     A copy has another name until it is whole and on the disk: half of one is never taken for one.
@@ -74,12 +74,13 @@ def copy(source: Path, target: Path, progress: Progress) -> Report:
         source: a data folder or a backup; a server may be writing to it.
         target: the new folder; it may be there, and empty.
         progress: called with pages done and pages in all.
+        accept_loss: whether to do without what is damaged or missing of the log.
 
     Raises:
         StorageError: there is no database in the source, or something in the target.
         DamagedError: what was copied is not whole.
     """
-    with _opened(source) as opened:
+    with _opened(source, accept_loss=accept_loss) as opened:
         made = _claim(target)
         unfinished = target / UNFINISHED
         try:
@@ -157,14 +158,19 @@ def _make_durable(path: Path) -> None:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[_Opened]:
+def _opened(path: Path, *, accept_loss: bool = False) -> Iterator[_Opened]:
     folder = Folder(path, Disk())
     with ExitStack() as stack:
         notes: list[str] = []
         own = None
         # A log that is being written to cannot be examined, and need not be: its server has read it.
         if stack.enter_context(folder.alone()):
-            notes, own = folder.check_log()
+            try:
+                notes, own = folder.check_log()
+            except DamagedError as error:
+                if not accept_loss:
+                    raise
+                notes = [f"done without what is lost: {error}"]
         if not folder.disk.size(folder.database):
             raise StorageError(f"{path} holds no hulls: there is no {DATABASE} in it")
         # Without a log nothing needs to be written beside the database to read it.

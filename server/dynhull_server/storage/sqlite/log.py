@@ -28,6 +28,8 @@ HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
 CHECKED_BYTES = 24  # of the header
 MAGIC = (0x377F0682, 0x377F0683)  # checksums over little-endian, over big-endian words
 
+REMEDY = "restore a backup, or what is left without the newest commits (dynhull restore --accept-loss)"
+
 # After a power failure, what was not synced may have holes, and whole commits behind them.
 UNSYNCED = (MODES[Durability.INTERVAL], MODES[Durability.NONE])
 
@@ -51,7 +53,7 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
         if in_use:
             raise DamagedError(
                 f"{path} is missing or cut short, and the database beside it is incomplete without it: put it back, "
-                "or restore a backup"
+                f"or {REMEDY}"
             )
         return None
     with disk.open(path) as file:
@@ -62,13 +64,13 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
         if magic not in MAGIC or state != (sum0, sum1):
             if own is not None and not in_use:
                 return None  # just begun: nobody was told of anything in it
-            raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: restore a backup")
+            raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: {REMEDY}")
         damage = _damage(_frames(file, page_bytes), (salts[0], salts[1]), state, order)
     if damage is None:
         return None
     frame, commits, others_follow = damage
     if others_follow and (own is None or own.mode not in UNSYNCED):
-        raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: restore a backup")
+        raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: {REMEDY}")
     return (
         f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most "
         f"{commits or 1} of the newest commits; whoever wrote them was not told that they were kept, unless the disk "
