@@ -53,8 +53,10 @@ contract: .venv/.check  ## with a release: the contract that later ones must not
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics
 
-robustness: .venv/.test  ## kill, pause, cut off and starve a server a hundred times while a model checks its promises
+robustness: .venv/.test  ## kill, starve and damage servers, leave calls, flip bits, while models check every promise
 	$(BIN)/python tests/robustness/server/torture.py --faults 99
+	$(BIN)/python tests/robustness/server/callers.py --calls 10000 --kills 5
+	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 
 tests/strangers/node_modules: tests/strangers/package-lock.json tests/peers.sh
 	tests/peers.sh

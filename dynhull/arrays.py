@@ -18,6 +18,28 @@ LARGEST_EXACT_INTEGER = 2**53
 MOST_AXES = 64  # of an array: no list is nested deeper
 
 
+class Checked:
+    """Points that have been checked already, as those of a request: checking them again takes as long as locating some.
+
+    Args:
+        points: what `as_points` or `packed_points` has returned.
+    """
+
+    __slots__ = ("points",)
+
+    def __init__(self, points: Points) -> None:
+        self.points = points
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __getitem__(self, rows: slice) -> "Checked":
+        return Checked(self.points[rows])
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        return np.array(self.points, dtype=dtype, copy=copy)
+
+
 def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     """Return `xy` as a C-contiguous float64 array of shape (n, 2) with finite entries and no negative zeros.
 
@@ -25,8 +47,10 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
         ValueError: the shape is not (n, 2), an entry is not finite, or is no double (an integer beyond 2**53, say).
         TypeError: an entry is not a real number.
 
-    The message names the first bad row.
+    The message names the first bad row. `Checked` points are taken as they are.
     """
+    if type(xy) is Checked:
+        return xy.points
     if type(xy) is np.ndarray and (points := plain_points(xy)) is not None:
         return points
     return _finite(_as_pairs(xy, name), name)

@@ -68,7 +68,7 @@ nb::object as_points(const nb::object& xy) { return nb::module_::import_("dynhul
 
 // Whether this is numpy's array and no subclass of it: a masked array's rows may be missing.
 bool is_plain_array(const nb::object& xy) {
-  static const nb::handle type = nb::module_::import_("numpy").attr("ndarray").release();
+  static const nb::handle type = nb::object(nb::module_::import_("numpy").attr("ndarray")).release();
   return xy.type().is(type);
 }
 

@@ -2,15 +2,15 @@
 
 import asyncio
 import logging
+import math
 import os
+import ssl
 import sys
 from collections.abc import Callable
 from functools import partial
 
 import grpc
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
-from grpc_reflection.v1alpha import reflection
-from prometheus_client import start_http_server
+from grpc_health.v1 import health_pb2
 
 from .engine.engine import Engine
 from .engine.live_hull import LiveHull
@@ -18,12 +18,15 @@ from .engine.scrub import Scrub
 from .engine.supervisor import Supervisor
 from .engine.threads import Machine
 from .engine.verification import Verification
-from .rpc.access import EVERYTHING, Access, TokenFile
+from .rpc.access import ANYBODY, LOOK_SECONDS, Caller, TokenFile
 from .rpc.calls import Calls, Context
+from .rpc.health import Health
 from .rpc.hull_service import HullService
-from .rpc.methods import DESCRIPTOR, method_handlers
+from .rpc.methods import DESCRIPTOR, UnknownMethods, health_handlers, hull_handlers, reflection_handlers
 from .rpc.metrics import Metrics, StateCollector
-from .settings import Settings
+from .rpc.metrics_page import MetricsPage
+from .rpc.places import Places
+from .settings import Settings, is_loopback
 from .state.limits import Limits
 from .storage.durability import Durability
 from .storage.memory import MemoryStorage
@@ -41,6 +44,10 @@ NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 LAST_WORDS = 1.0
 # Milliseconds between signs of life on a quiet connection, and until one without an answer is given up.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
+# Bytes of each call that a client may send before they are read.
+LOOKAHEAD = 256 * 2**10
+# Milliseconds until a connection must be one of HTTP/2.
+HANDSHAKE_TIMEOUT = 10_000
 
 # A message of so many bytes beyond the limit is read, to be refused with details.
 REFUSED_BYTES = 64 * 2**20
@@ -57,7 +64,7 @@ class Server:
 
     Attributes:
         address: host:port it listens on, once started.
-        metrics_address: host:port for Prometheus; empty for none.
+        metrics_url: the page for Prometheus; empty for none.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -73,9 +80,13 @@ class Server:
         )
         self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
         self._metrics = Metrics()
-        authenticate = _anonymous if settings.tokens is None else _bearer(TokenFile(settings.tokens))
-        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, settings.max_streams)
-        self._health = health.aio.HealthServicer()
+        self._tokens = None if settings.tokens is None else TokenFile(settings.tokens)
+        authenticate = _anonymous if self._tokens is None else _bearer(self._tokens)
+        streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
+        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams)
+        self._health = Health(
+            Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
+        )
         self._server = grpc.aio.server(
             options=[
                 # gRPC's own refusal of a message has no details. So ours comes first, but for the very largest.
@@ -85,14 +96,17 @@ class Server:
                 ("grpc.so_reuseport", 0),
                 ("grpc.keepalive_time_ms", KEEPALIVE),
                 ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
+                ("grpc.http2.bdp_probe", 0),
+                ("grpc.http2.lookahead_bytes", LOOKAHEAD),
+                ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
+                ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
+                ("grpc.max_allowed_incoming_connections", settings.max_connections),
             ]
         )
-        self._telling: asyncio.Task[None] | None = None
         self._stop_metrics: Callable[[], None] = lambda: None
         self._serving = False
-        self._well = True
         self.address = ""
-        self.metrics_address = ""
+        self.metrics_url = ""
 
     async def start(self, progress: Callable[[int, int], None]) -> None:
         """Listen, take up what is stored, then serve. Meanwhile calls are told so, and health is NOT_SERVING.
@@ -110,21 +124,28 @@ class Server:
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )
-        self._server.add_generic_rpc_handlers((method_handlers(service, self._calls),))
-        health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
-        reflection.enable_server_reflection((SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME), self._server)
+        self._server.add_generic_rpc_handlers(
+            (
+                hull_handlers(service, self._calls),
+                health_handlers(self._health, self._calls),
+                reflection_handlers(self._calls),
+                UnknownMethods(self._calls),
+            )
+        )
         port = self._listen()
         self.address = f"{self._settings.host}:{port}"
         self._serve_metrics()
-        await self._health.set("", NOT_SERVING)
-        await self._health.set(SERVICE, NOT_SERVING)
+        self._health.set(NOT_SERVING, "", SERVICE)
         await self._server.start()
         for note in await self._engine.start(progress):
             log.warning("lost", extra={"what": note})
         self._calls.ready()
-        await self._health.set(SCRUB, SERVING)
+        self._health.set(SERVING, SCRUB)
         self._serving = True
         self._well_or_not(None)
+        if self._tokens is not None:
+            self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
+            self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
         if not self._settings.in_memory:
             interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
             self._engine.keep_house(self._settings.snapshot_points, interval)
@@ -136,7 +157,7 @@ class Server:
     async def drain(self) -> None:
         """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
         log.info("draining")
-        await self._health.enter_graceful_shutdown()
+        self._health.stop()
         self._serving = False
         await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
@@ -150,17 +171,9 @@ class Server:
         self._metrics.scrub_round()
 
     def _well_or_not(self, reason: str | None) -> None:
-        """Tell health checks. Only the last word counts, and words come one after the other."""
-        self._well = reason is None
-        if self._telling is None or self._telling.done():
-            self._telling = asyncio.get_running_loop().create_task(self._tell_health())
-
-    async def _tell_health(self) -> None:
-        told = None
-        while self._serving and told is not self._well:
-            told = self._well
-            for name in ("", SERVICE):
-                await self._health.set(name, SERVING if told else NOT_SERVING)
+        """Tell health checks."""
+        if self._serving:
+            self._health.set(SERVING if reason is None else NOT_SERVING, "", SERVICE)
 
     def _listen(self) -> int:
         address = f"{self._settings.host}:{self._settings.port}"
@@ -181,18 +194,26 @@ class Server:
         registry = self._metrics.registry
         registry.register(StateCollector(self._engine, self._metrics, self._supervisor, asyncio.get_running_loop()))
         host, port = self._settings.metrics_host, self._settings.metrics_port
+        open_to_others = not is_loopback(host)
+        tls = self._tls() if open_to_others else None
+        bearer = self._tokens.bearer if open_to_others and self._tokens is not None else None
         try:
-            server, thread = start_http_server(port, host, registry)
+            page = MetricsPage(host, port, registry, bearer, tls, self._calls.refused_elsewhere())
         except OSError as error:
             raise OSError(f"no metrics on {host}:{port}: {error.strerror}") from None
-        self.metrics_address = f"{host}:{server.server_port}"
+        self.metrics_url = f"{'http' if tls is None else 'https'}://{host}:{page.port}/metrics"
+        self._stop_metrics = page.close
 
-        def stop() -> None:
-            server.shutdown()
-            server.server_close()
-            thread.join()
-
-        self._stop_metrics = stop
+    def _tls(self) -> ssl.SSLContext | None:
+        settings = self._settings
+        if settings.tls_cert is None or settings.tls_key is None:
+            return None
+        context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+        context.load_cert_chain(settings.tls_cert, settings.tls_key)
+        if settings.tls_client_ca is not None:
+            context.load_verify_locations(settings.tls_client_ca)
+            context.verify_mode = ssl.CERT_REQUIRED
+        return context
 
     def _compared(self, hull: LiveHull, outcome: Verification) -> None:
         equal = outcome.difference is None
@@ -201,7 +222,7 @@ class Server:
             log.error(
                 "a hull differs from Chan's algorithm", extra={"hull": hull.name, "difference": outcome.difference}
             )
-            asyncio.get_running_loop().create_task(self._health.set(SCRUB, NOT_SERVING))
+            self._health.set(NOT_SERVING, SCRUB)
 
 
 def _storage(settings: Settings) -> Storage:
@@ -216,9 +237,9 @@ def _end_process(reason: str) -> None:
     os._exit(os.EX_SOFTWARE)
 
 
-def _anonymous(_: Context) -> Access:
-    return EVERYTHING
+def _anonymous(_: Context) -> Caller:
+    return ANYBODY
 
 
-def _bearer(tokens: TokenFile) -> Callable[[Context], Access]:
-    return lambda context: tokens.access(dict(context.invocation_metadata() or ()))
+def _bearer(tokens: TokenFile) -> Callable[[Context], Caller]:
+    return lambda context: tokens.authenticate(context.invocation_metadata() or ())

@@ -1,4 +1,4 @@
-"""`dynhull backup`, `dynhull restore`, `dynhull export`: data folders as files."""
+"""`dynhull backup`, `dynhull restore`, `dynhull check`, `dynhull export`: data folders as files."""
 
 import json
 import sys
@@ -13,8 +13,8 @@ import typer
 from dynhull.arrays import Points
 
 from .progress import progress_bar
-from .storage.port import Progress, StorageError
 from .state.hull_state import replayed
+from .storage.port import Progress, StorageError
 from .storage.sqlite import copies
 
 DATA = Path("dynhull-data")
@@ -36,9 +36,12 @@ def backup(
 def restore(
     backup: Annotated[Path, typer.Argument(help="A backup, or any data folder.", exists=True, file_okay=False)],
     data: Annotated[Path, typer.Option(help="The data folder to make.")] = DATA,
+    accept_loss: Annotated[
+        bool, typer.Option(help="Where the log is missing or damaged, do without the commits in it.")
+    ] = False,
 ) -> None:
     """Make a data folder from a backup, with all that the backup holds, and only where every hull in it is whole."""
-    _copy(backup, data)
+    _copy(backup, data, accept_loss=accept_loss)
 
 
 def check(
@@ -57,7 +60,7 @@ def check(
     with _told(), progress_bar("rows") as progress:
         report = copies.check(data, progress)
     for hull in report.hulls:
-        typer.echo(f"{hull.name}: {hull.summary}: {'; '.join(hull.problems) or 'whole'}")
+        typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
     for problem in [*report.notes, *report.fatal]:
         typer.echo(problem, err=True)
     if report.fatal:
@@ -88,9 +91,9 @@ def export(
     typer.echo(f"{file}: {len(points):,} points of {name} at revision {kept.last_revision}")
 
 
-def _copy(source: Path, target: Path) -> None:
+def _copy(source: Path, target: Path, *, accept_loss: bool = False) -> None:
     with _told(), progress_bar("pages") as progress:
-        report = copies.copy(source, target, progress)
+        report = copies.copy(source, target, progress, accept_loss=accept_loss)
     for note in report.notes:
         typer.echo(note, err=True)
     typer.echo(f"{target}: {len(report.hulls)} hulls")

@@ -44,8 +44,8 @@ async def _serve(settings: Settings) -> None:
                 await server.start(progress)
             gc.freeze()  # modules and what was read: to look through that again and again would make calls wait 50 ms
             print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the command's output
-            if server.metrics_address:
-                print(f"metrics on http://{server.metrics_address}/metrics", flush=True)  # noqa: T201  # likewise
+            if server.metrics_url:
+                print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
             await stop.wait()
         finally:
             await server.drain()

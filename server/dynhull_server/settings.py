@@ -49,6 +49,15 @@ class Settings(BaseSettings):
         1_000, ge=1, description="How many of those one token may name, or without tokens one address."
     )
     max_streams: int = Field(10_000, ge=1, description="How many streaming calls there may be at a time.")
+    max_streams_per_caller: int = Field(
+        2_500, ge=1, description="How many of those one token may have, or without tokens one address."
+    )
+    max_health_calls: int = Field(1_000, ge=1, description="How many health checks and watches there may be at a time.")
+    max_health_calls_per_caller: int = Field(32, ge=1, description="How many of those one address may have.")
+    max_connections: int = Field(10_000, ge=1, description="How many connections there may be at a time.")
+    max_connection_idle: float = Field(
+        600.0, gt=0, description="Seconds that a connection without calls is kept; clients make a new one when needed."
+    )
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds a watcher may take for one event.")
     history_bytes: int = Field(4 * 2**20, ge=0, description="Memory a hull may take for watches that resume.")
 
@@ -57,7 +66,10 @@ class Settings(BaseSettings):
     )
     scrub_pause: float = Field(60.0, gt=0, description="Seconds between two rounds of that.")
 
-    metrics_host: str = Field("127.0.0.1", description="Address for Prometheus.")
+    metrics_host: str = Field(
+        "127.0.0.1",
+        description="Address for Prometheus. On another machine it must show a token that may read every hull.",
+    )
     metrics_port: int | None = Field(None, ge=0, le=65535, description="Port for Prometheus; without it, no metrics.")
     log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="What to log.")
     log_format: Literal["text", "json"] = Field("text", description="How to log.")
@@ -70,11 +82,12 @@ class Settings(BaseSettings):
         if self.tls_client_ca and not self.tls_cert:
             raise ValueError("--tls-client-ca needs --tls-cert and --tls-key")
         protected = self.tls_cert and self.tokens
-        if not _is_loopback(self.host) and not protected and not self.insecure:
-            raise ValueError(
-                f"{self.host} can be reached by other machines: give --tls-cert, --tls-key and --tokens, or say "
-                "--insecure to do without"
-            )
+        for host in (self.host, *([] if self.metrics_port is None else [self.metrics_host])):
+            if not is_loopback(host) and not protected and not self.insecure:
+                raise ValueError(
+                    f"{host} can be reached by other machines: give --tls-cert, --tls-key and --tokens, or say "
+                    "--insecure to do without"
+                )
         return self
 
     @classmethod
@@ -133,7 +146,8 @@ def read_file(file: Path | None) -> dict[str, Any]:
         raise SettingsError(f"{file}: {error}") from None
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach the address."""
     try:
         return ipaddress.ip_address(host.strip("[]")).is_loopback
     except ValueError:

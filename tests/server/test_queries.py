@@ -1,6 +1,7 @@
 """Questions about a hull, answered as the library answers them."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import grpc
 import numpy as np
@@ -144,3 +145,22 @@ def test_a_direction_that_is_none(stub: HullServiceStub, filled: str) -> None:
     assert dict(info.metadata) == {"field": "directions", "row": "1", "value": "(0.0, 0.0)"}
     _, info, _ = refusal(lambda: list(stub.Watch(pb.WatchRequest(name=filled, directions=directions))))
     assert info.metadata["field"] == "directions"
+
+
+def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
+    """The read sees one revision, and takes so long that a writer gets in between again and again."""
+    rng = np.random.default_rng(11)
+    angles = rng.uniform(0, 7, 3000)
+    rows = rng.uniform(-2, 2, (1_000_000, 2))
+    with HullClient(address) as reader, HullClient(address) as writer:
+        writer.create_hull(name)
+        writer.apply(name, insert=np.column_stack((np.cos(angles), np.sin(angles))))
+        with ThreadPoolExecutor() as threads:
+            reading = threads.submit(reader.distance, name, rows)
+            written = 0
+            while not reading.done():
+                written = writer.apply(name, insert=[[0.5, 0.5]]).revision - 1
+        assert 1 <= reading.result().revision <= 1 + written
+        assert written >= 5
+        expected = DynamicHull(np.column_stack((np.cos(angles), np.sin(angles)))).distance(rows)
+        np.testing.assert_array_equal(reading.result().distances, expected)

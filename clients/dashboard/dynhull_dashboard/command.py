@@ -24,7 +24,9 @@ def dashboard(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = 5006,
     origin: Annotated[
         list[str] | None,
-        typer.Option(help="HOST:PORT as browsers on other machines call the page. May be repeated."),
+        typer.Option(
+            help="HOST:PORT as browsers on other machines call the page; no other name is answered. May be repeated."
+        ),
     ] = None,
 ) -> None:
     """Show live hulls in the browser.

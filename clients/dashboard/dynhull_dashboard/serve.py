@@ -10,14 +10,16 @@ from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
 from bokeh.server.contexts import BokehSessionContext
 from bokeh.server.server import BaseServer
-from bokeh.server.tornado import BokehTornado
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 from tornado.netutil import bind_sockets
 
 from .hub import Hub
 from .hull_socket import HullSocket
+from .known_hosts import KnownHosts
 from .page import Page
+
+LOOPBACK = "127.0.0.1", "localhost", "[::1]"
 
 
 async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
@@ -35,10 +37,10 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     sockets = bind_sockets(port, host)
     port = sockets[0].getsockname()[1]
     # A page of another site must not get at the hulls through a browser that can.
-    allowed = [f"{host}:{port}", f"localhost:{port}", *origins]
+    hosts = [f"{name}:{port}" for name in (host, *LOOPBACK)]
     page = Application(FunctionHandler(partial(_show, hub)))
     hulls = ("/hulls", HullSocket, {"hub": hub})
-    application = BokehTornado({"/": page}, extra_websocket_origins=allowed, extra_patterns=[hulls])
+    application = KnownHosts({"/": page}, [*hosts, *origins], extra_patterns=[hulls])
     http = HTTPServer(application)
     http.add_sockets(sockets)
     server = BaseServer(IOLoop.current(), application, http)

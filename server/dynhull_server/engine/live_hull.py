@@ -7,9 +7,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import DynamicHull
-from dynhull.arrays import Points
+from dynhull.arrays import Checked, Points
 
 from ..state.errors import HullEmptyError, HullNotFoundError, HullReplacedError, RevisionForgottenError
 from ..state.events import ReadHull
@@ -126,20 +127,15 @@ class LiveHull:
         outline = await self._hull_of(vertices)
         return counts, await self._in_blocks(partial(question, outline), rows)
 
-    async def count(self, points: Points, min_revision: int = 0) -> tuple[Counts, list[int]]:
+    async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
         """How many times each of some points is there."""
-        xy = points.tolist()
-
-        def count(hull: DynamicHull, block: slice) -> list[int]:
-            return [hull.count(x, y) for x, y in xy[block]]
-
         if len(xy) <= BLOCK:
-            return await self.read(lambda state: count(state.hull, slice(0, len(xy))), len(xy), min_revision)
+            return await self.read(lambda state: state.hull.count_many(xy), len(xy), min_revision)
         counts, stored = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
-        hull = await self._engine.run(self._engine.reads, partial(DynamicHull, stored))
-        return counts, (await self._in_blocks(partial(count, hull), len(xy))).tolist()
+        hull: DynamicHull = await self._engine.run(self._engine.reads, partial(DynamicHull, stored))
+        return counts, await self._in_blocks(lambda rows: hull.count_many(xy[rows]), len(xy))
 
-    async def support(self, directions: Points, min_revision: int = 0) -> tuple[Counts, Points]:
+    async def support(self, directions: Checked, min_revision: int = 0) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
 
         def extreme(hull: DynamicHull, block: slice) -> Points:

@@ -4,7 +4,7 @@ import hashlib
 import logging
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,11 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..state.errors import RefusedError
+
+# Seconds between two looks at the file of tokens.
+LOOK_SECONDS = 0.25
+# Hexadecimal digits that stand for a token without a name.
+SHORT_HASH = 12
 
 log = logging.getLogger(__name__)
 
@@ -63,6 +68,55 @@ class Access:
 EVERYTHING = Access(("",), ("",))
 
 
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who calls.
+
+    Attributes:
+        owner: the name that its bounds are counted under; empty for the address it calls from.
+        access: what it may do.
+        key: the hash of its token; empty without tokens.
+    """
+
+    owner: str
+    access: Access
+    key: str = ""
+
+
+ANYBODY = Caller("", EVERYTHING)
+NOBODY = Caller("", Access((), ()))
+
+
+class Rights:
+    """What one call may do. It remembers what it was granted, which a narrowed token may no longer allow."""
+
+    __slots__ = ("_access", "_granted")
+
+    def __init__(self, access: Access) -> None:
+        self._access = access
+        self._granted: list[tuple[Callable[[Access, str], None], str]] = []
+
+    def require_read(self, name: str) -> None:
+        """Raise PermissionDeniedError where the hull may not be read."""
+        self._access.require_read(name)
+        self._granted.append((Access.require_read, name))
+
+    def require_write(self, name: str) -> None:
+        """Raise PermissionDeniedError where the hull may not be written."""
+        self._access.require_write(name)
+        self._granted.append((Access.require_write, name))
+
+    def readable(self, prefix: str) -> list[str]:
+        """The prefixes of the readable names among those that begin with `prefix`."""
+        return self._access.readable(prefix)
+
+    def change(self, access: Access) -> None:
+        """Go on with these rights, or raise PermissionDeniedError where they do not allow what was granted."""
+        self._access = access
+        for require, name in self._granted:
+            require(access, name)
+
+
 def _overlap(a: str, b: str) -> bool:
     return a.startswith(b) or b.startswith(a)
 
@@ -90,12 +144,15 @@ class TokenFile:
     """Tokens from a TOML file of hashes, read again whenever it has changed.
 
     [[token]]
-    name = "trucks"      # for people
+    name = "trucks"      # for people, and what bounds are counted under; without it, the beginning of the hash
     sha256 = "9f86d0..." # of the token, in hexadecimal digits
     read = ["fleet/"]    # prefixes of names; "" is every name
     write = ["fleet/truck-"]
 
     A file that has become unreadable or wrong is reported in the log, and the tokens stay as they were.
+
+    Attributes:
+        changed: called when other tokens have been read.
 
     Raises:
         ValueError: the file cannot be used. OSError: it cannot be read.
@@ -104,34 +161,60 @@ class TokenFile:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._version = self._current_version()
-        self._tokens = self._load()
+        self._callers = self._load()
+        self._trouble = ""
+        self.changed: Callable[[], None] = lambda: None
 
-    def access(self, metadata: Mapping[str, Any]) -> Access:
-        """What the caller with this metadata may do, or raise UnauthenticatedError."""
-        self._reload()
-        kind, _, token = str(metadata.get("authorization", "")).partition(" ")
-        access = self._tokens.get(hashlib.sha256(token.strip().encode()).hexdigest())
-        if kind.lower() != "bearer" or access is None:
+    def authenticate(self, metadata: Iterable[tuple[str, Any]]) -> Caller:
+        """Who the caller with this metadata is, or raise UnauthenticatedError."""
+        self.look()
+        return self.bearer(str(dict(metadata).get("authorization", "")))
+
+    def bearer(self, authorization: str) -> Caller:
+        """Whose token this is, by what was last read, or raise UnauthenticatedError."""
+        kind, _, token = authorization.partition(" ")
+        if kind.lower() != "bearer":
             raise UnauthenticatedError
-        return access
+        return self.known(hashlib.sha256(token.strip().encode()).hexdigest())
 
-    def _reload(self) -> None:
+    def known(self, key: str) -> Caller:
+        """The caller whose token has this hash, or raise UnauthenticatedError."""
+        caller = self._callers.get(key)
+        if caller is None:
+            raise UnauthenticatedError
+        return caller
+
+    async def run(self) -> None:
+        """Look, every LOOK_SECONDS, so that what a change ends does not wait for somebody's next call."""
+        self.look()
+
+    def look(self) -> None:
+        """Read the file if it has changed."""
         try:
             version = self._current_version()
             if version == self._version:
                 return
-            self._version = version
-            self._tokens = self._load()
-        except (OSError, ValueError) as error:
-            log.error("the tokens stay as they were: %s", error)  # the message says it all
+            callers = self._load()
+        except ValueError as error:
+            self._version = version  # it will not become right by itself
+            self._complain(error)
+        except OSError as error:  # perhaps it can be read a moment later
+            self._complain(error)
         else:
-            log.info("tokens read again", extra={"tokens": len(self._tokens)})
+            self._version, self._callers, self._trouble = version, callers, ""
+            log.info("tokens read again", extra={"tokens": len(callers)})
+            self.changed()
+
+    def _complain(self, error: Exception) -> None:
+        if str(error) != self._trouble:  # once, for every call looks
+            self._trouble = str(error)
+            log.error("the tokens stay as they were: %s", error)  # the message says it all
 
     def _current_version(self) -> tuple[int, int, int]:
         stat = os.stat(self._path)  # noqa: PTH116  # each call pays for it
         return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
-    def _load(self) -> dict[str, Access]:
+    def _load(self) -> dict[str, Caller]:
         try:
             table = TokenTable.model_validate(tomllib.loads(self._path.read_text("utf-8")))
         except ValidationError as error:
@@ -140,4 +223,9 @@ class TokenFile:
             raise ValueError(f"{self._path}: {where}: {first['msg']}") from None
         except ValueError as error:
             raise ValueError(f"{self._path}: {error}") from None
-        return {each.sha256: Access(tuple(each.read), tuple(each.write)) for each in table.token}
+        return {
+            each.sha256: Caller(
+                each.name or each.sha256[:SHORT_HASH], Access(tuple(each.read), tuple(each.write)), each.sha256
+            )
+            for each in table.token
+        }

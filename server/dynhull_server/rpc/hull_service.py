@@ -6,6 +6,7 @@ from contextlib import aclosing
 
 import numpy as np
 
+from dynhull.arrays import Checked
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ..engine.engine import Engine
@@ -116,27 +117,27 @@ class HullService:
 
     async def Locate(self, request: pb.LocateRequest, call: Call) -> pb.LocateResponse:
         hull = self._read(call, request.name)
-        xy = decode.decode_points(request.points, "points")
+        xy = Checked(decode.decode_points(request.points, "points"))
         counts, sides = await hull.ask_rows(lambda live, rows: live.locate(xy[rows]), len(xy), request.min_revision)
         return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
 
     async def Count(self, request: pb.CountRequest, call: Call) -> pb.CountResponse:
         hull = self._read(call, request.name)
-        points = decode.decode_points(request.points, "points")
-        counts, times = await hull.count(points, request.min_revision)
+        xy = Checked(decode.decode_points(request.points, "points"))
+        counts, times = await hull.count(xy, request.min_revision)
         return pb.CountResponse(revision=counts.revision, counts=times)
 
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         directions = decode.decode_directions(request.directions)
-        counts, extremes = await hull.support(directions, request.min_revision)
+        counts, extremes = await hull.support(Checked(directions), request.min_revision)
         return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
 
     async def Tangents(self, request: pb.TangentsRequest, call: Call) -> pb.TangentsResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        xy = decode.decode_points(request.points, "points")
+        xy = Checked(decode.decode_points(request.points, "points"))
         counts, tangents = await hull.ask_rows(
             lambda live, rows: live.tangents(xy[rows]), len(xy), request.min_revision
         )
@@ -148,7 +149,7 @@ class HullService:
 
     async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
         hull = self._read(call, request.name)
-        xy = decode.decode_points(request.points, "points")
+        xy = Checked(decode.decode_points(request.points, "points"))
         counts, distances = await hull.ask_rows(
             lambda live, rows: live.distance(xy[rows]), len(xy), request.min_revision
         )
@@ -157,7 +158,7 @@ class HullService:
     async def IntersectLines(self, request: pb.IntersectLinesRequest, call: Call) -> pb.IntersectLinesResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        p, q = decode.decode_lines(request)
+        p, q = map(Checked, decode.decode_lines(request))
         counts, crossings = await hull.ask_rows(
             lambda live, rows: live.intersect_lines(p[rows], q[rows]), len(p), request.min_revision
         )

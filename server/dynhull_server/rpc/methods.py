@@ -1,61 +1,137 @@
-"""The service's methods as gRPC wants them: each through `Calls.serve`, bytes that are no message refused."""
+"""The services' methods as gRPC wants them: each through `Calls.serve`, bytes that are no message refused.
 
-from collections.abc import Callable
+All are handlers of streams, also those of single messages. For these gRPC would read the message before it calls the
+handler, and strangers could fill the memory with what they may not send.
+"""
+
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import aclosing
 from functools import partial
 from typing import Any
 
 import grpc
-from google.protobuf.descriptor import MethodDescriptor
+from google.protobuf.descriptor import MethodDescriptor, ServiceDescriptor
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.message_factory import GetMessageClass
+from grpc_health.v1 import health_pb2
+from grpc_reflection.v1alpha import reflection, reflection_pb2
 
 from dynhull_proto.v1 import hull_service_pb2
 
 from ..state.errors import LimitExceededError
-from .calls import Call, Calls, Received, Work
+from .calls import Call, Calls, Context, Received, Work
+from .health import MAX_BYTES, Health
 from .hull_service import HullService
+from .status import MethodUnknownError
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
+HEALTH = health_pb2.DESCRIPTOR.services_by_name["Health"]
+REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 
 # A draining server finishes these, and cuts off the other calls.
 FINISHED = {"CreateHull", "DeleteHull", "ListHulls", "Apply"}
 
-MAKERS: dict[tuple[bool, bool], Callable[..., Any]] = {
-    (False, False): grpc.unary_unary_rpc_method_handler,
-    (False, True): grpc.unary_stream_rpc_method_handler,
-    (True, False): grpc.stream_unary_rpc_method_handler,
-    (True, True): grpc.stream_stream_rpc_method_handler,
-}
+# What the methods that there are not are counted as.
+UNKNOWN_METHOD = "unknown"
+
+Behave = Callable[[Any, Call], Awaitable[Any]]
 
 
-def method_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
-    """The service for `Server.add_generic_rpc_handlers`."""
-    handlers = {}
+def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
+    """The service of hulls."""
+    works = {}
     for method in DESCRIPTOR.methods:
-        streams = method.client_streaming, method.server_streaming
-        wrap = _streaming if any(streams) else _unary
-        handlers[method.name] = MAKERS[streams](
-            partial(calls.serve, method.name, wrap(method, getattr(service, method.name), calls)),
-            request_deserializer=_received(GetMessageClass(method.input_type), calls.max_message_bytes),
+        make = _streaming if method.client_streaming or method.server_streaming else _unary
+        works[method.name] = make(method, getattr(service, method.name))
+    return _handlers(DESCRIPTOR, works, "", calls, calls.admit, calls.max_message_bytes)
+
+
+def health_handlers(health: Health, calls: Calls) -> grpc.GenericRpcHandler:
+    """The service of health, which needs no token."""
+    works = {"Check": health.check, "Watch": health.watch}
+    return _handlers(HEALTH, works, f"{HEALTH.full_name}/", calls, calls.admit_anybody, MAX_BYTES)
+
+
+def reflection_handlers(calls: Calls) -> grpc.GenericRpcHandler:
+    """The service that describes all of them."""
+    services = [each.full_name for each in (DESCRIPTOR, HEALTH, REFLECTION)]
+    servicer = reflection.aio.ReflectionServicer(services)
+
+    async def describe(call: Call) -> None:
+        with call.stream():
+            async with aclosing(servicer.ServerReflectionInfo(call.messages(), None)) as responses:
+                async for response in responses:
+                    await call.write(response)
+
+    works = {"ServerReflectionInfo": describe}
+    return _handlers(REFLECTION, works, f"{REFLECTION.full_name}/", calls, calls.admit, calls.max_message_bytes)
+
+
+class UnknownMethods(grpc.GenericRpcHandler):
+    """Every other method: refused, and counted as the others are."""
+
+    def __init__(self, calls: Calls) -> None:
+        self._handler: Any = grpc.stream_stream_rpc_method_handler(
+            partial(calls.serve, UNKNOWN_METHOD, calls.admit, _refuse_method)
         )
-    return grpc.method_handlers_generic_handler(DESCRIPTOR.full_name, handlers)
+
+    def service(self, _: grpc.HandlerCallDetails) -> Any:
+        """The same for all."""
+        return self._handler
 
 
-def _unary(method: MethodDescriptor, behave: Work, calls: Calls) -> Work:
-    until_drain = calls.short if method.name in FINISHED else calls.cutoff
+async def _refuse_method(_: Call) -> None:
+    raise MethodUnknownError
 
-    async def work(request: Any, call: Call) -> bytes:
-        with until_drain():
-            response = await behave(call.take(request), call)
+
+def _handlers(
+    service: ServiceDescriptor,
+    works: Mapping[str, Work],
+    prefix: str,
+    calls: Calls,
+    admit: Callable[[Context], Call],
+    max_bytes: int,
+) -> grpc.GenericRpcHandler:
+    handlers = {}
+    for method in service.methods:
+        make: Callable[..., Any] = grpc.stream_unary_rpc_method_handler
+        if method.server_streaming:
+            make = grpc.stream_stream_rpc_method_handler
+        handlers[method.name] = make(
+            partial(calls.serve, prefix + method.name, admit, works[method.name]),
+            request_deserializer=_received(GetMessageClass(method.input_type), max_bytes),
+        )
+    return grpc.method_handlers_generic_handler(service.full_name, handlers)
+
+
+def _unary(method: MethodDescriptor, behave: Behave) -> Work:
+    if method.name not in FINISHED:
+
+        async def wait(call: Call) -> bytes:
+            with call.cutoff():
+                response = await behave(await call.receive(), call)
+            return call.serialize(response)
+
+        return wait
+
+    async def finish(call: Call) -> bytes:
+        with call.cutoff():
+            request = await call.receive()
+        with call.short():
+            response = await behave(request, call)
         return call.serialize(response)
 
-    return work
+    return finish
 
 
-def _streaming(method: MethodDescriptor, behave: Work, calls: Calls) -> Work:
-    async def work(request: Any, call: Call) -> bytes | None:
-        with calls.stream():
-            response = await behave(None if method.client_streaming else call.take(request), call)
+def _streaming(method: MethodDescriptor, behave: Behave) -> Work:
+    async def work(call: Call) -> bytes | None:
+        with call.stream():
+            request = None
+            if not method.client_streaming:
+                with call.cutoff():
+                    request = await call.receive()
+            response = await behave(request, call)
         return None if response is None else call.serialize(response)
 
     return work

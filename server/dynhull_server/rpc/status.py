@@ -43,6 +43,21 @@ class StartingError(Exception):
     """The server is not ready yet."""
 
 
+class ServiceUnknownError(RefusedError):
+    """There is no service of that name to ask the health of."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no service {_short(name)!r}")
+        self.name = name
+
+
+class MethodUnknownError(RefusedError):
+    """There is no such method."""
+
+    def __init__(self) -> None:
+        super().__init__("there is no such method")
+
+
 ANSWERED = (
     RefusedError,
     InvalidFieldError,
@@ -114,6 +129,10 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
             quota.violations.add(subject=error.limit, description=str(error))
             metadata = {"limit": error.limit, "value": str(error.maximum), **where}
             return _status(code.RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
+        case ServiceUnknownError():
+            return _status(code.NOT_FOUND, str(error), "SERVICE_UNKNOWN", {"value": _short(error.name)})
+        case MethodUnknownError():
+            return _status(code.UNIMPLEMENTED, str(error), "METHOD_UNKNOWN", {})
         case DecodeError():
             return _status(
                 code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from threading import Lock
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class MemoryStorage:
         self._forgets = forgets
         self._hulls: dict[int, _Hull] = {}
         self._next_number = 1
+        self._turn = Lock()  # commits and reads may come from different threads
 
     def open(self, progress: Progress) -> Contents:
         """What is there."""
@@ -53,20 +55,11 @@ class MemoryStorage:
 
     def commit(self, changes: Sequence[Change | Step]) -> None:
         """Keep the changes."""
-        if not self._forgets:  # what comes from the core is right; with nothing to compare, this would cost for nothing
-            self._examine(changes)
-        for change in changes:
-            match change:
-                case Append():
-                    if not self._forgets:
-                        self._append(change)
-                case Create():
-                    self._hulls[change.row.number] = _Hull(change.row)
-                    self._next_number = max(self._next_number, change.row.number + 1)
-                case Delete():
-                    del self._hulls[change.number]
-                case _Snapshot():
-                    self._take(change)
+        with self._turn:
+            if not self._forgets:  # with nothing to compare, this would cost for nothing
+                self._examine(changes)
+            for change in changes:
+                self._carry_out(change)
 
     def settle(self) -> None:
         """Every commit is kept: there is nothing to decide."""
@@ -81,13 +74,13 @@ class MemoryStorage:
         hull = self._hulls[number]
         if self._forgets:
             raise DamagedError(f"the batches of {hull.row.name} were not kept")
-        newest_first = sorted(hull.snapshots, key=lambda each: -each.revision)
-        base = next((each for each in newest_first if each.revision <= until), None)
-        if base is None:
-            base = _Snapshot(number, 0, np.empty((0, 2)), {})
-        records = [record for record in hull.records if base.revision < record.revision <= until]
-        if records and records[0].revision != base.revision + 1:
-            raise DamagedError(f"hull {hull.row.name!r}: revision {base.revision + 1} is not kept any more")
+        if until < self.oldest(number):
+            raise DamagedError(f"revision {until} of hull {hull.row.name!r} is not kept any more")
+        with self._turn:
+            base = next((each for each in reversed(hull.snapshots) if each.revision <= until), None)
+            if base is None:
+                base = _Snapshot(number, 0, np.empty((0, 2)), {})
+            records = [record for record in hull.records if base.revision < record.revision <= until]
         return Kept(base.revision, base.points, dict(base.producers), records)
 
     def oldest(self, number: int) -> int:
@@ -146,6 +139,19 @@ class MemoryStorage:
         hull = self._hulls.get(number)
         return None if hull is None else hull.last
 
+    def _carry_out(self, change: Change | Step) -> None:
+        match change:
+            case Append():
+                if not self._forgets:
+                    self._append(change)
+            case Create():
+                self._hulls[change.row.number] = _Hull(change.row)
+                self._next_number = max(self._next_number, change.row.number + 1)
+            case Delete():
+                del self._hulls[change.number]
+            case _Snapshot():
+                self._take(change)
+
     def _append(self, change: Append) -> None:
         hull = self._hulls[change.number]
         hull.last = change.records[-1].revision
@@ -155,7 +161,8 @@ class MemoryStorage:
         hull = self._hulls.get(snapshot.number)
         if hull is None:  # deleted meanwhile
             return
-        hull.snapshots = [*hull.snapshots, snapshot][-KEPT_SNAPSHOTS:]
+        snapshots = sorted([*hull.snapshots, snapshot], key=lambda each: each.revision)
+        hull.snapshots = snapshots[-KEPT_SNAPSHOTS:]
         if len(hull.snapshots) == KEPT_SNAPSHOTS:
             oldest = hull.snapshots[0].revision
             hull.records = [record for record in hull.records if record.revision > oldest]

@@ -84,7 +84,7 @@ class Storage(Protocol):
     def commit(self, changes: Sequence["Change | Step"]) -> None:
         """Keep all of the changes or none, as durably as was promised.
 
-        A change applies to what the ones before it have made. A step of a hull that was deleted meanwhile changes nothing.
+        A change applies to what the ones before it have made. A step of a hull that was deleted changes nothing.
 
         Raises:
             NotCommittedError: none was kept, and none will be found later. Also where a hull is there that is to be

@@ -2,9 +2,9 @@
 
     python tests/robustness/storage/flips.py [--flips 20000] [--seed 0] [--processes 2] [--folder /dev/shm]
 
-Folders of killed and of stopped servers. Every bit of the headers: of the database, of the log, of its frames, of all
-pages; then bits at random, anywhere. After each flip the folder is opened and compared with what was acknowledged; where
-it opens, one more batch is committed, and the folder opened again: damage may strike later.
+Folders of killed and of stopped servers. Every bit of the headers: of the database, of the log, of its frames, of
+all pages; then bits at random, anywhere. After each flip the folder is opened and compared with what was
+acknowledged; where it opens, one more batch is committed, and the folder opened again: damage may strike later.
 
 harmless: everything is there. repaired: a note says what was lost or mended. refused: a StorageError says why. Whatever
 else happens is a fault, and makes the exit code 1.

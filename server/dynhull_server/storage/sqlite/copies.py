@@ -15,7 +15,7 @@ from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import migrate
 from .reading import read_hull
 from .schema import FORMAT
-from .totals import STOPPED, renew_totals
+from .totals import STOPPED, Totals, renew_totals
 
 PAGES_A_STEP = 256
 
@@ -27,12 +27,12 @@ class HullReport:
     Attributes:
         name: its name.
         summary: what there is of it.
-        problems: what is wrong with it; empty where nothing is.
+        whole: whether all of it is as it was written.
     """
 
     name: str
     summary: str
-    problems: list[str]
+    whole: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +61,11 @@ def check(path: Path, progress: Progress) -> Report:
         StorageError: it holds no hulls, or cannot be read at all.
     """
     with _opened(path) as opened:
-        findings = examine(opened.connection, opened.version, progress)
+        findings = examine(opened.connection, opened.version, opened.own, progress)
         return _report(findings, opened.notes)
 
 
-def copy(source: Path, target: Path, progress: Progress) -> Report:
+def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = False) -> Report:
     """Make a folder with all that another holds, its log included, as of one moment. Returns what is in the copy.
 
     A copy has another name until it is whole and on the disk: half of one is never taken for one.
@@ -74,12 +74,13 @@ def copy(source: Path, target: Path, progress: Progress) -> Report:
         source: a data folder or a backup; a server may be writing to it.
         target: the new folder; it may be there, and empty.
         progress: called with pages done and pages in all.
+        accept_loss: whether to do without what is damaged or missing of the log.
 
     Raises:
         StorageError: there is no database in the source, or something in the target.
         DamagedError: what was copied is not whole.
     """
-    with _opened(source) as opened:
+    with _opened(source, accept_loss=accept_loss) as opened:
         made = _claim(target)
         unfinished = target / UNFINISHED
         try:
@@ -126,11 +127,13 @@ class _Opened:
         connection: to it.
         version: its format.
         notes: what was lost at the end of its log.
+        own: the totals in its own file, None where a server works on it.
     """
 
     connection: sqlite3.Connection
     version: int
     notes: list[str]
+    own: Totals | None
 
 
 def _claim(target: Path) -> bool:
@@ -155,13 +158,19 @@ def _make_durable(path: Path) -> None:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[_Opened]:
+def _opened(path: Path, *, accept_loss: bool = False) -> Iterator[_Opened]:
     folder = Folder(path, Disk())
     with ExitStack() as stack:
         notes: list[str] = []
+        own = None
         # A log that is being written to cannot be examined, and need not be: its server has read it.
         if stack.enter_context(folder.alone()):
-            notes = folder.check_log()
+            try:
+                notes, own = folder.check_log()
+            except DamagedError as error:
+                if not accept_loss:
+                    raise
+                notes = [f"done without what is lost: {error}"]
         if not folder.disk.size(folder.database):
             raise StorageError(f"{path} holds no hulls: there is no {DATABASE} in it")
         # Without a log nothing needs to be written beside the database to read it.
@@ -172,7 +181,7 @@ def _opened(path: Path) -> Iterator[_Opened]:
             version = format_of(connection, folder.database)
             if version == 0:
                 raise StorageError(f"{path} holds no hulls")
-            yield _Opened(connection, version, notes)
+            yield _Opened(connection, version, notes, own)
         except sqlite3.Error as error:
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
@@ -181,7 +190,7 @@ def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
     """Make a folder of today's format that nobody works on out of copied pages, and examine it."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("BEGIN IMMEDIATE")
-    findings = examine(connection, opened.version, lambda *_: None)
+    findings = examine(connection, opened.version, opened.own, lambda *_: None)
     report = _report(findings, opened.notes)
     if report.fatal:
         raise DamagedError(f"it is damaged, so it was not copied: {'; '.join(report.fatal)}")
@@ -201,5 +210,5 @@ def _report(findings: Findings, notes: list[str]) -> Report:
         summary = f"revision {hull.last}, {len(hull.ids)} rows of batches"
         if hull.snapshots:
             summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
-        reports.append(HullReport(hull.row.name, summary, findings.hulls.get(hull.row.number, [])))
+        reports.append(HullReport(hull.row.name, summary, hull.row.number not in findings.damaged))
     return Report(reports, notes + findings.notes, findings.fatal)

@@ -34,7 +34,7 @@ class Findings:
         ledger: what is there.
         fatal: what is lost for certain or perhaps, and cannot be told batch by batch.
         notes: what is lost or repaired, in words that name it.
-        hulls: both, of each hull by its number.
+        damaged: the numbers of the hulls that something is wrong with.
         repairs: what makes the database whole again.
         both_totals: whether both copies of the totals are whole.
     """
@@ -42,13 +42,13 @@ class Findings:
     ledger: Ledger = field(default_factory=Ledger)
     fatal: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    hulls: dict[int, list[str]] = field(default_factory=dict)
+    damaged: set[int] = field(default_factory=set)
     repairs: list[AnyStep] = field(default_factory=list)
     both_totals: bool = True
 
     def blame(self, hull: HullRows, text: str, *, fatal: bool) -> None:
         """Something is wrong with a hull."""
-        self.hulls.setdefault(hull.row.number, []).append(text)
+        self.damaged.add(hull.row.number)
         (self.fatal if fatal else self.notes).append(f"hull {hull.row.name!r}: {text}")
 
 
@@ -82,21 +82,25 @@ def format_of(connection: sqlite3.Connection, database: Path) -> int:
     return version
 
 
-def examine(connection: sqlite3.Connection, version: int, progress: Progress) -> Findings:
+def examine(connection: sqlite3.Connection, version: int, own: Totals | None, progress: Progress) -> Findings:
     """Compare everything that a database holds with what its checksums and totals say.
 
     Args:
         connection: inside a transaction, so that all is of one moment.
         version: its format.
+        own: the totals in the database's own file, without its log; None where they are not known.
         progress: called with rows done and rows in all.
     """
     findings = Findings()
     try:
-        if found(connection)[2] != SCHEMAS[version]:
-            findings.fatal.append("the tables are not those of this format")
+        if not _has_tables(connection, version, findings):
             return findings
         _check_structure(connection, version, findings)
         _Examination(connection, version, findings, progress).run()
+        if own is not None and own.commits > findings.ledger.totals.commits:
+            findings.fatal.append(
+                "log and database do not belong together: the database has later commits than its log"
+            )
     except sqlite3.Error as error:
         findings.fatal.append(f"a part of the database cannot be read ({error})")
     return findings
@@ -109,10 +113,19 @@ def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
         DamagedError: it is not whole any more.
     """
     findings = Findings()
-    _Examination(connection, version, findings, lambda *_: None, contents=False).run()
+    if _has_tables(connection, version, findings):
+        _Examination(connection, version, findings, lambda *_: None, contents=False).run()
     if findings.fatal:
         raise DamagedError("; ".join(findings.fatal))
     return findings.ledger
+
+
+def _has_tables(connection: sqlite3.Connection, version: int, findings: Findings) -> bool:
+    """Whether the tables are those of the format. Otherwise nothing can be read."""
+    *_, tables = found(connection)
+    if tables != SCHEMAS[version]:
+        findings.fatal.append("the tables are not those of this format")
+    return tables == SCHEMAS[version]
 
 
 def _check_structure(connection: sqlite3.Connection, version: int, findings: Findings) -> None:
@@ -183,34 +196,35 @@ class _Examination:
     def _hull_rows(self) -> Iterator[HullRow]:
         for row, whole in hull_rows(self._connection, self._version):
             if not whole:
+                self._findings.damaged.add(row.number)
                 self._findings.fatal.append(f"the row of hull {row.number}, {row.name!r}, is damaged")
             yield row
 
     def _snapshots(self) -> None:
         query = "SELECT id, hull, revision, chunks, state, checksum FROM snapshots ORDER BY id"
-        for id, number, revision, chunks, state, stored in self._connection.execute(query):
-            self._newest_snapshot = id
+        for place, number, revision, chunks, state, stored in self._connection.execute(query):
+            self._newest_snapshot = place
             scanned = self._hulls.get(number)
             if scanned is None:
-                self._ledger.dead["snapshots"].append(id)
-            elif _matches(stored, state, id, number, revision, chunks):
-                scanned.snapshots[id] = Snapshot(id, revision, array("q", [MISSING]) * chunks)
+                self._ledger.dead["snapshots"].append(place)
+            elif _matches(stored, state, place, number, revision, chunks):
+                scanned.snapshots[place] = Snapshot(place, revision, array("q", [MISSING]) * chunks)
             else:
-                scanned.rows.snapshots.append(Snapshot(id, revision if isinstance(revision, int) else 0))
+                scanned.rows.snapshots.append(Snapshot(place, revision if isinstance(revision, int) else 0))
 
     def _chunks(self) -> None:
         """Fill in where the snapshots' chunks lie."""
-        places = {id: snapshot.chunks for each in self._hulls.values() for id, snapshot in each.snapshots.items()}
+        chunks = {key: snapshot.chunks for each in self._hulls.values() for key, snapshot in each.snapshots.items()}
         column = "points" if self._contents else "NULL"
         query = f"SELECT rowid, snapshot, number, checksum, {column} FROM chunks ORDER BY rowid"  # noqa: S608  (ours)
         newest = MISSING
-        for id, snapshot, number, stored, data in self._counted(query):
-            newest = id
-            place = places.get(snapshot)
-            if place is None:
-                self._ledger.dead["chunks"].append(id)
-            elif not self._contents or _matches(stored, data, snapshot, number):
-                place[number] = id
+        for place, snapshot, number, stored, data in self._counted(query):
+            newest = place
+            places = chunks.get(snapshot)
+            if places is None:
+                self._ledger.dead["chunks"].append(place)
+            elif (not self._contents or _matches(stored, data, snapshot, number)) and number in range(len(places)):
+                places[number] = place
             if isinstance(snapshot, int):
                 self._newest_snapshot = max(self._newest_snapshot, snapshot)
         self._ledger.chunk_ids = count(newest + 1)
@@ -221,11 +235,11 @@ class _Examination:
         query = f"SELECT rowid, hull, first, last, checksum, {column} FROM batches ORDER BY rowid"  # noqa: S608  (ours)
         newest = MISSING
         hulls, dead = self._hulls, self._ledger.dead["batches"]
-        for id, number, first, last, stored, payload in self._counted(query):
-            newest = id
+        for place, number, first, last, stored, payload in self._counted(query):
+            newest = place
             scanned = hulls.get(number)
             if scanned is None:
-                dead.append(id)
+                dead.append(place)
                 if isinstance(number, int):
                     self._next_number = max(self._next_number, number + 1)
                 continue
@@ -233,10 +247,10 @@ class _Examination:
                 whole = not self._contents or checksum(payload, number, first, last) == stored
                 each = weight(stored, number, first, last)
             except (TypeError, struct.error):
-                self._findings.fatal.append(f"a row of batches of hull {scanned.rows.row.name!r} is damaged")
+                self._findings.blame(scanned.rows, "a row of batches is damaged", fatal=True)
                 continue
             scanned.gaps |= first != scanned.rows.last + 1 and len(scanned.lasts) > 0
-            scanned.rows.append(first, last, id, each)
+            scanned.rows.append(first, last, place, each)
             scanned.lasts.append(last)
             if not whole:
                 scanned.damaged[first] = each
@@ -257,8 +271,9 @@ class _Examination:
         self._ledger.totals = totals or there
         if totals is not None and (totals.hulls, totals.batches, totals.sum) != (there.hulls, there.batches, there.sum):
             self._findings.fatal.append(
-                f"there must be {totals.hulls} hulls with {totals.batches} rows of batches, and there are {there.hulls} "
-                f"with {there.batches}, or others: rows are missing, or log and database do not belong together"
+                f"there must be {totals.hulls} hulls with {totals.batches} rows of batches, and there are "
+                f"{there.hulls} with {there.batches}, or others: rows are missing, or log and database do not belong "
+                "together"
             )
         names = Counter(hull.row.name for hull in hulls)
         self._findings.fatal += [f"{times} hulls are named {name!r}" for name, times in names.items() if times > 1]
@@ -278,7 +293,7 @@ class _Examination:
         expected = np.append(base, lasts)[:-1] + 1
         if needed < len(firsts) and firsts[needed] > base + 1:
             self._findings.blame(hull, f"revisions {base + 1} to {firsts[needed] - 1} are missing", fatal=True)
-        for row in np.flatnonzero(firsts[1:] != expected[1:]) + 1:
+        for row in (np.flatnonzero(firsts[1:] != expected[1:]) + 1).tolist():
             text = f"revisions {expected[row]} to {firsts[row] - 1} are missing"
             if firsts[row] < expected[row]:
                 text = f"revisions {firsts[row]} to {lasts[row - 1]} are there twice"
@@ -288,16 +303,16 @@ class _Examination:
                 self._findings.blame(hull, f"{text}, which only looking back needs", fatal=False)
         for row, first in enumerate(firsts.tolist()):
             if first in scanned.damaged:
-                self._judge_damaged(scanned, row, needed, f"revisions {first} to {lasts[row]} are damaged")
+                self._judge_damaged(scanned, row, needed, base, f"revisions {first} to {lasts[row]} are damaged")
 
-    def _judge_damaged(self, scanned: _Scanned, row: int, needed: int, text: str) -> None:
+    def _judge_damaged(self, scanned: _Scanned, row: int, needed: int, base: int, text: str) -> None:
         hull = scanned.rows
         if row < needed:
             self._findings.blame(hull, f"{text}, which only looking back needs", fatal=False)
         elif row + 1 == len(hull.firsts):
-            first = hull.firsts[row]
-            self._findings.blame(hull, f"{text}: cut off at revision {first - 1}, the last whole batch", fatal=False)
-            self._findings.repairs.append(Cut(hull.row.number, scanned.damaged[first]))
+            last = max(base, hull.firsts[row] - 1)
+            self._findings.blame(hull, f"{text}: cut off at revision {last}, the last whole one", fatal=False)
+            self._findings.repairs.append(Cut(hull.row.number, last, scanned.damaged[hull.firsts[row]]))
         else:
             self._findings.blame(hull, f"{text}, and later ones are there", fatal=True)
 

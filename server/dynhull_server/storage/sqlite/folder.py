@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ..port import DamagedError, FormatError, LockedError
 from .disk import Access, Disk
-from .examine import format_of
 from .log import check_log
 from .totals import Totals, read_totals
 
@@ -44,7 +43,8 @@ class Folder:
         lock = self.disk.lock(self.path / LOCK)
         if lock is None:
             raise LockedError(
-                f"another server, or a command, works on {self.path}: stop it first, or choose another folder with --data"
+                f"another server, or a command, works on {self.path}: stop it first, or choose another folder "
+                "with --data"
             )
         with lock:
             yield
@@ -73,8 +73,10 @@ class Folder:
             raise
         return connection
 
-    def check_log(self) -> list[str]:
-        """Examine the log before SQLite reads it, while nobody writes. Returns what was lost at its end, in words.
+    def check_log(self) -> tuple[list[str], Totals | None]:
+        """Examine the log before SQLite reads it, while nobody writes.
+
+        Returns what was lost at its end, in words, and the totals in the database's own file.
 
         Raises:
             FormatError: the folder is a copy that was not finished.
@@ -84,7 +86,7 @@ class Folder:
             raise FormatError(f"{self.path} {UNFINISHED_WORDS}")
         own = self._own_totals()
         note = check_log(self.disk, self.log, own)
-        return [] if note is None else [note]
+        return ([] if note is None else [note]), own
 
     def _own_totals(self) -> Totals | None:
         """The totals in the database's own file, without its log; None where they cannot be read."""

@@ -2,7 +2,7 @@
 
 from array import array
 from bisect import bisect_right, insort
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, Self
@@ -27,7 +27,7 @@ class Snapshot:
 
     id: int
     revision: int
-    chunks: Sequence[int] = ()
+    chunks: "array[int]" = field(default_factory=lambda: array("q"))
 
 
 @dataclass(slots=True)
@@ -74,10 +74,10 @@ class HullRows:
         oldest = self.snapshots[-KEPT].revision
         return self.ids[:] if self.last <= oldest else self.ids[: max(0, bisect_right(self.firsts, oldest + 1) - 1)]
 
-    def append(self, first: int, last: int, id: int, weight: int) -> None:
+    def append(self, first: int, last: int, place: int, weight: int) -> None:
         """A row of batches has come."""
         self.firsts.append(first)
-        self.ids.append(id)
+        self.ids.append(place)
         self.last = last
         self.sum += weight
 
@@ -99,7 +99,7 @@ class Ledger:
             dead cannot be somebody's by the time it is dropped.
     """
 
-    totals: Totals = Totals()
+    totals: Totals = field(default_factory=Totals)
     hulls: dict[int, HullRows] = field(default_factory=dict)
     dead: "dict[str, array[int]]" = field(default_factory=lambda: {table: array("q") for table in DROPPED})
     batch_ids: "count[int]" = field(default_factory=lambda: count(1))
@@ -110,7 +110,7 @@ class Ledger:
         """Take the place of a ledger; chunks of snapshots that are `under_way` are not dead."""
         for name in ("batch_ids", "chunk_ids", "snapshot_ids"):
             setattr(self, name, count(max(next(getattr(self, name)), next(getattr(before, name)))))
-        self.dead["chunks"] = array("q", (id for id in self.dead["chunks"] if id not in under_way))
+        self.dead["chunks"] = array("q", (place for place in self.dead["chunks"] if place not in under_way))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +151,10 @@ class DropBatches:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Step: a hull's newest row of batches, which is damaged, is gone."""
+    """Step: a hull's newest row of batches, which is damaged, is gone; it ends at revision `last`."""
 
     number: int
+    last: int
     weight: int
 
 
@@ -204,8 +205,8 @@ class Group:
             case Delete():
                 self._delete(change.number)
             case Chunk():
-                sum = checksum(change.points, change.snapshot, change.number)
-                values = change.id, change.snapshot, change.number, sum, change.points
+                stored = checksum(change.points, change.snapshot, change.number)
+                values = change.id, change.snapshot, change.number, stored, change.points
                 self.statements.append((INSERT_CHUNK, values))
             case Finish():
                 self._finish(change)
@@ -228,12 +229,12 @@ class Group:
     def _create(self, row: HullRow) -> None:
         if self._hull(row.number):
             raise NotCommittedError(f"there is a hull {row.number} already")
-        sum = hull_checksum(row)
-        rows = HullRows(row, sum)
-        self._now[row.number] = _Now(rows, 0, sum, 0)
+        stored = hull_checksum(row)
+        rows = HullRows(row, stored)
+        self._now[row.number] = _Now(rows, 0, stored, 0)
         next_number = max(self._totals.next_number, row.number + 1)
-        self._totals = replace(self._totals.plus(1, 0, sum), next_number=next_number)
-        self.statements.append((INSERT_HULL, (row.number, row.name, row.uid, row.created, row.max_points, sum)))
+        self._totals = replace(self._totals.plus(1, 0, stored), next_number=next_number)
+        self.statements.append((INSERT_HULL, (row.number, row.name, row.uid, row.created, row.max_points, stored)))
         self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
 
     def _append(self, change: Append) -> None:
@@ -248,12 +249,12 @@ class Group:
         payload = encode(change.records)
         keys = change.number, first, last
         stored = checksum(payload, *keys)
-        sum = weight(stored, *keys)
-        id = next(self._ledger.batch_ids)
-        now.batches, now.sum, now.last = now.batches + 1, now.sum + sum, last
-        self._totals = self._totals.plus(0, 1, sum)
-        self.statements.append((INSERT_BATCH, (id, *keys, stored, payload)))
-        self._effects.append(lambda: now.rows.append(first, last, id, sum))
+        each = weight(stored, *keys)
+        place = next(self._ledger.batch_ids)
+        now.batches, now.sum, now.last = now.batches + 1, now.sum + each, last
+        self._totals = self._totals.plus(0, 1, each)
+        self.statements.append((INSERT_BATCH, (place, *keys, stored, payload)))
+        self._effects.append(lambda: now.rows.append(first, last, place, each))
 
     def _delete(self, number: int) -> None:
         """Its batches and snapshots stay for `sweep`: a large hull's would hold up every commit behind this one."""
@@ -309,7 +310,8 @@ class Group:
         rows = self._ledger.hulls[step.number]
 
         def cut() -> None:
-            rows.last = rows.firsts.pop() - 1
+            rows.last = step.last
+            rows.firsts.pop()
             rows.ids.pop()
             rows.sum -= step.weight
 
@@ -332,7 +334,7 @@ class Group:
 
     def _delete_rows(self, table: str, ids: "array[int]") -> None:
         sql = f"DELETE FROM {table} WHERE rowid = ?"  # noqa: S608  (ours)
-        self.statements += [(sql, (id,)) for id in ids]
+        self.statements += [(sql, (place,)) for place in ids]
 
 
 @dataclass(slots=True)

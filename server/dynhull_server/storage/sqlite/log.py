@@ -1,12 +1,12 @@
 """Is the write-ahead log whole? SQLite itself drops everything after a damaged frame, and does not say so.
 
-The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. A frame counts where both of its salts are
-those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit there may lie
+The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. A frame counts where both of its salts
+are those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit may lie
 
 * frames of an earlier use of the file: both of their salts are others;
-* one commit that did not finish, when the process or the power failed, or when the disk was full: nobody was told of it.
+* one commit that did not finish, because the process, the power or the room ended: nobody was told of it.
 
-Everything else is damage. A single salt that differs is, too: SQLite would take the rest for an earlier use of the file.
+Everything else is damage. One salt that differs alone is, too: SQLite would take the rest for an earlier use.
 """
 
 import struct
@@ -27,6 +27,8 @@ from .totals import MODES, STOPPED, Totals
 HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
 CHECKED_BYTES = 24  # of the header
 MAGIC = (0x377F0682, 0x377F0683)  # checksums over little-endian, over big-endian words
+
+REMEDY = "restore a backup, or what is left without the newest commits (dynhull restore --accept-loss)"
 
 # After a power failure, what was not synced may have holes, and whole commits behind them.
 UNSYNCED = (MODES[Durability.INTERVAL], MODES[Durability.NONE])
@@ -51,7 +53,7 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
         if in_use:
             raise DamagedError(
                 f"{path} is missing or cut short, and the database beside it is incomplete without it: put it back, "
-                "or restore a backup"
+                f"or {REMEDY}"
             )
         return None
     with disk.open(path) as file:
@@ -62,16 +64,17 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
         if magic not in MAGIC or state != (sum0, sum1):
             if own is not None and not in_use:
                 return None  # just begun: nobody was told of anything in it
-            raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: restore a backup")
+            raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: {REMEDY}")
         damage = _damage(_frames(file, page_bytes), (salts[0], salts[1]), state, order)
     if damage is None:
         return None
     frame, commits, others_follow = damage
     if others_follow and (own is None or own.mode not in UNSYNCED):
-        raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: restore a backup")
+        raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: {REMEDY}")
     return (
-        f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most {commits or 1} of "
-        "the newest commits; whoever wrote them was not told that they were kept, unless the disk lost them afterwards"
+        f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most "
+        f"{commits or 1} of the newest commits; whoever wrote them was not told that they were kept, unless the disk "
+        "lost them afterwards"
     )
 
 
@@ -108,18 +111,20 @@ def _damage(
     The frames behind the damaged one are taken for whole where their checksums run on from the one before.
     """
     damaged: int | None = None
+    foreign: int | None = None
     commits = 0
     others_follow = False
     for number, frame in enumerate(frames, start=1):
         same = [one == other for one, other in zip(frame.salts, salts, strict=True)]
         if not any(same):
-            break  # of an earlier use of the file
+            foreign = foreign or number
+            continue
         whole = all(same) and _checksum(state, frame.header[:8] + frame.page, order) == frame.sums
         state = frame.sums
-        if damaged is None and whole:
+        if damaged is None and foreign is None and whole:
             continue
         if damaged is None:
-            damaged = number
+            damaged = foreign or number
         else:
             others_follow |= whole and commits > 0
         commits += frame.commit != 0 and (whole or number == damaged)

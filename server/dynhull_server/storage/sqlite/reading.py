@@ -3,13 +3,12 @@
 import json
 import sqlite3
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from threading import Condition
+from typing import Any
 
 import numpy as np
-
-from dynhull.arrays import Points
 
 from ...state.records import Kept, Record
 from ..port import DamagedError
@@ -92,6 +91,8 @@ def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kep
     Raises:
         DamagedError: a row is damaged or missing.
     """
+    if until < hull.oldest:
+        raise DamagedError(f"revision {until} of hull {hull.row.name!r} is not kept any more")
     try:
         kept = _newest_snapshot(connection, hull, until)
         ids = hull.between(kept.revision, until)
@@ -107,7 +108,9 @@ def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kep
     return kept
 
 
-def rows_by_id(connection: sqlite3.Connection, columns: str, table: str, ids: "array[int]") -> Iterator[Sequence[int]]:
+def rows_by_id(
+    connection: sqlite3.Connection, columns: str, table: str, ids: "array[int]"
+) -> Iterator[tuple[Any, ...]]:
     """Some columns of rows, in the order of their numbers; those that are not there are left out."""
     # Numbers as JSON: one query for many rows. A cross join is carried out from left to right.
     sql = f"SELECT {columns} FROM json_each(?) AS id CROSS JOIN {table} ON {table}.rowid = id.value"  # noqa: S608  (ours)
@@ -131,7 +134,7 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
     row = connection.execute(query, keys).fetchone()
     if row is None or checksum(row[0], *keys) != row[1]:
         return None
-    parts: list[Points] = [np.empty((0, 2))]
+    parts = [np.empty((0, 2))]
     found = rows_by_id(connection, "number, checksum, points", "chunks", array("q", snapshot.chunks))
     for expected, (number, stored, data) in enumerate(found):
         if number != expected or checksum(data, snapshot.id, number) != stored:

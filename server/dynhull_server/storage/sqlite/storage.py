@@ -4,9 +4,9 @@ Outcomes. A commit that fails before its COMMIT has written no frame with a comm
 itself SQLite writes the frames in order, the one with the mark last, so a write that fails leaves no whole mark either.
 Everything else that COMMIT may fail with (a sync, no memory, shared memory that cannot grow) can come after the mark: a
 crash now would make the next recovery find the commit, though this process does not see it. `settle` decides it with a
-commit of its own. That one is written either behind the frames in question, if they are part of the log as SQLite sees it
-now, or over them. In the second case the first of them is gone, and with it all: checksums run on from frame to frame, so
-none behind it can be valid. Once it is durable, the outcome is what can be read.
+commit of its own. That one is written either behind the frames in question, if they are part of the log as SQLite sees
+it now, or over them. In the second case the first of them is gone, and with it all: checksums run on from frame to
+frame, so none behind it can be valid. Once it is durable, the outcome is what can be read.
 """
 
 import json
@@ -17,7 +17,6 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
-from typing import IO
 
 from dynhull.arrays import Points
 
@@ -49,16 +48,17 @@ from .ledger import (
     Ledger,
     Snapshot,
 )
+from .migration import make_tables, migrate
 from .reading import Readers, begin, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
-from .migration import make_tables, migrate
-from .totals import MODES, STOPPED, read_totals, renew_totals
+from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
 CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays the ones behind it by little
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # a step
 
 CHECKPOINT_BYTES = 16 * 2**20  # of log, before it is copied into the database
 LONGEST_LOG_BYTES = 64 * 2**20  # kept when the log is begun anew
+START_PATIENCE_MS = 1000  # for readers, at the start
 PATIENCE_MS = 10  # for writers and readers, before the log is begun anew; meanwhile no commit begins
 
 SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durability.NONE: "OFF"}
@@ -98,14 +98,14 @@ class SQLiteStorage:
         with ExitStack() as stack:
             stack.enter_context(self._folder.held())
             try:
-                notes = self._folder.check_log()
-                findings, version = self._examined(progress)
+                notes, own = self._folder.check_log()
+                findings, version = self._examined(stack, own, progress)
                 if findings.fatal:
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
                 self._take_up(findings, version)
                 self._checkpointer = stack.enter_context(closing(self._folder.connect(Access.WRITE)))
-                self._begin_log_anew()
+                self._begin_log_anew(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
                 self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
             except sqlite3.OperationalError as error:
@@ -125,6 +125,7 @@ class SQLiteStorage:
             with suppress(sqlite3.Error, StorageError):
                 self._writer.execute("PRAGMA synchronous = FULL")
                 self._write(Group(self._in_mode(STOPPED), []))
+                self._guard.close()
         self._open.close()
 
     # Committing
@@ -149,6 +150,8 @@ class SQLiteStorage:
         connection.execute(UPDATE_TOTALS, replace(totals, commits=totals.commits + 1).row)
         connection.execute("COMMIT")
         self._set_synchronous(connection)
+        with self._housekeeping:
+            self._copy_log("RESTART")  # if it can be: else what failed stays behind the log's end for a while
         connection.execute("BEGIN")
         ledger = load(connection)
         connection.execute("COMMIT")
@@ -228,8 +231,8 @@ class SQLiteStorage:
         snapshot = Snapshot(next(self._ledger.snapshot_ids), revision, array("q", ids))
         self._under_way[snapshot.id] = set(ids)
         try:
-            for i, (id, start) in enumerate(zip(ids, starts, strict=True)):
-                yield Chunk(id, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
+            for i, (place, start) in enumerate(zip(ids, starts, strict=True)):
+                yield Chunk(place, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
             yield Finish(number, snapshot, json.dumps(dict(producers)).encode())
         finally:
             del self._under_way[snapshot.id]
@@ -240,8 +243,10 @@ class SQLiteStorage:
             yield DropSnapshot(number, hull.snapshots[0])
         yield from self._drop_dead("chunks", "points")
         while (hull := self._ledger.hulls.get(number)) and (ids := hull.superfluous()):
-            rows = self._few(ids, "first, last, checksum", "batches", "payload")
-            weights = sum(weight(stored, number, first, last) for first, last, stored in rows)
+            rows = self._few(ids, "batches.rowid, first, last, checksum", "batches", "payload")
+            if any(place != row[0] for place, row in zip(ids, rows, strict=False)) or not rows:
+                raise DamagedError(f"{self._folder.database}: a row of batches of hull {number} is missing")
+            weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
             yield DropBatches(number, ids[: len(rows)], weights)
 
     def sweep(self) -> Iterator[Step]:
@@ -261,7 +266,7 @@ class SQLiteStorage:
         with self._visible:
             live = {snapshot.id for hull in self._ledger.hulls.values() for snapshot in hull.snapshots}
             live |= self._under_way.keys()
-            self._ledger.dead["chunks"] = array("q", (id for id, snapshot in rows if snapshot not in live))
+            self._ledger.dead["chunks"] = array("q", (place for place, snapshot in rows if snapshot not in live))
 
     def _few(self, ids: "array[int]", columns: str, table: str, sized: str) -> list[Sequence[int]]:
         """Some columns of the first of the rows: as many as fit into a step, at least one."""
@@ -279,18 +284,19 @@ class SQLiteStorage:
 
     def sync(self) -> None:
         """Make durable what was committed."""
-        with self._housekeeping:
-            if self._log_in_doubt:
-                # After a sync that failed, the next may succeed without the pages that the first one lost.
-                if self._copy_log("FULL") != (0, 0):
-                    raise StorageError("the log is in use: it is made durable later")
-                self._log_in_doubt = False
-                return
-            try:
-                self._folder.disk.sync(self._log)
-            except BaseException:
-                self._log_in_doubt = True
-                raise
+        if self._log_in_doubt:
+            # After a sync that failed, the next may succeed without the pages that the first one lost.
+            with self._housekeeping:
+                busy, left = self._copy_log("FULL")
+            if busy or left:
+                raise StorageError("the log is in use: it is made durable later")
+            self._log_in_doubt = False
+            return
+        try:
+            self._folder.disk.sync(self._log)
+        except BaseException:
+            self._log_in_doubt = True
+            raise
 
     def checkpoint(self) -> None:
         """Copy the log into the database beside commits, when it is long, then begin it anew.
@@ -313,14 +319,30 @@ class SQLiteStorage:
 
     # Opening
 
-    def _examined(self, progress: Progress) -> tuple[Findings, int]:
-        """What is there, and its format; nothing is changed."""
+    def _examined(self, stack: ExitStack, own: Totals | None, progress: Progress) -> tuple[Findings, int]:
+        """What is there, and its format; nothing is changed, but that a database is made where there is none.
+
+        The last connection that is closed drops the log, but not if it only reads. A log that is gone while the
+        database's own file says that it is in use is taken for lost. So the connection that reads here outlives all
+        others, unless the database says that it is not in use any more.
+        """
         if not self._folder.disk.size(self._folder.database):
-            return Findings(), 0
-        with closing(self._folder.connect(Access.READ)) as connection:
-            connection.execute("BEGIN")
-            version = format_of(connection, self._folder.database)
-            return (examine(connection, version, progress) if version else Findings()), version
+            self._make_database()
+        connection = self._guard = stack.enter_context(closing(self._folder.connect(Access.READ)))
+        version = format_of(connection, self._folder.database)
+        if version == 0:  # a server was killed before it had made the tables
+            self._make_database()
+            version = FORMAT
+        connection.execute("BEGIN")
+        findings = examine(connection, version, own, progress)
+        connection.execute("ROLLBACK")
+        return findings, version
+
+    def _make_database(self) -> None:
+        with closing(self._connect_writer()) as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            make_tables(connection)
+            connection.execute("COMMIT")
 
     def _take_up(self, findings: Findings, version: int) -> None:
         """Bring the database to today's format and repair it, and say in it that somebody works on it."""
@@ -328,9 +350,7 @@ class SQLiteStorage:
         connection.execute("PRAGMA synchronous = FULL")
         self._ledger = findings.ledger
         connection.execute("BEGIN IMMEDIATE")
-        if version == 0:
-            make_tables(connection)
-        elif version < FORMAT:
+        if version < FORMAT:
             migrate(connection, findings.ledger)
         elif not findings.both_totals:
             renew_totals(connection, findings.ledger.totals)
@@ -342,10 +362,12 @@ class SQLiteStorage:
         self._ledger.totals = replace(self._ledger.totals, mode=mode)
         return self._ledger
 
-    def _begin_log_anew(self) -> None:
+    def _begin_log_anew(self, own: Totals | None) -> None:
         """So that the database's own file says who works on it, and nothing that failed lies behind the log's end."""
+        self._checkpointer.execute(f"PRAGMA busy_timeout = {START_PATIENCE_MS}")
         busy, _ = self._copy_log("RESTART")
-        if busy:
+        # A backup may have begun before the server that was here stopped: then the file says it already.
+        if busy and (own is None or own.mode == STOPPED):
             raise LockedError(f"somebody reads {self._folder.database}: wait until they are done")
         self._checkpointer.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
 
@@ -365,7 +387,7 @@ class SQLiteStorage:
 
     def _connect_reader(self) -> sqlite3.Connection:
         """Reads once, so that its files are open."""
-        connection = self._folder.connect(Access.WRITE)
+        connection = self._folder.connect(Access.READ)
         try:
             connection.execute("SELECT id FROM totals").fetchone()
         except BaseException:

@@ -1,0 +1,129 @@
+"""The page for Prometheus, in threads of its own. It names hulls, so other machines must show who they are."""
+
+import socket
+import ssl
+import threading
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from prometheus_client import CollectorRegistry
+from prometheus_client.exposition import choose_encoder
+
+from .access import Caller, PermissionDeniedError, UnauthenticatedError
+
+# A connection that does not say what it wants for so many seconds is closed, and so is one beyond so many.
+PATIENCE = 5.0
+MOST_CONNECTIONS = 32
+
+
+class MetricsPage:
+    """Answers from `__init__` until `close`.
+
+    Args:
+        host: the address to listen on.
+        port: the port to listen on; 0 for a free one.
+        registry: what is told.
+        bearer: whose token this value of the header Authorization has, or raises UnauthenticatedError; None where
+            no token is asked for.
+        tls: the certificates; None for HTTP.
+        refused: called in another thread with the status and the peer of each refused request.
+
+    Attributes:
+        port: the port it listens on.
+
+    Raises:
+        OSError: it cannot listen there.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        registry: CollectorRegistry,
+        bearer: Callable[[str], Caller] | None,
+        tls: ssl.SSLContext | None,
+        refused: Callable[[str, str, str], None],
+    ) -> None:
+        class Page(_Page):
+            def require(self) -> None:
+                if bearer is not None:
+                    bearer(self.headers.get("Authorization", "")).access.require_read("")
+
+        Page.registry = registry
+        Page.refused = staticmethod(refused)
+        self._server = _Server(host, port, Page, tls)
+        self._thread = threading.Thread(target=self._server.serve_forever, name="metrics")
+        self._thread.start()
+        self.port = self._server.server_port
+
+    def close(self) -> None:
+        """Answer no more."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+
+class _Page(BaseHTTPRequestHandler):
+    registry: CollectorRegistry
+    refused: Callable[[str, str, str], None]
+    timeout = PATIENCE
+
+    def require(self) -> None:
+        """Raise where the caller may not see the page."""
+
+    def do_GET(self) -> None:
+        """Every path is the page."""
+        try:
+            self.require()
+        except (UnauthenticatedError, PermissionDeniedError) as error:
+            unknown = isinstance(error, UnauthenticatedError)
+            self.refused(str(error), "UNAUTHENTICATED" if unknown else "PERMISSION_DENIED", self.address_string())
+            self.send_response(HTTPStatus.UNAUTHORIZED if unknown else HTTPStatus.FORBIDDEN)
+            if unknown:
+                self.send_header("WWW-Authenticate", "Bearer")
+            self.end_headers()
+            return
+        encode, content_type = choose_encoder(self.headers.get("Accept", ""))
+        page = encode(self.registry)
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", content_type)
+        self.send_header("Content-Length", str(len(page)))
+        self.end_headers()
+        self.wfile.write(page)
+
+    def log_message(self, *_: Any) -> None:
+        """Nothing: Prometheus comes every few seconds."""
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def __init__(self, host: str, port: int, page: type[_Page], tls: ssl.SSLContext | None) -> None:
+        host = host.strip("[]")
+        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._tls = tls
+        self._room = threading.BoundedSemaphore(MOST_CONNECTIONS)
+        super().__init__((host, port), page)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        if self._room.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            if self._tls is not None:  # here, for it waits for the other end
+                request.settimeout(PATIENCE)
+                request = self._tls.wrap_socket(request, server_side=True)
+        except OSError:  # the other end is none, or speaks something else
+            self.shutdown_request(request)
+        else:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._room.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Nothing: the other end has gone."""

@@ -1,0 +1,342 @@
+"""What every storage promises, whatever is behind it."""
+
+import io
+import itertools
+import sqlite3
+import threading
+
+import numpy as np
+import pytest
+
+from dynhull_server.state.records import Append, Create, Delete, HullRow, Record
+from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.memory import MemoryStorage
+from dynhull_server.storage.port import NEWEST, DamagedError, NotCommittedError
+from dynhull_server.storage.sqlite.disk import Disk
+from dynhull_server.storage.sqlite.folder import DATABASE
+from dynhull_server.storage.sqlite.storage import CHUNK_POINTS, SQLiteStorage
+
+NOTHING = np.empty((0, 2))
+SIMULATED = itertools.count()
+
+
+class MemoryDisk(Disk):
+    """SQLite's own memory in place of files: what simulations run on."""
+
+    def __init__(self):
+        self._name = f"file:/simulated-{next(SIMULATED)}?vfs=memdb"
+        self._keep = sqlite3.connect(self._name, uri=True, check_same_thread=False)
+
+    def make(self, folder):
+        """There are no folders."""
+
+    def lock(self, _):
+        return io.StringIO()
+
+    def size(self, file):
+        if file.name != DATABASE:
+            return None
+        return self._keep.execute("PRAGMA page_count").fetchone()[0]
+
+    def open(self, _):
+        return io.BytesIO()
+
+    def sync(self, file):
+        """There is nothing more durable."""
+
+    def connect(self, *_):
+        return sqlite3.connect(self._name, uri=True, isolation_level=None, check_same_thread=False)
+
+
+def no_progress(done, total):
+    assert 0 <= done <= total
+
+
+@pytest.fixture(params=["memory", "simulated", *Durability])
+def make(request, tmp_path):
+    """Makes the storage; again, as it is after a restart."""
+    if request.param == "memory":
+        storage = MemoryStorage()
+        return lambda: storage
+    if request.param == "simulated":
+        disk = MemoryDisk()
+        return lambda: SQLiteStorage(tmp_path / "data", disk=disk)
+    return lambda: SQLiteStorage(tmp_path / "data", request.param)
+
+
+class Opened:
+    """A storage, with shorter words for what tests do to it."""
+
+    def __init__(self, make):
+        self.make = make
+        self.storage = make()
+        self.contents = self.storage.open(no_progress)
+
+    def reopen(self):
+        self.storage.close()
+        self.storage = self.make()
+        self.contents = self.storage.open(no_progress)
+        return self
+
+    def commit(self, *changes):
+        self.storage.commit(changes)
+
+    def create(self, number, *first):
+        self.commit(Create(row(number)), *first)
+
+    def carry_out(self, steps):
+        count = 0
+        for step in steps:
+            self.commit(step)
+            count += 1
+        return count
+
+    def snapshot(self, number, revision, points):
+        return self.carry_out(self.storage.snapshot(number, revision, points, {"w": revision}))
+
+
+@pytest.fixture
+def opened(make):
+    opened = Opened(make)
+    yield opened
+    opened.storage.close()
+
+
+def row(number, name=None):
+    return HullRow(number, name or f"hull {number}", f"uid{number}", 12.5 + number, number)
+
+
+def points(n, seed=0):
+    return np.random.default_rng(seed).random((n, 2))
+
+
+def record(revision, n=3, deletes=NOTHING, **fields):
+    return Record(revision, points(n, revision), deletes, **fields)
+
+
+def records(first, last):
+    return [record(revision) for revision in range(first, last + 1)]
+
+
+def same(found, expected):
+    assert [each.revision for each in found] == [each.revision for each in expected]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one.inserts, other.inserts)
+        np.testing.assert_array_equal(one.deletes, other.deletes)
+        assert (one.producer, one.sequence, one.lenient) == (other.producer, other.sequence, other.lenient)
+
+
+def test_what_was_committed_comes_back(opened):
+    assert (opened.contents.hulls, opened.contents.next_number, opened.contents.notes) == ([], 1, [])
+    batches = [
+        record(1, producer="truck é", sequence=7),
+        Record(2, NOTHING, points(1, 1)),
+        Record(3, NOTHING, NOTHING),
+        record(4, n=20_000, deletes=np.array([[-0.5, 1e308], [5e-324, 0.0]]), lenient=True),
+    ]
+    fleet, other = row(1, "fleet"), row(2, "fl/é")
+    opened.commit(Create(fleet), Append(1, batches[:2]))
+    opened.commit(Append(1, batches[2:]), Create(other))
+    for _ in range(2):
+        assert opened.storage.row(1) == fleet
+        assert opened.storage.row(3) is None
+        kept = opened.storage.read(1)
+        assert (kept.revision, kept.points.shape, kept.producers, kept.last_revision) == (0, (0, 2), {}, 4)
+        same(kept.records, batches)
+        assert opened.storage.read(2).records == []
+        assert opened.storage.oldest(1) == 0
+        opened.reopen()
+        assert (opened.contents.hulls, opened.contents.next_number) == ([other, fleet], 3)
+        assert opened.contents.notes == []
+
+
+def test_a_hull_is_read_as_it_was(opened):
+    opened.create(1)
+    for revision in range(1, 6):
+        opened.commit(Append(1, [record(revision)]))
+    opened.commit(Append(1, records(6, 9)))
+    for until in range(10):
+        same(opened.storage.read(1, until).records, records(1, until))
+    same(opened.storage.read(1, NEWEST).records, records(1, 9))
+
+
+def test_a_snapshot_stands_for_the_batches_before_it(opened):
+    opened.create(1)
+    at = {}
+    for revision in range(1, 41):
+        opened.commit(Append(1, [record(revision)]))
+        if revision % 10 == 0:
+            at[revision] = points(2 * CHUNK_POINTS + 5, revision)
+            opened.snapshot(1, revision, at[revision])
+    opened.commit(Append(1, [record(41)]))
+    for _ in range(2):
+        kept = opened.storage.read(1)
+        assert (kept.revision, kept.producers, kept.last_revision) == (40, {"w": 40}, 41)
+        np.testing.assert_array_equal(kept.points, at[40])
+        same(kept.records, [record(41)])
+        assert opened.storage.oldest(1) == 30
+        kept = opened.storage.read(1, 33)
+        assert (kept.revision, kept.producers) == (30, {"w": 30})
+        np.testing.assert_array_equal(kept.points, at[30])
+        same(kept.records, records(31, 33))
+        with pytest.raises(DamagedError, match="not kept any more"):
+            opened.storage.read(1, 29)
+        opened.reopen()
+
+
+def test_a_snapshot_counts_once_it_is_whole(opened):
+    opened.create(1, Append(1, records(1, 2)))
+    steps = opened.storage.snapshot(1, 2, points(3 * CHUNK_POINTS), {})
+    opened.commit(next(steps))
+    steps.close()
+    for _ in range(2):
+        kept = opened.storage.read(1)
+        assert kept.last_revision == 2
+        assert kept.revision in (0, 2)
+        opened.reopen()
+    opened.carry_out(opened.storage.sweep())
+    assert opened.carry_out(opened.storage.sweep()) == 0
+    assert opened.storage.read(1).last_revision == 2
+
+
+def test_an_empty_hull_has_a_snapshot_too(opened):
+    opened.create(1, Append(1, [record(1)]))
+    opened.snapshot(1, 1, NOTHING)
+    kept = opened.storage.read(1)
+    assert (kept.revision, kept.points.shape, kept.records) == (1, (0, 2), [])
+
+
+def test_snapshots_of_hulls_are_written_beside_each_other_and_beside_a_sweep(opened):
+    for number in (1, 2, 3):
+        opened.create(number, Append(number, records(1, 3)))
+    opened.snapshot(3, 3, points(CHUNK_POINTS + 1))
+    opened.commit(Delete(3))
+    large = {number: points(2 * CHUNK_POINTS + 1, number) for number in (1, 2)}
+    writing = [opened.storage.snapshot(number, 3, large[number], {}) for number in (1, 2)]
+    writing.append(opened.storage.sweep())
+    while writing:
+        for steps in list(writing):
+            step = next(steps, None)
+            if step is None:
+                writing.remove(steps)
+            else:
+                opened.commit(step)
+    for _ in range(2):
+        for number in (1, 2):
+            np.testing.assert_array_equal(opened.storage.read(number).points, large[number])
+        opened.reopen()
+
+
+def test_a_deleted_hull_is_gone(opened):
+    opened.create(1, Append(1, records(1, 30)))
+    opened.create(2, Append(2, [record(1)]))
+    opened.snapshot(1, 30, points(3))
+    steps = opened.storage.snapshot(1, 30, points(3), {})  # is under way
+    opened.commit(next(steps))
+    opened.commit(Delete(1))
+    opened.carry_out(steps)
+    for _ in range(2):
+        assert opened.storage.row(1) is None
+        for read in (opened.storage.read, opened.storage.oldest):
+            with pytest.raises(KeyError):
+                read(1)
+        opened.reopen()
+        assert opened.contents.hulls == [row(2)]
+    opened.carry_out(opened.storage.sweep())
+    assert opened.carry_out(opened.storage.sweep()) == 0
+    same(opened.reopen().storage.read(2).records, [record(1)])
+
+
+def test_a_name_is_free_again_in_the_commit_that_deletes_it(opened):
+    opened.commit(Create(row(1, "a")), Append(1, [record(1)]))
+    opened.commit(Delete(1), Create(row(2, "a")), Append(2, records(1, 2)))
+    opened.reopen()
+    assert opened.contents.hulls == [row(2, "a")]
+    same(opened.storage.read(2).records, records(1, 2))
+
+
+def test_numbers_are_never_used_again(opened):
+    opened.create(7)
+    opened.create(5)
+    opened.commit(Delete(7))
+    assert opened.reopen().contents.next_number == 8
+    opened.carry_out(opened.storage.sweep())
+    opened.commit(Create(row(8)), Delete(8))
+    assert opened.reopen().contents.next_number == 9
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        Create(row(1)),
+        Append(1, records(4, 5)),
+        Append(1, records(6, 7)),
+        Append(2, records(1, 1)),
+        Delete(2),
+    ],
+)
+def test_a_group_is_kept_whole_or_not_at_all(opened, change):
+    opened.create(1, Append(1, records(1, 3)))
+    with pytest.raises(NotCommittedError):
+        opened.commit(Create(row(3)), Append(1, [record(4)]), change, Delete(3))
+    for _ in range(2):
+        same(opened.storage.read(1).records, records(1, 3))
+        assert opened.storage.row(3) is None
+        opened.reopen()
+    opened.commit(Append(1, [record(4)]))
+    same(opened.storage.read(1).records, records(1, 4))
+
+
+def test_a_group_of_much(opened):
+    numbers = range(1, 40)
+    opened.commit(*(Create(row(number)) for number in numbers))
+    for revision in range(1, 8):
+        opened.commit(*(Append(number, [record(revision, number)]) for number in numbers))
+    opened.commit(*(Delete(number) for number in numbers if number % 3 == 0))
+    opened.reopen()
+    opened.carry_out(opened.storage.sweep())
+    for number in numbers:
+        if number % 3:
+            expected = [record(revision, number) for revision in range(1, 8)]
+            same(opened.storage.read(number).records, expected)
+    assert len(opened.contents.hulls) == sum(number % 3 > 0 for number in numbers)
+
+
+def test_reading_goes_on_beside_commits(opened, request):
+    if "simulated" in request.node.name:
+        pytest.skip("readers lock SQLite's own memory")
+    opened.create(1)
+    done = threading.Event()
+    wrong = []
+
+    def read():
+        while not done.is_set():
+            try:
+                found = opened.storage.read(1)
+                same(found.records, records(found.revision + 1, found.last_revision))
+            except BaseException as error:
+                wrong.append(error)
+                return
+
+    threads = [threading.Thread(target=read) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    try:
+        for revision in range(1, 61):
+            opened.commit(Append(1, [record(revision)]))
+            if revision % 20 == 0:
+                opened.snapshot(1, revision, points(10))
+    finally:
+        done.set()
+        for thread in threads:
+            thread.join()
+    assert wrong == []
+
+
+def test_housekeeping_changes_nothing(opened):
+    opened.create(1, Append(1, records(1, 3)))
+    opened.storage.sync()
+    opened.storage.checkpoint()
+    opened.storage.settle()
+    assert opened.storage.bytes_used() >= 0
+    same(opened.storage.read(1).records, records(1, 3))

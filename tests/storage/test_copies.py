@@ -1,0 +1,346 @@
+"""Backup, restore, check and export, as commands, beside servers that run or were killed."""
+
+import signal
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+from folders import (
+    DATABASE,
+    FORMAT_1,
+    LOG,
+    append,
+    fill,
+    flip,
+    killed,
+    no_progress,
+    opened,
+    record,
+    records,
+    same,
+    snapshot,
+    stopped,
+)
+from server_process import COMMAND, PATIENCE, server_process
+
+from dynhull_client import HullClient
+from dynhull_server.state.records import Append, Create, Delete, HullRow, Record
+from dynhull_server.storage.port import LockedError, StorageError
+from dynhull_server.storage.sqlite import copies
+
+UNFINISHED = "is a copy that was not finished: remove it, and copy again"
+
+
+def run(*command, **more):
+    return subprocess.run(
+        [COMMAND, *map(str, command)], capture_output=True, text=True, timeout=PATIENCE, check=False, **more
+    )
+
+
+def done(*command, says):
+    """A command that ends well, with these last words."""
+    finished = run(*command)
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stdout.splitlines()[-1] == says
+    return finished
+
+
+def refused(*command, says):
+    """A command that ends with a line that says why."""
+    finished = run(*command)
+    assert finished.returncode == 1
+    assert says in finished.stderr
+    assert "Traceback" not in finished.stderr
+
+
+def served(folder, last, number=1):
+    """What a server makes of a folder."""
+    storage, contents = opened(folder)
+    same(storage.read(number).records, records(1, last))
+    storage.close()
+    return contents
+
+
+@pytest.fixture
+def paths(tmp_path):
+    return [tmp_path / name for name in ("data", "copy", "new")]
+
+
+def test_backup_beside_a_server_and_restore(paths):
+    data, copy, new = paths
+    storage, _ = opened(data)
+    fill(storage, 5)
+    fill(storage, 3, "a/b", 2)
+    done("backup", copy, "--data", data, says=f"{copy}: 2 hulls")
+    append(storage, 6, 6)
+    refused("backup", copy, "--data", data, says=f"{copy} is not empty")
+    assert [file.name for file in copy.iterdir()] == [DATABASE]
+    done("restore", copy, "--data", new, says=f"{new}: 2 hulls")
+    refused("restore", copy, "--data", new, says=f"{new} is not empty")
+    assert served(new, 5).notes == []
+    assert served(copy, 3, 2).notes == []
+    storage.close()
+
+
+def test_a_backup_takes_the_moment_it_began_at(paths):
+    """Commits go on meanwhile, as fast as they can."""
+    data, copy, _ = paths
+    storage, _ = opened(data)
+    storage.commit([Create(HullRow(1, "large", "", 0.0))])
+    batch = np.zeros((50_000, 2))
+    for revision in range(1, 21):
+        storage.commit([Append(1, [Record(revision, batch, batch[:0])])])
+    with subprocess.Popen([COMMAND, "backup", copy, "--data", data]) as backup:
+        revision = 20
+        while backup.poll() is None:
+            revision += 1
+            storage.commit([Append(1, [Record(revision, batch[:1], batch[:0])])])
+    assert backup.returncode == 0
+    storage.close()
+    storage, contents = opened(copy)
+    assert 20 <= storage.read(1).last_revision < revision
+    assert contents.notes == []
+    storage.close()
+
+
+def test_restore_takes_the_log_along(paths, tmp_path):
+    data, copy, new = paths
+    storage, _ = opened(data)
+    fill(storage, 9)
+    fill(storage, 2, "b", 2)
+    crash = killed(data, tmp_path / "crash")
+    storage.close()
+    done("check", crash, says=f"{crash}: 2 hulls, all whole")
+    done("restore", crash, "--data", new, says=f"{new}: 2 hulls")
+    assert served(new, 9).notes == []
+    # A backup that was served, by a server that was killed.
+    done("backup", copy, "--data", crash, says=f"{copy}: 2 hulls")
+    storage, _ = opened(copy)
+    append(storage, 10, 12)
+    crash = killed(copy, tmp_path / "crash of the copy")
+    storage.close()
+    done("restore", crash, "--data", tmp_path / "newer", says=f"{tmp_path / 'newer'}: 2 hulls")
+    assert served(tmp_path / "newer", 12).notes == []
+
+
+@pytest.mark.parametrize("name", ["stopped", "killed"])
+def test_a_backup_of_format_1_is_checked_restored_and_exported(tmp_path, name):
+    old = killed(FORMAT_1 / name, tmp_path / "old")
+    before = Counter(file.read_bytes() for file in old.iterdir())
+    done("check", old, says=f"{old}: 2 hulls, all whole")
+    done("restore", old, "--data", tmp_path / "new", says=f"{tmp_path / 'new'}: 2 hulls")
+    done("check", tmp_path / "new", says=f"{tmp_path / 'new'}: 2 hulls, all whole")
+    points, revision = {"stopped": (83, 30), "killed": (92, 33)}[name]
+    file = tmp_path / "points.csv"
+    done("export", "fleet", file, "--data", old, says=f"{file}: {points} points of fleet at revision {revision}")
+    assert before <= Counter(file.read_bytes() for file in old.iterdir())
+
+
+def test_a_damaged_backup_is_not_restored(paths):
+    data, copy, new = paths
+    stopped(data)
+    done("backup", copy, "--data", data, says=f"{copy}: 1 hulls")
+    flip(copy / DATABASE, record(4).inserts.tobytes())
+    refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones are there")
+    assert not new.exists()
+
+
+def test_what_is_left_is_restored_where_loss_is_accepted(paths, tmp_path):
+    data, _, new = paths
+    storage, _ = opened(data)
+    fill(storage, 5)
+    storage.close()
+    storage, _ = opened(data)
+    append(storage, 6, 9)
+    crash = killed(data, tmp_path / "crash")
+    storage.close()
+    (crash / LOG).unlink()
+    refused("restore", crash, "--data", new, says="dynhull restore --accept-loss")
+    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hulls")
+    assert "done without what is lost" in finished.stderr
+    assert served(new, 5).notes == []
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from dynhull_server.storage.sqlite import copies
+
+left = int(sys.argv[4])
+
+def strike(*_):
+    global left
+    left -= 1
+    if left == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+sync = os.fsync
+if sys.argv[3] == "fsync":
+    os.fsync = lambda descriptor: (strike(), sync(descriptor))
+if sys.argv[3] == "examine":
+    finish = copies._finish
+    copies._finish = lambda *given: (strike(), finish(*given))[1]
+copies.copy(Path(sys.argv[1]), Path(sys.argv[2]), strike if sys.argv[3] == "progress" else lambda *_: None)
+"""
+
+
+@pytest.mark.parametrize(
+    ("where", "nth", "whole"),
+    [
+        ("progress", 1, False),
+        ("progress", 3, False),
+        ("examine", 1, False),
+        ("fsync", 1, False),
+        ("fsync", 2, True),
+        ("fsync", 3, True),
+    ],
+)
+def test_half_a_copy_is_never_taken_for_one(paths, where, nth, whole):
+    data, copy, new = paths
+    storage, _ = opened(data)
+    fill(storage, 9)
+    for number in range(2, 5):
+        fill(storage, 1, f"hull {number}", number)
+        for step in storage.snapshot(number, 1, np.zeros((200_000, 2)), {}):
+            storage.commit([step])
+    storage.close()
+    command = [sys.executable, "-c", KILLED, data, copy, where, str(nth)]
+    assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
+    if whole:
+        assert len(served(copy, 9).hulls) == 4
+        return
+    with pytest.raises(StorageError, match=UNFINISHED):
+        opened(copy)
+    for source, target in ((copy, new), (data, copy)):
+        with pytest.raises(StorageError, match=UNFINISHED):
+            copies.copy(source, target, no_progress)
+    if where == "examine":
+        refused("serve", "--port", "0", "--data", copy, says=UNFINISHED)
+        refused("restore", copy, "--data", new, says=UNFINISHED)
+        refused("check", copy, says=UNFINISHED)
+    assert not new.exists()
+
+
+def test_a_copy_that_fails_leaves_nothing(paths):
+    data, copy, _ = paths
+    stopped(data, 300)
+    limited = ["sh", "-c", 'ulimit -f 64; exec "$0" "$@"', COMMAND, "backup", copy, "--data", data]
+    finished = subprocess.run(limited, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert finished.returncode == 1
+    assert f"error: {data} cannot be copied to {copy}" in finished.stderr
+    assert not copy.exists()
+
+
+def test_a_server_starts_beside_a_backup_that_began_before_it(paths):
+    data, copy, _ = paths
+    storage, _ = opened(data)
+    fill(storage, 9)
+
+    def restart(*_):
+        nonlocal storage
+        if storage is not None:
+            storage.close()
+            storage = None
+            again, contents = opened(data)
+            assert contents.notes == []
+            append(again, 10, 12)
+            again.close()
+
+    copies.copy(data, copy, restart)
+    assert storage is None
+    assert served(copy, 9).notes == []
+    assert served(data, 12).notes == []
+
+
+def test_a_server_waits_for_a_command_that_reads_a_stopped_folder(paths):
+    data, copy, _ = paths
+    stopped(data)
+    refusals = []
+
+    def start(*_):
+        with pytest.raises(LockedError) as refusal:
+            opened(data)
+        refusals.append(str(refusal.value))
+
+    copies.copy(data, copy, start)
+    assert "or a command" in refusals[0]
+
+
+def test_check_beside_a_server(paths):
+    data, *_ = paths
+    storage, _ = opened(data)
+    fill(storage, 5)
+    done("check", data, says=f"{data}: 1 hulls, all whole")
+    append(storage, 6, 9)
+    storage.close()
+    assert served(data, 9).notes == []
+
+
+def test_check_says_what_is_damaged(paths):
+    data, *_ = paths
+    storage, _ = opened(data)
+    fill(storage, 10)
+    fill(storage, 2, "whole", 2)
+    fill(storage, 2, "gone", 3)
+    for revision in (10, 20, 30):
+        snapshot(storage, revision)
+        append(storage, revision + 1, revision + 10)
+    older = storage.read(1, 25).points
+    storage.commit([Delete(3)])
+    storage.close()
+    content = (data / DATABASE).read_bytes()
+    flip(data / DATABASE, older.tobytes())
+    finished = run("check", data)
+    assert finished.returncode == 1
+    assert finished.stdout.splitlines() == [
+        "fleet: revision 40, 20 rows of batches, snapshots at 20, 30: DAMAGED",
+        "whole: revision 2, 2 rows of batches: whole",
+        f"{data}: damaged; it can be served without what is named",
+    ]
+    assert finished.stderr == "hull 'fleet': the snapshot at revision 20 is damaged, and is left out\n"
+    (data / DATABASE).write_bytes(content)
+    flip(data / DATABASE, record(35).inserts.tobytes())
+    finished = run("check", data)
+    assert finished.returncode == 1
+    assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it is not served: restore a backup"
+    assert "hull 'fleet': revisions 35 to 35 are damaged, and later ones are there" in finished.stderr
+    (data / DATABASE).write_bytes(content)
+    done("check", data, says=f"{data}: 2 hulls, all whole")
+    assert (data / DATABASE).read_bytes() == content
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "geojson"])
+def test_export_and_import(tmp_path, suffix):
+    data, file = tmp_path / "data", tmp_path / f"points.{suffix}"
+    given = np.concatenate(
+        [np.random.default_rng(4).normal(size=(20_000, 2)), [[1e308, -5e-324], [0.1, 0.2], [0.1, 0.2]]]
+    )
+    with server_process("--data", str(data)) as server, HullClient(server.address) as client:
+        client.create_hull("from")
+        client.apply("from", insert=given)
+        done("export", "from", file, "--data", data, says=f"{file}: 20,003 points of from at revision 1")
+        words = "to: 20,003 points loaded, 20,003 in the hull"
+        done("import", "to", file, "--address", server.address, says=words)
+        run("export", "to", tmp_path / "again.csv", "--data", data)
+    again = np.loadtxt(tmp_path / "again.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(sorted_rows(again), sorted_rows(given))
+
+
+def sorted_rows(points):
+    return points[np.lexsort((points[:, 1], points[:, 0]))]
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (["backup", "copy", "--data", "nowhere"], "nowhere holds no hulls"),
+        (["check", "nowhere"], "nowhere holds no hulls"),
+        (["export", "h", "points.csv", "--data", "nowhere"], "nowhere holds no hulls"),
+        (["export", "h", "points.xls"], "the name must end in .csv, .parquet, .geojson"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_line(tmp_path, monkeypatch, command, message):
+    monkeypatch.chdir(tmp_path)
+    refused(*command, says=message)

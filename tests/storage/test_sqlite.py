@@ -1,0 +1,380 @@
+"""The SQLite folder: who may open it, older formats, and what damage does."""
+
+import shutil
+import sqlite3
+
+import numpy as np
+import pytest
+from dynhull_server.storage.replay import replayed
+from folders import (
+    DATABASE,
+    FORMAT_1,
+    LOG,
+    append,
+    fill,
+    flip,
+    killed,
+    opened,
+    record,
+    records,
+    same,
+    snapshot,
+    stopped,
+)
+
+from dynhull_server.state.records import Append, Delete, HullRow
+from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
+from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES, HEADER_BYTES
+from dynhull_server.storage.sqlite.schema import PAGE_BYTES
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+FRAME_BYTES = FRAME_HEADER_BYTES + PAGE_BYTES
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "data"
+
+
+def notes(folder):
+    """What the next start says."""
+    storage, contents = opened(folder)
+    storage.close()
+    return contents.notes
+
+
+def test_nothing_is_touched_before_it_is_opened(folder):
+    SQLiteStorage(folder)
+    assert not folder.exists()
+
+
+def test_one_server_at_a_time(folder):
+    storage, _ = opened(folder)
+    with pytest.raises(LockedError, match=r"another server, .* works on .*: stop it first"):
+        opened(folder)
+    storage.close()
+    opened(folder)[0].close()
+
+
+def test_a_start_that_is_refused_lets_others_in(folder):
+    stopped(folder)
+    whole = (folder / DATABASE).read_bytes()
+    flip(folder / DATABASE, record(4).inserts.tobytes())
+    for _ in range(2):
+        with pytest.raises(DamagedError):
+            opened(folder)
+    (folder / DATABASE).write_bytes(whole)
+    opened(folder)[0].close()
+
+
+def test_a_newer_format_is_refused(folder):
+    stopped(folder)
+    with sqlite3.connect(folder / DATABASE) as database:
+        database.execute("PRAGMA user_version = 99")
+    with pytest.raises(FormatError, match=r"has format 99, .* run the newer version"):
+        opened(folder)
+
+
+def test_another_programs_database_is_refused(folder):
+    folder.mkdir()
+    with sqlite3.connect(folder / DATABASE) as database:
+        database.execute("CREATE TABLE theirs (x)")
+    with pytest.raises(FormatError, match="another program"):
+        opened(folder)
+    (folder / DATABASE).write_bytes(b"not a database at all" * 100)
+    with pytest.raises(DamagedError, match=r"no readable database .*: restore a backup"):
+        opened(folder)
+
+
+@pytest.mark.parametrize(("name", "fleet", "zones"), [("stopped", (30, 83), (3, 5)), ("killed", (33, 92), (4, 6))])
+def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
+    shutil.copytree(FORMAT_1 / name, folder)
+    for _ in range(2):
+        storage, contents = opened(folder)
+        assert contents.hulls == [
+            HullRow(1, "fleet", "00aa00aa00aa00aa", 1700000000.5),
+            HullRow(2, "zones/é", "00bb00bb00bb00bb", 1700000001.0, 500),
+        ]
+        assert (contents.next_number, contents.notes) == (3, [])
+        for number, (revision, count) in ((1, fleet), (2, zones)):
+            kept = storage.read(number)
+            assert (kept.last_revision, len(replayed(kept))) == (revision, count)
+        assert (storage.oldest(1), storage.oldest(2)) == (20, 0)
+        assert storage.read(1).producers == {"p0": 24, "p1": 25, "p2": 23}
+        assert storage.read(2).records[0].producer == "truck"
+        storage.close()
+
+
+def test_a_folder_of_format_1_goes_on(folder):
+    shutil.copytree(FORMAT_1 / "killed", folder)
+    storage, _ = opened(folder)
+    append(storage, 34, 40)
+    snapshot(storage, 40)
+    storage.commit([Delete(2)])
+    for step in storage.sweep():
+        storage.commit([step])
+    storage.close()
+    storage, contents = opened(folder)
+    assert ([hull.name for hull in contents.hulls], contents.notes) == (["fleet"], [])
+    assert (storage.read(1).revision, storage.oldest(1)) == (40, 25)
+    storage.close()
+    with sqlite3.connect(folder / DATABASE) as database:
+        assert database.execute("SELECT min(first) FROM batches").fetchone() == (26,)
+        assert database.execute("SELECT count(*) FROM chunks").fetchone() == (2,)
+
+
+def test_what_a_snapshot_makes_superfluous_is_dropped(folder):
+    storage, _ = opened(folder)
+    fill(storage, 10)
+    for revision in (10, 20, 30):
+        snapshot(storage, revision)
+        append(storage, revision + 1, revision + 10)
+    storage.commit([Delete(1)])
+    storage.close()
+    storage, _ = opened(folder)  # what a deleted hull left is found again
+    for step in storage.sweep():
+        storage.commit([step])
+    storage.close()
+    with sqlite3.connect(folder / DATABASE) as database:
+        for table in ("batches", "snapshots", "chunks", "hulls"):
+            assert database.execute(f"SELECT count(*) FROM {table}").fetchone() == (0,)
+
+
+# Damage in the database
+
+
+@pytest.mark.parametrize("damaged", [1, 5])
+def test_damage_in_the_middle_is_refused(folder, damaged):
+    stopped(folder)
+    flip(folder / DATABASE, record(damaged).inserts.tobytes())
+    words = f"hull 'fleet': revisions {damaged} to {damaged} are damaged, and later ones are there: restore a backup"
+    with pytest.raises(DamagedError, match=words):
+        opened(folder)
+
+
+@pytest.mark.parametrize("gone", ["first IN (4, 5)", "first = 9", "first = 1"])
+def test_missing_batches_are_refused(folder, gone):
+    stopped(folder)
+    with sqlite3.connect(folder / DATABASE) as database:
+        database.execute(f"DELETE FROM batches WHERE {gone}")
+    with pytest.raises(DamagedError, match="1 hulls with 9 rows of batches, and there are 1 with"):
+        opened(folder)
+
+
+def test_a_missing_hull_is_refused(folder):
+    stopped(folder)
+    with sqlite3.connect(folder / DATABASE) as database:
+        database.execute("DELETE FROM hulls")
+    with pytest.raises(DamagedError, match="1 hulls with 9 rows of batches, and there are 0 with 0"):
+        opened(folder)
+
+
+def test_a_damaged_end_is_cut_at_the_last_whole_batch(folder):
+    stopped(folder)
+    flip(folder / DATABASE, record(9).inserts.tobytes())
+    storage, contents = opened(folder)
+    assert contents.notes == [
+        f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: cut off at revision 8, the last whole one"
+    ]
+    same(storage.read(1).records, records(1, 8))
+    append(storage, 9, 9)
+    storage.close()
+    storage, contents = opened(folder)
+    same(storage.read(1).records, records(1, 9))
+    assert contents.notes == []
+    storage.close()
+
+
+def test_a_damaged_end_that_a_snapshot_reaches_into_is_cut_at_the_snapshot(folder):
+    storage, _ = opened(folder)
+    fill(storage, 3)
+    storage.commit([Append(1, records(4, 8))])
+    snapshot(storage, 6)
+    storage.close()
+    flip(folder / DATABASE, record(8).inserts.tobytes())
+    storage, contents = opened(folder)
+    assert "revisions 4 to 8 are damaged: cut off at revision 6" in contents.notes[0]
+    assert storage.read(1).last_revision == 6
+    append(storage, 7, 9)
+    same(storage.read(1).records, records(7, 9))
+    storage.close()
+    storage, _ = opened(folder)
+    same(storage.read(1).records, records(7, 9))
+    storage.close()
+
+
+def test_a_damaged_snapshot_gives_way_to_the_one_before(folder):
+    storage, _ = opened(folder)
+    fill(storage, 10)
+    for revision in (10, 20, 30):
+        snapshot(storage, revision)
+        append(storage, revision + 1, revision + 10)
+    newest = storage.read(1, 30).points
+    storage.close()
+    flip(folder / DATABASE, newest.tobytes())
+    storage, contents = opened(folder)
+    assert contents.notes == [
+        f"{folder / DATABASE}: hull 'fleet': the snapshot at revision 30 is damaged, and is left out"
+    ]
+    assert storage.read(1).revision == 20
+    same(storage.read(1).records, records(21, 40))
+    assert storage.oldest(1) == 20
+    snapshot(storage, 40)
+    assert (storage.oldest(1), storage.read(1).revision) == (20, 40)
+    storage.close()
+    assert notes(folder) == []
+
+
+def test_one_damaged_copy_of_the_totals_is_mended(folder):
+    stopped(folder)
+    with sqlite3.connect(folder / DATABASE) as database:
+        database.execute("UPDATE totals SET sum = sum + 1 WHERE id = 2")
+    storage, contents = opened(folder)
+    assert len(contents.notes) == 1
+    assert "one of the two copies" in contents.notes[0]
+    same(storage.read(1).records, records(1, 9))
+    storage.close()
+    assert notes(folder) == []
+
+
+# Damage in the log
+
+
+@pytest.fixture
+def crash(folder, tmp_path):
+    """A killed server's folder, with nine batches in its log."""
+    storage, _ = opened(folder)
+    fill(storage, 9)
+    crash = killed(folder, tmp_path / "crash")
+    storage.close()
+    return crash
+
+
+def test_a_killed_servers_folder_is_whole(crash):
+    storage, contents = opened(crash)
+    same(storage.read(1).records, records(1, 9))
+    assert contents.notes == []
+    storage.close()
+
+
+def test_a_log_cut_short_loses_the_last_commit_only(crash):
+    log = crash / LOG
+    length = log.read_bytes().rindex(record(9).inserts.tobytes()) + 10
+    log.write_bytes(log.read_bytes()[:length])
+    storage, contents = opened(crash)
+    same(storage.read(1).records, records(1, 8))
+    assert len(contents.notes) == 1
+    assert "incomplete or damaged and was dropped, with at most 1 of the newest commits" in contents.notes[0]
+    storage.close()
+
+
+def test_damage_in_the_middle_of_the_log_is_refused(crash):
+    flip(crash / LOG, record(4).inserts.tobytes())
+    with pytest.raises(DamagedError, match=r"frame .* is damaged, and whole commits follow it: restore a backup"):
+        opened(crash)
+
+
+@pytest.mark.parametrize("byte", range(HEADER_BYTES))
+def test_a_damaged_header_of_the_log_is_refused(crash, byte):
+    content = bytearray((crash / LOG).read_bytes())
+    content[byte] ^= 1
+    (crash / LOG).write_bytes(content)
+    with pytest.raises(DamagedError, match=r"the header of .* is damaged"):
+        opened(crash)
+
+
+@pytest.mark.parametrize("byte", range(8, 16))
+def test_a_damaged_salt_is_refused(crash, byte):
+    content = bytearray((crash / LOG).read_bytes())
+    content[HEADER_BYTES + FRAME_BYTES + byte] ^= 1
+    (crash / LOG).write_bytes(content)
+    with pytest.raises(DamagedError, match=r"frame 2 is damaged, and whole commits follow it"):
+        opened(crash)
+
+
+@pytest.mark.parametrize("left", [None, 0, HEADER_BYTES])
+def test_a_missing_log_is_refused(crash, left):
+    log = crash / LOG
+    content = log.read_bytes()
+    log.unlink()
+    if left is not None:
+        log.write_bytes(content[:left])
+    with pytest.raises(DamagedError, match="is missing or cut short"):
+        opened(crash)
+
+
+def test_a_log_without_its_database_is_refused(crash):
+    (crash / DATABASE).write_bytes(b"")
+    with pytest.raises(DamagedError, match="is missing or empty, and its log is there"):
+        opened(crash)
+    assert (crash / LOG).exists()
+
+
+def test_a_log_older_than_its_database_is_refused(folder, tmp_path):
+    """Each is whole, and what they make together is, too: the hull as it was before revisions that are acknowledged."""
+    storage, _ = opened(folder)
+    fill(storage, 5)
+    earlier = killed(folder, tmp_path / "earlier")
+    append(storage, 6, 9)
+    storage.close()
+    shutil.copyfile(earlier / LOG, folder / LOG)
+    with pytest.raises(DamagedError, match="do not belong together"):
+        opened(folder)
+
+
+def test_a_log_newer_than_its_database_is_refused(folder, tmp_path):
+    stopped(folder)
+    earlier = (folder / DATABASE).read_bytes()
+    storage, _ = opened(folder)
+    storage.commit([Append(1, [record(10, n=2000)])])
+    storage.close()
+    storage, _ = opened(folder)
+    append(storage, 11, 12)
+    crash = killed(folder, tmp_path / "crash")
+    storage.close()
+    (crash / DATABASE).write_bytes(earlier)
+    with pytest.raises(DamagedError):
+        opened(crash)
+
+
+def test_after_a_power_failure_unsynced_commits_are_dropped_with_a_note(folder, tmp_path):
+    storage, _ = opened(folder, Durability.NONE)
+    fill(storage, 9)
+    crash = killed(folder, tmp_path / "crash")
+    storage.close()
+    content = (crash / LOG).read_bytes()
+    start = HEADER_BYTES + (content.index(record(4).inserts.tobytes()) - HEADER_BYTES) // FRAME_BYTES * FRAME_BYTES
+    hole = bytes(FRAME_BYTES)
+    (crash / LOG).write_bytes(content[:start] + hole + content[start + FRAME_BYTES :])
+    storage, contents = opened(crash)
+    kept = storage.read(1)
+    same(kept.records, records(1, kept.last_revision))
+    storage.close()
+    assert kept.last_revision < 9
+    assert contents.notes != []
+
+
+def test_a_write_of_a_header_that_did_not_come_through_is_no_damage(folder):
+    stopped(folder)
+    (folder / LOG).write_bytes(bytes(HEADER_BYTES + FRAME_BYTES))
+    storage, contents = opened(folder)
+    same(storage.read(1).records, records(1, 9))
+    assert contents.notes == []
+    storage.close()
+
+
+def test_shared_memory_and_lock_hold_nothing(crash):
+    (crash / f"{DATABASE}-shm").write_bytes(np.random.default_rng(0).bytes(32768))
+    (crash / "dynhull.lock").write_bytes(b"nonsense")
+    storage, contents = opened(crash)
+    same(storage.read(1).records, records(1, 9))
+    assert contents.notes == []
+    storage.close()
+
+
+def test_an_unfinished_copy_is_refused(folder):
+    folder.mkdir()
+    (folder / "unfinished.db").write_bytes(b"")
+    with pytest.raises(StorageError, match="is a copy that was not finished: remove it, and copy again"):
+        opened(folder)
