@@ -1,6 +1,6 @@
 """The simulation from the command line.
 
-    python -m simulation run --seconds 60 --seed 1     random plans of both layers; exit code 1 on a finding
+    python -m simulation run --seconds 60 --seed 1     random plans of all layers; exit code 1 on a finding
     python -m simulation replay FILE                   one plan that was kept
     python -m simulation mutants                       after how many lives the simulation finds each fault put back in
 """
@@ -27,7 +27,7 @@ def main() -> int:
     run = commands.add_parser("run", help="random plans")
     run.add_argument("--seconds", type=float, default=60.0)
     run.add_argument("--seed", type=int, default=1)
-    run.add_argument("--layer", choices=("core", "shell", "both"), default="both")
+    run.add_argument("--layer", choices=("core", "shell", "sqlite", "all"), default="all")
     run.add_argument("--lives", type=int, default=None, help="end after so many")
     run.add_argument("--keep", action="store_true", help="shrink what is found, and keep its plan")
     replay = commands.add_parser("replay", help="a plan that was kept")
@@ -55,16 +55,24 @@ def main() -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    gc.disable()  # dead worlds are collected between plans
+    try:
+        return _search(arguments)
+    finally:
+        gc.enable()
+        gc.collect()
+
+
+def _search(arguments: argparse.Namespace) -> int:
     """Plans until the time or the lives are over, or one has found something."""
     from .plan import random_plan
     from .play import play
 
-    layers = ("core", "shell") if arguments.layer == "both" else (arguments.layer,)
+    layers = ("core", "shell", "sqlite") if arguments.layer == "all" else (arguments.layer,)
     lives = dict.fromkeys(layers, 0)
     seconds = dict.fromkeys(layers, 0.0)
     begun = time.monotonic()
     seed, reported = arguments.seed * ROOM, 0
-    gc.disable()  # dead worlds are collected between plans
     while time.monotonic() - begun < arguments.seconds:
         layer = min(layers, key=lambda each: seconds[each])
         plan_begun = time.monotonic()
@@ -105,7 +113,7 @@ def _found(seed: int, layer: str, *, keep: bool) -> int:
         plan = shrunk(plan)
         file = FINDINGS / f"{layer}-{seed}.json"
         file.write_text(json.dumps({"finding": play(plan).finding, "plan": plan}, indent=1) + "\n")
-        print(f"kept; to replay it: make replay PLAN={file}")
+        print(f"kept; to replay it: PYTHONPATH=tests .venv/bin/python -m simulation replay {file}")
     return 1
 
 

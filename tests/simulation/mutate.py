@@ -29,17 +29,28 @@ class Hunt:
     finding: str
 
 
+def fits(patch: Path) -> None:
+    """Raise RuntimeError where a patch does not fit the code any more."""
+    with tempfile.TemporaryDirectory() as folder:
+        _put_in(patch, Path(folder))
+
+
+def _put_in(patch: Path, folder: Path) -> None:
+    """Make a copy of the package with a fault in it."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(dynhull_server.__file__).parent, folder / "dynhull_server", ignore=ignored)
+    command = ["git", "apply", "-C1", str(patch)]
+    applied = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if applied.returncode:
+        raise RuntimeError(f"{patch.name} does not fit the code any more: renew it\n{applied.stderr}")
+
+
 def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
     """Put a fault into a copy of the package, and look for it."""
     layer = re.search(r"^Layer: (\w+)$", patch.read_text(), re.MULTILINE)
     assert layer is not None, f"{patch} does not say in which layer"
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(Path(dynhull_server.__file__).parent, Path(folder) / "dynhull_server")
-        applied = subprocess.run(
-            ["git", "apply", "-C1", str(patch)], cwd=folder, capture_output=True, text=True, check=False
-        )
-        if applied.returncode:
-            raise RuntimeError(f"{patch.name} does not fit the code any more: renew it\n{applied.stderr}")
+        _put_in(patch, Path(folder))
         begun = time.monotonic()
         command = ["--package", folder, "run", "--layer", layer[1], "--lives", str(lives), "--seconds", "600"]
         run = subprocess.run(

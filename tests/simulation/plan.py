@@ -46,8 +46,11 @@ SHELL = {
 COMMIT_FAULTS = ("nothing", "full", "lost", "ghost", "memory", "ghost memory", "later lost", "later ghost")
 # How everything else fails.
 OTHER_FAULTS = ("os", "memory")
+SQLITE_FAULTS = ("full", "lost", "ghost", "memory", "ghost memory")
 CORE_PLACES = ("commit",) * 6 + ("read", "settle", "row")
 SHELL_PLACES = (*CORE_PLACES, "oldest", "snapshot", "sweep", "checkpoint", "sync")
+SQLITE_PLACES = ("commit",) * 5 + ("begin", "connect", "connect", "open", "fsync", "stat")
+PLACES = {"core": CORE_PLACES, "shell": SHELL_PLACES, "sqlite": SQLITE_PLACES}
 
 ENDS = ("kill", "kill", "stop")
 
@@ -56,11 +59,11 @@ def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     draw = random.Random(seed)
     names = NAMES[: draw.randint(1, 3)]
-    immediate = draw.random() < 0.03
+    immediate = layer != "sqlite" and draw.random() < 0.03
     return {
         "seed": seed,
         "layer": layer,
-        "storage": "immediate" if immediate else "memory",
+        "storage": "immediate" if immediate else "sqlite" if layer == "sqlite" else "memory",
         "limits": {
             "max_hulls": draw.choice((1, 2, 10, 10, 10)),
             "max_points": draw.choice((3, 100, 100, 100)),
@@ -117,10 +120,11 @@ def _operation(draw: random.Random, names: tuple[str, ...], layer: str) -> Opera
 
 
 def _fault(draw: random.Random, layer: str) -> dict[str, Any]:
-    at = draw.choice(CORE_PLACES if layer == "core" else SHELL_PLACES)
+    at = draw.choice(PLACES[layer])
+    commit_faults = SQLITE_FAULTS if layer == "sqlite" else COMMIT_FAULTS
     return {
         "at": at,
         "nth": 1 + int(draw.expovariate(1 / 4)),
-        "kind": draw.choice(COMMIT_FAULTS if at == "commit" else OTHER_FAULTS),
-        "calls": draw.choice((1, 1, 1, 2, 5)),
+        "kind": draw.choice(commit_faults if at == "commit" else OTHER_FAULTS),
+        "calls": draw.choice((1, 1, 1, 2, 5, 20)),
     }

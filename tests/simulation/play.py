@@ -13,9 +13,10 @@ from .model import Finding, Model
 from .plan import Plan
 from .schedule import Schedule
 from .shell_life import ShellServer
+from .sqlite_store import SQLiteLives
 from .store import FaultyStorage
 
-LAYERS = {"core": CoreServer, "shell": ShellServer}
+LAYERS = {"core": CoreServer, "shell": ShellServer, "sqlite": ShellServer}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +38,7 @@ def play(plan: Plan) -> Outcome:
     """Play a plan to its end, or to the first broken promise."""
     limits = Limits(**plan["limits"])
     model, schedule = Model(limits), Schedule(plan["seed"])
-    immediate = plan["storage"] == "immediate"
-    storage = FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=immediate)
+    storage = _storage(plan, model)
     lives = 0
     where = ""
     try:
@@ -51,7 +51,15 @@ def play(plan: Plan) -> Outcome:
     except Exception as error:  # the server's own code has failed
         model.finds(f"{type(error).__name__}: {error}")
         where = traceback.format_exc()
+    finally:
+        storage.remove()
     return Outcome(lives, schedule.trace, model.finding, where)
+
+
+def _storage(plan: Plan, model: Model) -> FaultyStorage:
+    if plan["storage"] == "sqlite":
+        return SQLiteLives(model, plan["faults"])
+    return FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=plan["storage"] == "immediate")
 
 
 def _live(
