@@ -5,7 +5,7 @@ import sqlite3
 
 import numpy as np
 import pytest
-from dynhull_server.storage.replay import replayed
+from dynhull_server.state.hull_state import replayed
 from folders import (
     DATABASE,
     FORMAT_1,
