@@ -4,7 +4,7 @@ BIN := .venv/bin
 KERNEL := $(wildcard dynhull/kernel/*)
 DAY ?= 2013-03-08
 
-.PHONY: demo test check docs proto contract fuzz fuzz-reference fuzz-server robustness clean
+.PHONY: demo test check docs proto contract fuzz fuzz-reference fuzz-server robustness simulate clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
@@ -57,6 +57,11 @@ robustness: .venv/.test  ## kill, starve and damage servers, leave calls, flip b
 	$(BIN)/python tests/robustness/server/torture.py --faults 99
 	$(BIN)/python tests/robustness/server/callers.py --calls 10000 --kills 5
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
+
+SEED ?= 1
+
+simulate: .venv/.test  ## random lives of the server in simulated time, for SECONDS from SEED, while a model checks every promise
+	PYTHONPATH=tests $(BIN)/python -m simulation run --seconds $(SECONDS) --seed $(SEED) --keep
 
 tests/strangers/node_modules: tests/strangers/package-lock.json tests/peers.sh
 	tests/peers.sh

@@ -42,6 +42,9 @@ class Server(Protocol):
     async def delete(self, name: str) -> None:
         """Remove a hull."""
 
+    async def delete_at_once(self, name: str, times: int) -> None:
+        """Remove a hull, again and again; whatever the answers are."""
+
     async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
         """Apply a batch."""
 
@@ -106,6 +109,9 @@ class Client:
         match op["do"]:
             case "create":
                 await self.create(op["name"], op["max_points"])
+            case "delete" if "crowd" in op:
+                self.model.ask(op["name"], removes=True)
+                await self.server.delete_at_once(op["name"], op["crowd"])
             case "delete":
                 await self.delete(op["name"])
             case "write":
@@ -261,12 +267,13 @@ class Client:
     async def recall(self, op: Operation) -> None:
         """Resume from something seen before, or from a revision in between."""
         name = op["name"]
+        if not self.seen.get(name):
+            await self.read(name)
         seen = self.seen.get(name)
         if not seen:
-            await self.read(name)
             return
         uid, revision, _ = seen[-1 - op["back"] % len(seen)]
-        revision = max(0, revision - op["back"] % 2)
+        revision = max(0, revision - op["back"])
         asked = self.model.ask(name)
         try:
             vertices = await self.server.recall(name, uid, revision)
@@ -293,7 +300,9 @@ class Client:
     ) -> None:
         """A request failed: there must be a reason."""
         match error:
-            case _ if self.calm and not (isinstance(error, LimitExceededError) and self.model.full(asked.name, error.limit)):
+            case _ if self.calm and not (
+                isinstance(error, LimitExceededError) and self.model.full(asked.name, error.limit)
+            ):
                 raise self.model.finds(f"after all faults: {error!r}") from error
             case OutcomeUnknownError() if self.model.faulty:
                 return

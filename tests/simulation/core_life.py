@@ -112,7 +112,7 @@ class CoreServer:
         self._limits = limits
         self._storage = storage
         contents = storage.open(lambda *_: None)
-        self.core = Core(limits, contents.next_number)
+        self.core = Core(limits, contents.next_number, immediate=storage.immediate)
         for row in contents.hulls:
             kept = storage.read(row.number)
             self.core.restore(row, HullState(limits, row.max_points, kept, now=0.0), len(kept.records))
@@ -156,7 +156,7 @@ class CoreServer:
             case Compute():
                 self._computing.append(effect.ticket)
             case Examine():
-                self._examining.append(effect)
+                self._settle(effect)
             case Retry():
                 self._pauses.append(effect.ticket)
             case Moved():
@@ -165,7 +165,6 @@ class CoreServer:
     def _commit(self, trip: Trip, changes: list[Any]) -> None:
         if self._storage.immediate:
             self._storage.commit(changes)
-            self._events.append(Committed(trip))
             return
 
         def done(error: Exception | None, unknown: bool) -> None:
@@ -179,12 +178,23 @@ class CoreServer:
         trip.run()
         self._news.append(partial(self.dispatch, Computed(trip)))
 
+    def _settle(self, effect: Examine) -> None:
+        if not effect.settle:
+            self._examining.append(effect)
+            return
+
+        def settled(error: Exception | None, _: bool) -> None:
+            if error is None:
+                self._news.append(partial(self._examining.append, effect))
+            else:
+                self._news.append(partial(self.dispatch, NotExamined(effect.ticket, error)))
+
+        self._commits.settle(settled)
+
     def _examine(self) -> None:
         effect = self._examining.popleft()
         event: Event
         try:
-            if effect.settle:
-                self._storage.settle()
             row = self._storage.row(effect.number)
             event = Examined(effect.ticket, effect.load(self._storage.read(effect.number)) if row else None)
         except Exception as error:
@@ -214,6 +224,12 @@ class CoreServer:
 
     async def delete(self, name: str) -> None:
         await self._ask(DeleteHull(Answer(), name))
+
+    async def delete_at_once(self, name: str, times: int) -> None:
+        requests = [DeleteHull(Answer(), name) for _ in range(times)]
+        for request in requests:
+            self.dispatch(request)
+        await Wait(lambda: all(request.to.told for request in requests))
 
     async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
         birth = self._birth() if create else None
@@ -253,12 +269,13 @@ class CoreServer:
             self._now += DAY
             self.dispatch(Tick(self._now))
             return
+        asked = self.model.ask(op["name"])
         try:
             hull = self.core.get(op["name"])
             read = ReadHull(Answer(), hull, lambda state: (state.hull.points(), state.producers()))
             counts, (points, producers) = await self._ask(read)
         except (RefusedError, StoppingError) as error:
-            client.refused(self.model.ask(op["name"]), error, (HullNotFoundError,))
+            client.refused(asked, error, (HullNotFoundError,))
             return
         for step in self._storage.snapshot(hull.row.number, counts.revision, points, producers):
             failed: list[Exception | None] = []
@@ -274,6 +291,14 @@ class CoreServer:
         actor = ClientActor(client, operations)
         self._clients.append(actor)
         self.schedule.actor(client.producer, actor.ready, actor.act)
+
+    def turn(self) -> bool:
+        """One turn."""
+        return self.schedule.turn()
+
+    def rest(self) -> None:
+        """Let everybody finish."""
+        self.schedule.rest()
 
     def waiting(self) -> list[str]:
         """Who has not been answered, and what has not ended."""
@@ -305,7 +330,7 @@ class CoreServer:
         """Begin nothing more; then nothing may be left under way."""
         self.model.stopping = True
         self.dispatch(Stopping())
-        self.schedule.rest()
+        self.rest()
 
 
 def compare(core: Core, model: Model) -> None:

@@ -19,15 +19,38 @@ Operation = dict[str, Any]
 NAMES = ("a", "b", "c")
 
 # What can be asked for, and how often.
-CORE = {"write": 40, "stream": 14, "read": 12, "delete": 10, "create": 8, "recall": 5, "snapshot": 5, "last": 4, "day": 1}
-SHELL = {"write": 34, "stream": 14, "read": 10, "delete": 9, "create": 8, "recall": 12, "last": 3, "watch": 6, "rest": 8}
+CORE = {
+    "write": 40,
+    "stream": 14,
+    "read": 12,
+    "delete": 10,
+    "create": 8,
+    "recall": 5,
+    "snapshot": 5,
+    "last": 4,
+    "day": 1,
+}
+SHELL = {
+    "write": 34,
+    "stream": 14,
+    "read": 10,
+    "delete": 9,
+    "create": 8,
+    "recall": 12,
+    "last": 3,
+    "watch": 6,
+    "rest": 8,
+}
 
 # How a commit fails: surely not done; done or not though it raised; and not decided before it is settled.
 COMMIT_FAULTS = ("nothing", "full", "lost", "ghost", "memory", "ghost memory", "later lost", "later ghost")
 # How everything else fails.
 OTHER_FAULTS = ("os", "memory")
+SQLITE_FAULTS = ("full", "lost", "ghost", "memory", "ghost memory")
 CORE_PLACES = ("commit",) * 6 + ("read", "settle", "row")
 SHELL_PLACES = (*CORE_PLACES, "oldest", "snapshot", "sweep", "checkpoint", "sync")
+SQLITE_PLACES = ("commit",) * 5 + ("begin", "connect", "connect", "open", "fsync", "stat")
+PLACES = {"core": CORE_PLACES, "shell": SHELL_PLACES, "sqlite": SQLITE_PLACES}
 
 ENDS = ("kill", "kill", "stop")
 
@@ -36,17 +59,17 @@ def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     draw = random.Random(seed)
     names = NAMES[: draw.randint(1, 3)]
-    immediate = draw.random() < 0.03
+    immediate = layer != "sqlite" and draw.random() < 0.03
     return {
         "seed": seed,
         "layer": layer,
-        "storage": "immediate" if immediate else "memory",
+        "storage": "immediate" if immediate else "sqlite" if layer == "sqlite" else "memory",
         "limits": {
             "max_hulls": draw.choice((1, 2, 10, 10, 10)),
             "max_points": draw.choice((3, 100, 100, 100)),
             "max_producers": draw.choice((1, 10, 10)),
             "max_producers_per_caller": draw.choice((1, 10, 10)),
-            "history_bytes": draw.choice((0, 700, 1_000_000)),
+            "history_bytes": draw.choice((0, 0, 700, 1_000_000)),
         },
         "lives": [_life(draw, names, layer) for _ in range(draw.choice((1, 1, 2, 3)))],
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
@@ -97,10 +120,11 @@ def _operation(draw: random.Random, names: tuple[str, ...], layer: str) -> Opera
 
 
 def _fault(draw: random.Random, layer: str) -> dict[str, Any]:
-    at = draw.choice(CORE_PLACES if layer == "core" else SHELL_PLACES)
+    at = draw.choice(PLACES[layer])
+    commit_faults = SQLITE_FAULTS if layer == "sqlite" else COMMIT_FAULTS
     return {
         "at": at,
         "nth": 1 + int(draw.expovariate(1 / 4)),
-        "kind": draw.choice(COMMIT_FAULTS if at == "commit" else OTHER_FAULTS),
-        "calls": draw.choice((1, 1, 1, 2, 5)),
+        "kind": draw.choice(commit_faults if at == "commit" else OTHER_FAULTS),
+        "calls": draw.choice((1, 1, 1, 2, 5, 20)),
     }

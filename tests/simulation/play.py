@@ -12,7 +12,11 @@ from .core_life import CoreServer
 from .model import Finding, Model
 from .plan import Plan
 from .schedule import Schedule
+from .shell_life import ShellServer
+from .sqlite_store import SQLiteLives
 from .store import FaultyStorage
+
+LAYERS = {"core": CoreServer, "shell": ShellServer, "sqlite": ShellServer}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,38 +38,47 @@ def play(plan: Plan) -> Outcome:
     """Play a plan to its end, or to the first broken promise."""
     limits = Limits(**plan["limits"])
     model, schedule = Model(limits), Schedule(plan["seed"])
-    immediate = plan["storage"] == "immediate"
-    storage = FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=immediate)
+    storage = _storage(plan, model)
     lives = 0
     where = ""
     try:
         for life in plan["lives"]:
             lives += 1
-            _live(life, limits, model, schedule, storage)
-        _live({"clients": [], "end": "kill"}, limits, model, schedule, storage)
+            _live(plan["layer"], life, limits, model, schedule, storage)
+        _live(plan["layer"], {"clients": [], "end": "kill"}, limits, model, schedule, storage)
     except Finding:
         where = traceback.format_exc()
     except Exception as error:  # the server's own code has failed
         model.finds(f"{type(error).__name__}: {error}")
         where = traceback.format_exc()
+    finally:
+        storage.remove()
     return Outcome(lives, schedule.trace, model.finding, where)
 
 
-def _live(life: dict[str, Any], limits: Limits, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:
+def _storage(plan: Plan, model: Model) -> FaultyStorage:
+    if plan["storage"] == "sqlite":
+        return SQLiteLives(model, plan["faults"])
+    return FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=plan["storage"] == "immediate")
+
+
+def _live(
+    layer: str, life: dict[str, Any], limits: Limits, model: Model, schedule: Schedule, storage: FaultyStorage
+) -> None:
     schedule.clear()
     model.new_life()
     storage.calm = True
-    server = CoreServer(limits, storage, model, schedule)
+    server: CoreServer | ShellServer = LAYERS[layer](limits, storage, model, schedule)
     server.check()
     storage.calm = False
     for number, operations in enumerate(life["clients"]):
         server.client(Client(number, server, model), operations)
     if "after" in life:
         for _ in range(life["after"]):
-            if not schedule.turn():
+            if not server.turn():
                 break
     else:
-        schedule.rest()
+        server.rest()
         _look(server, model, schedule, storage)
     if life["end"] == "stop":
         server.stop()
@@ -75,7 +88,7 @@ def _live(life: dict[str, Any], limits: Limits, model: Model, schedule: Schedule
     server.kill()
 
 
-def _look(server: CoreServer, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:
+def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:
     """Everything is as it should be, and works, once all clients have been answered and nothing fails any more."""
     if server.waiting():
         raise model.finds(f"these wait for ever: {server.waiting()}")

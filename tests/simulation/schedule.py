@@ -20,11 +20,11 @@ class Schedule:
         self.random = random.Random(seed)
         self.turns = 0
         self.trace = 0
-        self._actors: list[tuple[str, float, Callable[[], object], Callable[[], None]]] = []
+        self._actors: list[tuple[Callable[[], object], float, Callable[[], None], bytes]] = []
 
     def actor(self, name: str, ready: Callable[[], object], act: Callable[[], None]) -> None:
         """Add an actor, which takes a turn by `act` when it is `ready`."""
-        self._actors.append((name, 10 ** self.random.uniform(-2, 0), ready, act))
+        self._actors.append((ready, 10 ** self.random.uniform(-2, 0), act, name.encode()))
 
     def clear(self) -> None:
         """All actors leave."""
@@ -36,21 +36,20 @@ class Schedule:
 
     def turn(self) -> bool:
         """Let one actor act. Returns whether any was ready."""
-        total = 0.0
-        ready = []
-        for actor in self._actors:
-            if actor[2]():
-                total += actor[1]
-                ready.append((total, actor))
+        ready = [actor for actor in self._actors if actor[0]()]
         if not ready:
             return False
-        drawn = self.random.random() * total
-        for bound, actor in ready:
-            if drawn < bound:
-                break
+        actor = ready[-1]
+        if len(ready) > 1:
+            drawn = self.random.random() * sum([each[1] for each in ready])
+            for each in ready:
+                drawn -= each[1]
+                if drawn < 0:
+                    actor = each
+                    break
         self.turns += 1
-        self.trace = zlib.crc32(actor[0].encode(), self.trace)
-        actor[3]()
+        self.trace = zlib.crc32(actor[3], self.trace)
+        actor[2]()
         return True
 
     def rest(self) -> None:

@@ -151,3 +151,6 @@ class FaultyStorage:
 
     def close(self) -> None:
         """The next life opens it again."""
+
+    def remove(self) -> None:
+        """Nothing of it is needed any more."""

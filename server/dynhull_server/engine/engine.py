@@ -219,6 +219,7 @@ class Engine:
             while True:
                 for effect in self._core.step(event):
                     self._carry_out(effect)
+                self._notice_idle()
                 if not self._events:
                     return
                 event = self._events.popleft()
@@ -280,8 +281,6 @@ class Engine:
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))
             case _:
                 assert_never(effect)
-        if self._idle is not None:
-            self._notice_idle()
 
     def _move(self, hull: Hull) -> None:
         live = self._live.get(hull)

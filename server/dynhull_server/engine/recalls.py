@@ -12,9 +12,11 @@ from ..state.errors import HullNotFoundError, NotStoredError, RefusedError, Revi
 from ..state.hull import Hull
 from ..state.hull_state import replay, replayed
 from ..state.records import Kept
-from ..storage.port import Storage, StorageError
+from ..storage.port import DamagedError, Storage, StorageError
 
 Answer = Points | RefusedError
+# How reading fails where the machine has run out of something.
+UNREADABLE = (StorageError, OSError, MemoryError)
 
 
 class Recalls:
@@ -57,7 +59,7 @@ class Recalls:
             try:
                 answers = await self._run(partial(self._recall, hull, sorted(wanted)))
             except Exception as error:
-                refusal = NotStoredError(str(error)) if isinstance(error, StorageError) else error
+                refusal = NotStoredError(str(error)) if isinstance(error, UNREADABLE) else error
                 answers = dict.fromkeys(wanted, refusal)
             except BaseException:
                 for future in wanted.values():
@@ -72,6 +74,12 @@ class Recalls:
 
     def _recall(self, hull: Hull, revisions: list[int]) -> dict[int, Answer]:
         """The vertices at some revisions, in ascending order, or why there are none."""
+        try:
+            return self._recalled(hull, revisions)
+        except KeyError:  # deleted meanwhile
+            return dict.fromkeys(revisions, HullNotFoundError(hull.name))
+
+    def _recalled(self, hull: Hull, revisions: list[int]) -> dict[int, Answer]:
         answers: dict[int, Answer] = {}
         left = revisions
         while left:
@@ -86,8 +94,8 @@ class Recalls:
             if kept is None or not covered or left[-1] < oldest:
                 newest = hull.counts.revision
                 return answers | {revision: RevisionForgottenError(revision, oldest, newest) for revision in left}
-            if kept.last_revision != left[-1]:  # deleted meanwhile
-                return answers | dict.fromkeys(left, HullNotFoundError(hull.name))
+            if kept.last_revision != left[-1]:
+                raise DamagedError(f"revision {left[-1]} of {hull.name} was kept, and is not there")
             answers |= _vertices_at(kept, covered)
             left = left[: -len(covered)]
         return answers

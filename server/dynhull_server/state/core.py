@@ -182,12 +182,12 @@ class Core:
                 effects.append(Told([request]))
             else:
                 self._begin(queue, [request], request.rows, effects)
+                self._go_on(queue, effects)
             return
         queue.waiting.append(request)
-        if self._stopping:
-            self._refuse_waiting(queue, StoppingError(), effects)
-        elif queue.ill is not None:
+        if queue.ill is not None:
             self._refuse_waiting(queue, _ill(queue.ill), effects)
+        self._go_on(queue, effects)
 
     def _read(self, queue: _Queue, request: ReadHull) -> None:
         """A small read of a hull that nothing is done to needs no trip."""
@@ -204,13 +204,15 @@ class Core:
     def _gone(self, event: Gone, _: list[Effect]) -> None:
         event.what.leave()
 
-    def _start(self, queue: _Queue, effects: list[Effect]) -> None:
-        """Begin a trip with what waits, if there is anything."""
-        requests, rows = self._take(queue)
-        if requests:
-            self._begin(queue, requests, rows, effects)
-        else:
-            self._rest(queue)
+    def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
+        """Begin trips with what waits, until one of them takes time."""
+        while queue.trip is None and queue.waiting:
+            if self._stopping:
+                self._refuse_waiting(queue, StoppingError(), effects)
+            requests, rows = self._take(queue)
+            if requests:
+                self._begin(queue, requests, rows, effects)
+        self._rest(queue)
 
     def _begin(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
         hull = queue.hull
@@ -252,11 +254,13 @@ class Core:
 
     def _computed(self, event: Computed, effects: list[Effect]) -> None:
         trip = event.ticket
-        self._ran(self._queues[trip.name], trip, effects)
+        queue = self._queues[trip.name]
+        self._ran(queue, trip, effects)
+        self._go_on(queue, effects)
 
     def _ran(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         if trip.torn:
-            self._failed(Failed(trip, MemoryError("a batch was applied in part"), unknown=False), effects)
+            self._fail(queue, trip, MemoryError("a batch was applied in part"), effects)
             return
         changes = trip.changes()
         if not changes:
@@ -267,12 +271,10 @@ class Core:
             self._keep(queue, trip, effects)
 
     def _end(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
-        """The trip is over: tell its callers, and begin the next one."""
+        """The trip is over: tell its callers."""
         requests = trip.requests
         effects.append(Told(requests if len(requests) == 1 and not requests[0].abandoned else _present(requests)))
         self._over(queue, trip)
-        if queue.waiting or queue.hull is None:
-            self._go_on(queue, effects)
 
     def _over(self, queue: _Queue, trip: Trip) -> None:
         queue.trip = None
@@ -282,20 +284,17 @@ class Core:
         if trip.before is None:
             self._creating -= 1
 
-    def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
-        if self._stopping:
-            self._refuse_waiting(queue, StoppingError(), effects)
-        self._start(queue, effects)
-
     def _rest(self, queue: _Queue) -> None:
         """Forget the queue of a name without a hull."""
-        if queue.hull is None and queue.trip is None and not queue.waiting:
-            self._queues.pop(queue.name, None)
+        if queue.hull is None and queue.trip is None:
+            del self._queues[queue.name]
 
     # Commits
 
     def _committed(self, event: Committed, effects: list[Effect]) -> None:
-        self._keep(self._queues[event.ticket.name], event.ticket, effects)
+        queue = self._queues[event.ticket.name]
+        self._keep(queue, event.ticket, effects)
+        self._go_on(queue, effects)
 
     def _keep(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The changes of the trip are there: everybody may see them."""
@@ -315,12 +314,18 @@ class Core:
 
     def _failed(self, event: Failed, effects: list[Effect]) -> None:
         trip = event.ticket
-        trip.failure, trip.unknown = event.error, event.unknown
         queue = self._queues[trip.name]
         if event.unknown:
+            trip.failure, trip.unknown = event.error, True
             self._examine(trip, effects)
             return
-        self._refuse_changes(trip, _not_stored(event.error), effects)
+        self._fail(queue, trip, event.error, effects)
+        self._go_on(queue, effects)
+
+    def _fail(self, queue: _Queue, trip: Trip, error: Exception, effects: list[Effect]) -> None:
+        """Nothing of the trip is kept."""
+        trip.failure = error
+        self._refuse_changes(trip, _not_stored(error), effects)
         if trip.before is not None and trip.has_records:
             self._examine(trip, effects)  # the batches are in its state
         else:
@@ -351,7 +356,6 @@ class Core:
             request.result = request.error = None
         self._over(queue, trip)
         queue.waiting[:0] = reads
-        self._go_on(queue, effects)
 
     # What the storage has
 
@@ -362,28 +366,33 @@ class Core:
         load = partial(HullState, self._limits, row.max_points, now=self._now)
         effects.append(Examine(trip, row.number, trip.unknown, load))
 
+    def _under_way(self, trip: Trip) -> _Queue | None:
+        """The queue of a trip; None where the server is stopping, and did not wait for it."""
+        queue = self._queues.get(trip.name)
+        return queue if queue is not None and queue.trip is trip else None
+
     def _examined(self, event: Examined, effects: list[Effect]) -> None:
         trip, found = event.ticket, event.state
-        queue = self._queues[trip.name]
-        if queue.trip is not trip:  # the server is stopping, and does not wait
+        queue = self._under_way(trip)
+        if queue is None:
             return
         if trip.unknown and trip.landed(found):
             self._keep(queue, trip, effects)
-            return
-        if trip.before is not None:
-            if found is None:
-                self._not_examined(NotExamined(trip, LookupError("the storage does not know the hull")), effects)
-                return
-            trip.before.state = found
-        assert trip.failure is not None  # or it would not have been examined
-        if trip.unknown:
-            self._refuse_changes(trip, _not_stored(trip.failure), effects)
-        self._again(queue, trip, effects)
+        elif trip.before is not None and found is None:
+            self._not_examined(NotExamined(trip, LookupError("the storage does not know the hull")), effects)
+        else:
+            if trip.before is not None and found is not None:
+                trip.before.state = found
+            assert trip.failure is not None  # or it would not have been examined
+            if trip.unknown:
+                self._refuse_changes(trip, _not_stored(trip.failure), effects)
+            self._again(queue, trip, effects)
+        self._go_on(queue, effects)
 
     def _not_examined(self, event: NotExamined, effects: list[Effect]) -> None:
         trip = event.ticket
-        queue = self._queues[trip.name]
-        if queue.trip is not trip:
+        queue = self._under_way(trip)
+        if queue is None:
             return
         queue.ill = event.error
         if trip.unknown:
@@ -399,7 +408,7 @@ class Core:
         queue.pause = min(2 * queue.pause, LONGEST_PAUSE)
 
     def _retried(self, event: Retried, effects: list[Effect]) -> None:
-        if self._queues[event.ticket.name].trip is event.ticket:
+        if self._under_way(event.ticket) is not None:
             self._examine(event.ticket, effects)
 
     def _refuse_waiting(self, queue: _Queue, error: Exception, effects: list[Effect]) -> None:
@@ -425,13 +434,12 @@ class Core:
         for queue in list(self._queues.values()):
             if queue.ill is not None and queue.trip is not None:
                 self._abandon(queue, queue.trip, effects)
-            else:
-                self._refuse_waiting(queue, StoppingError(), effects)
+            # What waits for a trip is refused after it: the answers of a stream come in their order.
 
     def _abandon(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The next start will find out what became of the trip."""
         self._over(queue, trip)
-        self._refuse_waiting(queue, StoppingError(), effects)
+        self._go_on(queue, effects)
 
 
 def _present(requests: list[Request]) -> list[Request]:

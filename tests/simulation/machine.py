@@ -1,0 +1,336 @@
+"""A machine in which time is simulated and threads take turns: the event loop, and greenlets for threads.
+
+The loop is first in, first out, as asyncio's is, one callback a turn; time passes in turns of its own, from timer to
+timer. A thread runs until it waits, or gives way where it would for a disk.
+"""
+
+import asyncio
+import heapq
+from collections import deque
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future
+from contextvars import Context
+from typing import Any
+
+from greenlet import GreenletExit, getcurrent, greenlet
+
+from dynhull_server.engine.threads import Clock, Machine, Threads
+
+from .model import Finding, Model
+from .schedule import Schedule
+
+
+class Loop(asyncio.AbstractEventLoop):
+    """An event loop in simulated time.
+
+    Attributes:
+        now: seconds since the life began.
+        dead: whether the process has been killed.
+        tasks: all tasks.
+    """
+
+    def __init__(self, model: Model, schedule: Schedule) -> None:
+        self.now = 0.0
+        self.dead = False
+        self.tasks: list[asyncio.Task[Any]] = []
+        self._model = model
+        self._ready: deque[asyncio.Handle] = deque()
+        self._timers: list[tuple[float, int, asyncio.TimerHandle]] = []
+        self._timer_count = 0
+        self._executor: Callable[[Callable[[], Any]], "Future[Any]"] | None = None
+        schedule.actor("loop", lambda: self._ready, self._run)
+        schedule.actor("time", lambda: self._timers, self._pass)
+
+    def _run(self) -> None:
+        handle = self._ready.popleft()
+        if not handle.cancelled():
+            asyncio._set_running_loop(self)
+            try:
+                handle._run()
+            finally:
+                asyncio._set_running_loop(None)
+
+    def _pass(self) -> None:
+        self.now = max(self.now, self._timers[0][0])
+        while self._timers and self._timers[0][0] <= self.now:
+            self._ready.append(heapq.heappop(self._timers)[2])
+
+    # What asyncio and the engine ask for
+
+    def time(self) -> float:
+        return self.now
+
+    def get_debug(self) -> bool:
+        return False
+
+    def is_running(self) -> bool:
+        return True
+
+    def is_closed(self) -> bool:
+        return self.dead
+
+    def call_soon(self, callback: Any, *args: Any, context: Context | None = None) -> asyncio.Handle:
+        handle = asyncio.Handle(callback, args, self, context)
+        self._ready.append(handle)
+        return handle
+
+    call_soon_threadsafe = call_soon
+
+    def call_later(
+        self, delay: float, callback: Any, *args: Any, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        return self.call_at(self.now + delay, callback, *args, context=context)
+
+    def call_at(self, when: float, callback: Any, *args: Any, context: Context | None = None) -> asyncio.TimerHandle:
+        handle = asyncio.TimerHandle(when, callback, args, self, context)
+        self._timer_count += 1
+        heapq.heappush(self._timers, (when, self._timer_count, handle))
+        return handle
+
+    def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
+        """It is passed over when its time comes."""
+
+    def create_future(self) -> "asyncio.Future[Any]":
+        return asyncio.Future(loop=self)
+
+    def create_task(self, coro: Coroutine[Any, Any, Any], **options: Any) -> "asyncio.Task[Any]":  # type: ignore[override]
+        task = asyncio.Task(coro, loop=self, **options)
+        self.tasks.append(task)
+        return task
+
+    def run_in_executor(self, executor: Any, function: Any, *args: Any) -> Any:
+        assert self._executor is not None
+        return asyncio.wrap_future(self._executor(lambda: function(*args)), loop=self)
+
+    def executor(self, submit: Callable[[Callable[[], Any]], "Future[Any]"]) -> None:
+        """Where functions of `asyncio.to_thread` run."""
+        self._executor = submit
+
+    def call_exception_handler(self, context: dict[str, Any]) -> None:
+        """What asyncio would log and forget is a finding."""
+        if not self.dead:
+            self._model.finds(f"{context.get('message')}: {context.get('exception')!r}")
+
+    def kill(self) -> None:
+        """End the process: nobody's last words count."""
+        self.dead = True
+        for task in self.tasks:
+            task._log_destroy_pending = False  # type: ignore[attr-defined]
+            try:
+                task.get_coro().close()  # type: ignore[union-attr]
+            except (Exception, Finding) as last_words:
+                del last_words
+
+
+class Thread:
+    """A thread: runs at its turns, until it waits."""
+
+    def __init__(self, hub: greenlet, run: Callable[[], None]) -> None:
+        self._hub = hub
+        self._greenlet = greenlet(run)
+        self._condition: Callable[[], object] | None = None
+
+    @property
+    def done(self) -> bool:
+        return bool(self._greenlet.dead)
+
+    def ready(self) -> object:
+        return not self.done and (self._condition is None or self._condition())
+
+    def act(self) -> None:
+        self._condition = None
+        self._greenlet.switch()
+
+    def wait(self, condition: Callable[[], object] | None) -> None:
+        """Called in the thread: let others go on until the condition holds."""
+        self._condition = condition
+        self._hub.switch()
+
+    def owns(self, current: greenlet) -> bool:
+        return self._greenlet is current
+
+    def kill(self) -> None:
+        if not self.done:
+            self._greenlet.throw(GreenletExit)
+
+
+class SimulatedThreads(Threads):
+    """Makes simulated threads."""
+
+    def __init__(self, loop: Loop, model: Model, schedule: Schedule) -> None:
+        self._loop = loop
+        self._model = model
+        self._schedule = schedule
+        self._hub = getcurrent()
+        self._all: list[Thread] = []
+        self._pools: list[_Pool] = []
+        loop.executor(self.pool("to_thread", 4).submit)
+
+    def current(self) -> Thread | None:
+        """The thread that runs, None for the event loop's."""
+        current = getcurrent()
+        if current is self._hub:
+            return None
+        return next(thread for thread in reversed(self._all) if thread.owns(current))
+
+    def wait(self, condition: Callable[[], object]) -> None:
+        """Let the current thread wait."""
+        if condition():
+            return
+        thread = self.current()
+        if thread is None:
+            raise self._model.finds("the event loop blocks")
+        thread.wait(condition)
+
+    def give_way(self) -> None:
+        """Let others go on; the current thread may go on at any time."""
+        thread = self.current()
+        if thread is not None:
+            thread.wait(None)
+
+    def start(self, run: Callable[[], None]) -> Thread:
+        """A new thread, for its owner to schedule."""
+
+        def guarded() -> None:
+            try:
+                run()
+            except (Finding, GreenletExit):
+                pass  # the model knows
+
+        thread = Thread(self._hub, guarded)
+        self._all = [each for each in self._all if not each.done]
+        self._all.append(thread)
+        return thread
+
+    def pool(self, name: str, size: int) -> "_Pool":
+        """A pool of simulated threads."""
+        pool = _Pool(self, size, self._schedule)
+        self._pools.append(pool)
+        self._schedule.actor(name, pool.ready, pool.act)
+        return pool
+
+    def inbox(self) -> Any:
+        """A queue into a thread."""
+        return _Inbox(self)
+
+    def spawn(self, name: str, run: Callable[[], None], died: Callable[[BaseException], None]) -> Any:
+        """A thread that its owner hears of."""
+
+        def guarded() -> None:
+            try:
+                run()
+            except GreenletExit:
+                raise
+            except BaseException as error:
+                died(error)
+
+        thread = self.start(guarded)
+        self._schedule.actor(name, thread.ready, thread.act)
+        return _Spawned(self, thread)
+
+    def kill(self) -> None:
+        """End all threads."""
+        for thread in self._all:
+            thread.kill()
+
+
+class _Spawned:
+    def __init__(self, threads: SimulatedThreads, thread: Thread) -> None:
+        self._threads, self._thread = threads, thread
+
+    def join(self) -> None:
+        self._threads.wait(lambda: self._thread.done)
+
+
+class _Inbox:
+    def __init__(self, threads: SimulatedThreads) -> None:
+        self._threads = threads
+        self._items: list[Any] = []
+        self._closed = False
+
+    def put(self, item: Any) -> None:
+        if self._closed:
+            raise RuntimeError("the inbox is closed")
+        self._items.append(item)
+
+    def take(self) -> list[Any]:
+        self._threads.wait(lambda: self._items or self._closed)
+        items, self._items = self._items, []
+        return items
+
+    def close(self) -> None:
+        self._closed = True
+
+
+class _Pool:
+    def __init__(self, threads: SimulatedThreads, size: int, schedule: Schedule) -> None:
+        self._threads = threads
+        self._size = size
+        self._schedule = schedule
+        self._jobs: deque[tuple[Future[Any], Callable[[], Any]]] = deque()
+        self._running: list[Thread] = []
+        self._shut = False
+
+    def submit(self, function: Callable[[], Any]) -> "Future[Any]":
+        if self._shut:
+            raise RuntimeError("cannot schedule new futures after shutdown")
+        future: Future[Any] = Future()
+        self._jobs.append((future, function))
+        return future
+
+    def shutdown(self) -> None:
+        self._shut = True
+        self._threads.wait(lambda: not self._jobs and not self._running)
+
+    def ready(self) -> object:
+        return (self._jobs and len(self._running) < self._size) or any(thread.ready() for thread in self._running)
+
+    def act(self) -> None:
+        ready = [thread for thread in self._running if thread.ready()]
+        if self._jobs and len(self._running) < self._size and (not ready or self._schedule.random.random() < 0.5):
+            thread = self._start(*self._jobs.popleft())
+        else:
+            thread = self._schedule.random.choice(ready)
+        thread.act()
+        if thread.done:
+            self._running.remove(thread)
+
+    def _start(self, future: "Future[Any]", function: Callable[[], Any]) -> Thread:
+        def job() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                result = function()
+            except GreenletExit:
+                raise
+            except BaseException as error:
+                future.set_exception(error)
+                if isinstance(error, Finding):
+                    raise
+            else:
+                future.set_result(result)
+
+        thread = self._threads.start(job)
+        self._running.append(thread)
+        return thread
+
+
+class SimulatedClock(Clock):
+    """Simulated time."""
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop = loop
+
+    def monotonic(self) -> float:
+        return self._loop.now
+
+    def wall(self) -> float:
+        return 1e9 + self._loop.now
+
+    async def sleep(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+
+def simulated_machine(loop: Loop, threads: SimulatedThreads, model: Model) -> Machine:
+    """All seams together."""
+    return Machine(SimulatedClock(loop), threads, model.uid)

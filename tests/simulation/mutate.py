@@ -1,0 +1,82 @@
+"""The test of the test: each patch in mutants/ puts a fault back in that was there once. After how many lives is it found?"""
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import dynhull_server
+
+HERE = Path(__file__).parent
+PATCHES = sorted((HERE / "mutants").glob("*.patch"))
+# Lives within which a fault must be found.
+MOST_LIVES = 5_000
+# Seeds of the plans that look for it.
+SEED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Hunt:
+    """How a fault was looked for: after how many lives it was found, None where it was not, and as what."""
+
+    name: str
+    lives: int | None
+    seconds: float
+    finding: str
+
+
+def fits(patch: Path) -> None:
+    """Raise RuntimeError where a patch does not fit the code any more."""
+    with tempfile.TemporaryDirectory() as folder:
+        _put_in(patch, Path(folder))
+
+
+def _put_in(patch: Path, folder: Path) -> None:
+    """Make a copy of the package with a fault in it."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(dynhull_server.__file__).parent, folder / "dynhull_server", ignore=ignored)
+    command = ["git", "apply", "-C1", str(patch)]
+    applied = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if applied.returncode:
+        raise RuntimeError(f"{patch.name} does not fit the code any more: renew it\n{applied.stderr}")
+
+
+def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
+    """Put a fault into a copy of the package, and look for it."""
+    layer = re.search(r"^Layer: (\w+)$", patch.read_text(), re.MULTILINE)
+    assert layer is not None, f"{patch} does not say in which layer"
+    with tempfile.TemporaryDirectory() as folder:
+        _put_in(patch, Path(folder))
+        begun = time.monotonic()
+        command = ["--package", folder, "run", "--layer", layer[1], "--lives", str(lives), "--seconds", "600"]
+        run = subprocess.run(
+            [sys.executable, "-m", "simulation", *command, "--seed", str(SEED)],
+            cwd=HERE.parent,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    seconds = time.monotonic() - begun
+    if run.returncode == 0:
+        return Hunt(patch.stem, None, seconds, "")
+    found = re.search(r"(\d+) lives.*, 1 finding\nseed \d+ of the \w+: (.*)", run.stdout)
+    if found is None:
+        raise RuntimeError(f"{patch.name}: the simulation itself fails\n{run.stdout}\n{run.stderr}")
+    return Hunt(patch.stem, int(found[1]), seconds, found[2])
+
+
+def report(names: list[str]) -> int:
+    """Look for each, and say after how many lives it was found. Exit code 1 where one was not."""
+    missed = 0
+    for patch in PATCHES:
+        if names and patch.stem not in names:
+            continue
+        outcome = hunt(patch)
+        missed += outcome.lives is None
+        lives = f"{outcome.lives:>5}" if outcome.lives is not None else "never"
+        print(f"{lives} lives {outcome.seconds:6.1f} s  {outcome.name}: {outcome.finding}", flush=True)
+    return int(missed > 0)

@@ -1,0 +1,255 @@
+"""One life of the real engine, with its supervisor, housekeeping, recalls and watches, on a simulated machine."""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable, Coroutine
+from contextlib import aclosing
+from typing import Any
+
+from dynhull.arrays import Points
+from dynhull_server.engine.batch_stream import BatchStream
+from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.supervisor import PASSING, Supervisor
+from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
+from dynhull_server.engine.watch import watch
+from dynhull_server.state.batch import Applied
+from dynhull_server.state.errors import HullNotFoundError
+from dynhull_server.state.hull_state import HullState, Write
+from dynhull_server.state.limits import Limits
+
+from .clients import Client
+from .core_life import compare
+from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
+from .model import Finding, Model
+from .plan import Operation
+from .schedule import Schedule
+from .store import FaultyStorage
+
+# Simulated seconds within which everything that anybody waits for has to happen, once nothing fails.
+FOREVER = 600.0
+# Turns, too: time may pass much faster than threads get on.
+MANY_TURNS = 20_000
+
+SNAPSHOT_POINTS = 2
+SYNC_SECONDS = 0.5
+
+logging.getLogger("dynhull_server").setLevel(logging.CRITICAL + 1)
+
+
+class WatchedSupervisor(Supervisor):
+    """The real one; errors that it takes for a bug are findings."""
+
+    def __init__(self, model: Model, loop: Loop) -> None:
+        super().__init__(SimulatedClock(loop), lambda _: None, self._process_ends)
+        self._model, self._loop_of_life = model, loop
+
+    def failed(self, name: str, error: BaseException) -> None:
+        if not isinstance(error, PASSING):
+            raise self._model.finds(f"{name} fails: {error!r}") from error
+        if not self._model.faulty:
+            raise self._model.finds(f"{name} fails without a fault: {error!r}") from error
+        super().failed(name, error)
+
+    def _process_ends(self, reason: str) -> None:
+        if not self._loop_of_life.dead:
+            raise self._model.finds(f"the process ends: {reason}")
+
+    def ended(self) -> list[str]:
+        """The periodic work that has ended."""
+        return [task.get_name() for task in self._tasks if task.done()]
+
+    def failing(self) -> list[str]:
+        """The work that has not succeeded since it failed."""
+        return [name for name, health in self.works.items() if health.failing_since is not None]
+
+
+class ShellServer:
+    """Drives an Engine."""
+
+    def __init__(self, limits: Limits, storage: FaultyStorage, model: Model, schedule: Schedule) -> None:
+        self.model = model
+        self.schedule = schedule
+        self.loop = Loop(model, schedule)
+        self._threads = SimulatedThreads(self.loop, model, schedule)
+        storage.give_way = self._threads.give_way
+        self._supervisor = WatchedSupervisor(model, self.loop)
+        machine = simulated_machine(self.loop, self._threads, model)
+        self._engine = Engine(limits, storage, self._supervisor, machine)
+        self._clients: list[ClientActor] = []
+        self._news: dict[BatchStream, asyncio.Event] = {}
+        self._closed = False
+        self._drive(self._start(), "the start")
+
+    async def _start(self) -> None:
+        await self._engine.start(lambda *_: None)
+        self._engine.keep_house(SNAPSHOT_POINTS, SYNC_SECONDS)
+
+    def _drive(self, work: Coroutine[Any, Any, None], name: str) -> None:
+        """Let everybody take turns until some work is done."""
+        task = self.loop.create_task(work)
+        self._until(task.done, name)
+        task.result()
+
+    def _until(self, done: Callable[[], object], name: str) -> None:
+        deadline, bound = self.loop.now + FOREVER, self.schedule.turns + MANY_TURNS
+        while not done():
+            if not self.turn() or (self.loop.now > deadline and self.schedule.turns > bound):
+                raise self.model.finds(f"{name} waits for ever")
+
+    def turn(self) -> bool:
+        """One turn; a promise that it broke is raised here."""
+        went_on = self.schedule.turn()
+        if self.model.finding is not None:
+            raise Finding(self.model.finding)
+        return went_on
+
+    # What clients ask for
+
+    async def create(self, name: str, max_points: int) -> str:
+        return (await self._engine.create(name, max_points)).uid
+
+    async def delete(self, name: str) -> None:
+        await self._engine.delete(name)
+
+    async def delete_at_once(self, name: str, times: int) -> None:
+        await asyncio.gather(*(self._engine.delete(name) for _ in range(times)), return_exceptions=True)
+
+    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
+        return await self._engine.apply(name, write, create=create)
+
+    def stream(self, name: str, *, create: bool) -> BatchStream:
+        event = asyncio.Event()
+        stream = self._engine.stream(name, event.set, create=create)
+        self._news[stream] = event
+        return stream
+
+    async def news(self, stream: BatchStream) -> None:
+        event = self._news[stream]
+        while not stream.applied and stream.refusal is None:
+            event.clear()
+            await event.wait()
+
+    async def vertices(self, name: str, rows: int) -> tuple[str, int, Points]:
+        hull = self._engine.get(name)
+        counts, vertices = await hull.read(HullState.vertices, rows)
+        return hull.uid, counts.revision, vertices
+
+    async def recall(self, name: str, uid: str, revision: int) -> Points | None:
+        return await self._engine.get(name).recall(uid, revision)
+
+    async def last(self, name: str, producer: str) -> int:
+        return await self._engine.get(name).last_sequence(producer)
+
+    async def special(self, client: Client, op: Operation) -> None:
+        """Let time pass, or watch a hull."""
+        if op["do"] == "rest":
+            await asyncio.sleep(op["seconds"])
+            return
+        asked = self.model.ask(op["name"])
+        try:
+            await self._watch(client, op)
+        except Exception as error:
+            client.refused(asked, error, (HullNotFoundError,))
+
+    async def _watch(self, client: Client, op: Operation) -> None:
+        hull = self._engine.get(op["name"])
+        async with aclosing(watch(hull, VerticesView(hull), progress_interval=1.0)) as events:
+            held: Points | None = None
+            for _ in range(1 + op["back"]):
+                asked = self.model.ask(op["name"])
+                event = await anext(events)
+                match event:
+                    case Snapshot() | Change():
+                        held = event.vertices
+                    case Progress():
+                        pass
+                assert held is not None
+                client.saw(asked, hull.uid, event.counts.revision, held)
+
+    # Its life
+
+    def client(self, client: Client, operations: list[Operation]) -> None:
+        """A client comes."""
+        actor = ClientActor(self, client, operations)
+        self._clients.append(actor)
+        self.schedule.actor(client.producer, actor.ready, actor.act)
+
+    def rest(self) -> None:
+        """Let everybody finish."""
+        for actor in self._clients:
+            self._until(actor.finished, f"the client {actor.client.producer}")
+        self._until(lambda: not self._engine._core.busy, "the core")
+
+    def waiting(self) -> list[str]:
+        """The work that has ended, and should not have."""
+        return [] if self._closed else self._supervisor.ended()
+
+    def probe(self, probe: Coroutine[Any, Any, None]) -> None:
+        """Run a probe to its end."""
+        self._drive(probe, "a probe")
+
+    def check(self) -> None:
+        """Compare what is in memory with the truth, and let background work succeed again."""
+        compare(self._engine._core, self.model)
+        # Of a commit that failed the supervisor hears when the next one succeeds.
+        self._until(lambda: not set(self._supervisor.failing()) - {"commits", "examination"}, "the background work")
+
+    def kill(self) -> None:
+        """Nothing more happens."""
+        self.loop.kill()
+        self._threads.kill()
+        self.model.finding = None  # nobody hears what the dead say
+
+    def stop(self) -> None:
+        """End the server as the process does: background work first, then its callers, then the engine."""
+        self.model.stopping = True
+        self._closed = True
+        self._drive(self._drain(), "the end")
+
+    async def _drain(self) -> None:
+        await self._supervisor.stop()
+        for actor in self._clients:
+            actor.leave()
+        await self._engine.close()
+
+
+class ClientActor:
+    """A client, its turns: it begins an operation, or goes away."""
+
+    def __init__(self, server: ShellServer, client: Client, operations: list[Operation]) -> None:
+        self.client = client
+        self._server = server
+        self._left = deque(operations)
+        self._task: asyncio.Task[None] | None = None
+        self._patience: int | None = None
+
+    def finished(self) -> bool:
+        return self._task is None and not self._left
+
+    def ready(self) -> object:
+        return self._left if self._task is None else self._patience is not None
+
+    def act(self) -> None:
+        if self._task is None:
+            op = self._left.popleft()
+            self._patience = op.get("leave")
+            self._task = self._server.loop.create_task(self.client.do(op))
+            self._task.add_done_callback(self._done)
+        elif self._patience:
+            self._patience -= 1
+        else:
+            self._patience = None
+            self._task.cancel()
+
+    def leave(self) -> None:
+        """The server ends its calls."""
+        self._left.clear()
+        if self._task is not None:
+            self._task.cancel()
+
+    def _done(self, task: "asyncio.Task[None]") -> None:
+        self._task = None
+        self._server.schedule.note((self.client.producer, task.cancelled()))
+        if not task.cancelled() and (error := task.exception()) is not None and not isinstance(error, Finding):
+            self._server.model.finds(f"a client gets {error!r}")

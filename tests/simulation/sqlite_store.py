@@ -1,0 +1,155 @@
+"""The real storage on SQLite, on a disk that fails when the plan says so.
+
+A kill takes a copy of the database and its log, as they are between two calls, and leaves the rest behind. Torn pages and
+checkpoints in the middle of a commit are not simulated: SQLite does its work within one turn.
+"""
+
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.memory import MemoryStorage
+from dynhull_server.storage.port import Contents, Progress
+from dynhull_server.storage.sqlite.disk import Access, Disk
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+from .model import Model
+from .store import FaultyStorage
+
+FAILED = {"full": sqlite3.SQLITE_FULL, "lost": sqlite3.SQLITE_IOERR, "ghost": sqlite3.SQLITE_IOERR_FSYNC}
+# Where the folders of the lives are: in memory, where there is such a place.
+SHARED_MEMORY = Path("/dev/shm")
+
+
+class SQLiteLives(FaultyStorage):
+    """A folder with a database; each life has a storage of its own on it."""
+
+    def __init__(self, model: Model, faults: Sequence[dict[str, Any]]) -> None:
+        super().__init__(MemoryStorage(), model, faults, immediate=False)
+        self._home = tempfile.TemporaryDirectory(dir=SHARED_MEMORY if SHARED_MEMORY.is_dir() else None)
+        self._folders = 1
+        self._disk = _FaultyDisk(self.fault, self._landed)
+        self._pending: Sequence[Any] = ()
+
+    @property
+    def _folder(self) -> Path:
+        return Path(self._home.name) / str(self._folders)
+
+    def fault(self, place: str) -> str | None:
+        """What fails at this call of a method of the disk."""
+        return self._fault(place)
+
+    def open(self, progress: Progress) -> Contents:
+        """Take up what the life before has left."""
+        if self.dead:
+            left = self._folder
+            self._folders += 1
+            self._folder.mkdir()
+            for file in left.iterdir():
+                if not file.name.endswith("-shm"):
+                    shutil.copy(file, self._folder)
+            self._disk.drop()
+            shutil.rmtree(left)
+        self._inner = SQLiteStorage(self._folder, Durability.SYNC, self._disk)
+        return super().open(progress)
+
+    def commit(self, changes: Sequence[Any]) -> None:
+        """Keep the changes."""
+        self.give_way()
+        self._pending = changes
+        self._inner.commit(changes)
+        self.give_way()
+
+    def _landed(self) -> None:
+        changes, self._pending = self._pending, ()
+        self._model.landed(changes)
+
+    def close(self) -> None:
+        """The server ends."""
+        self._inner.close()
+        self._disk.drop()
+
+    def remove(self) -> None:
+        """Nothing of it is needed any more."""
+        self._disk.drop()
+        self._home.cleanup()
+
+
+class _Connection(sqlite3.Connection):
+    """A connection that may fail at BEGIN and COMMIT."""
+
+    disk: "_FaultyDisk"
+
+    def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
+        if sql == "BEGIN IMMEDIATE":
+            _fail(self.disk.fault("begin"), sqlite3.OperationalError)
+            self.disk.writing = self
+        elif sql == "COMMIT" and self.disk.writing is self:
+            return self._commit(self.disk.fault("commit"))
+        return super().execute(sql, *values)
+
+    def _commit(self, kind: str | None) -> sqlite3.Cursor:
+        if kind in (None, "ghost", "ghost memory"):
+            cursor = super().execute("COMMIT")
+            self.disk.landed()
+            if kind is None:
+                return cursor
+        if kind in ("memory", "ghost memory"):
+            raise MemoryError("no memory for a commit, as planned")
+        assert kind is not None
+        error = sqlite3.OperationalError("a commit fails, as planned")
+        error.sqlite_errorcode = FAILED[kind]
+        raise error
+
+
+class _FaultyDisk(Disk):
+    def __init__(self, fault: Callable[[str], str | None], landed: Callable[[], None]) -> None:
+        self.fault = fault
+        self.landed = landed
+        self.writing: sqlite3.Connection | None = None
+        self._opened: list[Any] = []
+
+    def lock(self, file: Path) -> IO[str] | None:
+        lock = super().lock(file)
+        self._opened.append(lock)
+        return lock
+
+    def size(self, file: Path) -> int | None:
+        _fail(self.fault("stat"), OSError)
+        return super().size(file)
+
+    def open(self, file: Path) -> IO[bytes]:
+        _fail(self.fault("open"), OSError)
+        opened = super().open(file)
+        self._opened.append(opened)
+        return opened
+
+    def sync(self, file: IO[bytes]) -> None:
+        _fail(self.fault("fsync"), OSError)
+
+    def connect(self, database: Path, access: Access) -> sqlite3.Connection:
+        _fail(self.fault("connect"), sqlite3.OperationalError)
+        address = f"{database.absolute().as_uri()}?{access.value}"
+        connection = sqlite3.connect(
+            address, uri=True, isolation_level=None, check_same_thread=False, timeout=0, factory=_Connection
+        )
+        assert isinstance(connection, _Connection)
+        connection.disk = self
+        self._opened.append(connection)
+        return connection
+
+    def drop(self) -> None:
+        """Close everything that a life has opened."""
+        for each in self._opened:
+            if each is not None:
+                each.close()
+        self._opened = []
+
+
+def _fail(kind: str | None, error: type[Exception]) -> None:
+    if kind is not None:
+        raise (MemoryError if kind == "memory" else error)("the disk fails, as planned")

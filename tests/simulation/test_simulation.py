@@ -1,0 +1,58 @@
+"""A short run of the simulation, everything that it has found, and that it finds what it should."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from simulation.mutate import PATCHES, fits, hunt
+from simulation.plan import random_plan
+from simulation.play import play
+
+FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
+# Plans of each layer, a few seconds together.
+PLANS = {"core": 1000, "shell": 200, "sqlite": 10}
+# The first seed: other plans than those of the command line.
+FIRST = 5 * 10**6
+# Faults that are found in a second; `python -m simulation mutants` has all of them.
+QUICK = {"row02_discarded_while_creating", "row06_commit_thread_catches_one_kind", "row18_unknown_is_nothing"}
+
+
+@pytest.mark.parametrize("layer", PLANS)
+def test_no_promise_is_broken(layer):
+    for seed in range(FIRST, FIRST + PLANS[layer]):
+        outcome = play(random_plan(seed, layer))
+        assert outcome.finding is None, f"seed {seed}: {outcome.where}"
+
+
+@pytest.mark.parametrize("file", FINDINGS, ids=lambda file: file.stem)
+def test_what_was_found_stays_mended(file):
+    outcome = play(json.loads(file.read_text())["plan"])
+    assert outcome.finding is None, outcome.where
+
+
+def test_a_plan_always_ends_the_same_way():
+    def traces(hash_seed: str) -> str:
+        command = [sys.executable, "-m", "simulation", "trace", "100"]
+        environment = os.environ | {"PYTHONHASHSEED": hash_seed}
+        ran = subprocess.run(
+            command, cwd=Path(__file__).parents[1], env=environment, check=True, capture_output=True, text=True
+        )
+        return ran.stdout
+
+    first = traces("1")
+    assert len(set(first.split())) > 100
+    assert traces("2") == first
+
+
+@pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.stem)
+def test_faults_can_be_put_back_in(patch):
+    fits(patch)
+
+
+@pytest.mark.parametrize("patch", [each for each in PATCHES if each.stem in QUICK], ids=lambda patch: patch.stem)
+def test_a_fault_put_back_in_is_found(patch):
+    assert hunt(patch, lives=1000).lives is not None
