@@ -61,12 +61,14 @@ class SQLiteLives(FaultyStorage):
         """Keep the changes."""
         self.give_way()
         self._pending = changes
-        self._inner.commit(changes)
+        try:
+            self._inner.commit(changes)
+        finally:
+            self._pending = ()
         self.give_way()
 
     def _landed(self) -> None:
-        changes, self._pending = self._pending, ()
-        self._model.landed(changes)
+        self._model.landed(self._pending)
 
     def close(self) -> None:
         """The server ends."""

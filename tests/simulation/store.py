@@ -99,6 +99,7 @@ class FaultyStorage:
         """Decide what was left undecided."""
         self._fail("settle")
         self._decide()
+        self._inner.settle()
 
     def row(self, number: int) -> HullRow | None:
         """The row of a hull."""

@@ -319,6 +319,9 @@ class Engine:
         self._commits.settle(settled)
 
     def _read_for(self, effect: Examine) -> None:
+        if self._idle is not None and self._idle.is_set():  # the server has not waited for it
+            return
+
         def examined() -> Event:
             try:
                 if self._storage.row(effect.number) is None:

@@ -13,7 +13,7 @@ import json
 import sqlite3
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
@@ -65,6 +65,15 @@ SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durabilit
 
 # A write failed: there is no whole frame with a commit mark.
 NOTHING_WRITTEN = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE)
+
+
+@contextmanager
+def _in_words() -> Iterator[None]:
+    """What SQLite raises is a fault of the disk, or of what is on it."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise StorageError(str(error)) from error
 
 
 class SQLiteStorage:
@@ -122,7 +131,7 @@ class SQLiteStorage:
         """Let others have the folder."""
         if not self._unsettled and self._writer is not None:
             # Where there is no room for it, the folder is taken for a killed server's, and its log stays.
-            with suppress(sqlite3.Error, StorageError):
+            with suppress(sqlite3.Error, StorageError, MemoryError):
                 self._writer.execute("PRAGMA synchronous = FULL")
                 self._write(Group(self._in_mode(STOPPED), []))
                 self._guard.close()
@@ -130,12 +139,14 @@ class SQLiteStorage:
 
     # Committing
 
+    @_in_words()
     def commit(self, changes: Sequence[Change | Step]) -> None:
         """Keep all of the changes or none."""
         if self._unsettled:
             raise StorageError("the outcome of the commit before is not known yet")
         self._write(Group(self._ledger, changes))  # type: ignore[arg-type]  # steps are ours
 
+    @_in_words()
     def settle(self) -> None:
         """Decide what became of the last commit; see the top of this file."""
         if not self._unsettled:
@@ -204,6 +215,7 @@ class SQLiteStorage:
             hull = self._settled().hulls.get(number)
             return None if hull is None else hull.row
 
+    @_in_words()
     def read(self, number: int, until: int = NEWEST) -> Kept:
         """A hull as it was at a revision."""
         with self._readers.lend() as connection:
@@ -259,6 +271,7 @@ class SQLiteStorage:
         while ids := self._ledger.dead[table][:DROPPED_ROWS]:
             yield DropDead(table, ids[: max(1, len(self._few(ids, "NULL", table, column)))])
 
+    @_in_words()
     def _look_for_dead_chunks(self) -> None:
         """Snapshots that were given up have left some, too."""
         with self._readers.lend() as connection:
@@ -268,6 +281,7 @@ class SQLiteStorage:
             live |= self._under_way.keys()
             self._ledger.dead["chunks"] = array("q", (place for place, snapshot in rows if snapshot not in live))
 
+    @_in_words()
     def _few(self, ids: "array[int]", columns: str, table: str, sized: str) -> list[Sequence[int]]:
         """Some columns of the first of the rows: as many as fit into a step, at least one."""
         taken: list[Sequence[int]] = []
@@ -282,6 +296,7 @@ class SQLiteStorage:
 
     # Housekeeping
 
+    @_in_words()
     def sync(self) -> None:
         """Make durable what was committed."""
         if self._log_in_doubt:
@@ -298,6 +313,7 @@ class SQLiteStorage:
             self._log_in_doubt = True
             raise
 
+    @_in_words()
     def checkpoint(self) -> None:
         """Copy the log into the database beside commits, when it is long, then begin it anew.
 
