@@ -133,7 +133,6 @@ def test_any_layout():
         packed["xy"],
         np.frombuffer(b"-" + square.tobytes(), np.uint8)[1:].view(np.float64).reshape(5, 2),
         read_only,
-        np.ma.array(square),
         iter(square.tolist()),
     ):
         assert convex_hull(xy).tolist() == corners

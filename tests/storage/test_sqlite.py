@@ -153,6 +153,16 @@ def test_damage_in_the_middle_is_refused(folder, damaged):
         opened(folder)
 
 
+@pytest.mark.parametrize("bit", range(8))
+def test_a_damaged_schema_is_refused(folder, bit):
+    stopped(folder)
+    content = bytearray((folder / DATABASE).read_bytes())
+    content[content.index(b"CREATE TABLE totals") + 10] ^= 1 << bit
+    (folder / DATABASE).write_bytes(content)
+    with pytest.raises(StorageError, match=r"restore a backup|cannot be opened"):
+        opened(folder)
+
+
 @pytest.mark.parametrize("gone", ["first IN (4, 5)", "first = 9", "first = 1"])
 def test_missing_batches_are_refused(folder, gone):
     stopped(folder)

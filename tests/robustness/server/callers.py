@@ -78,8 +78,13 @@ class Server:
         self.port = int(line.rsplit(":", 1)[1])
 
     def kill(self) -> None:
-        self.process.kill()
-        self.process.wait()
+        with self.process:  # which waits for its end
+            self.process.kill()
+
+    def stop(self) -> int:
+        with self.process:
+            self.process.send_signal(signal.SIGTERM)
+            return self.process.wait(PATIENCE)
 
 
 class Model:
@@ -130,8 +135,7 @@ class Callers:
                 else:
                     await self._check(stub)
                     await self._probe(stub)
-        self._server.process.send_signal(signal.SIGTERM)
-        require(self._server.process.wait(PATIENCE) == 0, "the server did not end in peace")
+        require(self._server.stop() == 0, "the server did not end in peace")
 
     async def _call_until(self, stub: HullServiceStub, calls: int) -> None:
         while self.calls < calls:
@@ -248,8 +252,7 @@ def callers(folder: Path, calls: int, kills: int, seed: int) -> str:
         print(server.log.read_text(), file=sys.stderr)
         raise
     finally:
-        server.process.kill()
-        server.process.wait()
+        server.kill()
     return (
         f"calls: {run.calls}, their callers went away in {run.gone}; kills: {kills}; batches acknowledged: "
         f"{run.acknowledged}, and {run.steady} of a steady writer; lost: 0, doubled: 0, zombies: 0; "
