@@ -9,6 +9,7 @@ import heapq
 from collections import deque
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
+from contextlib import suppress
 from contextvars import Context
 from typing import Any
 
@@ -37,7 +38,7 @@ class Loop(asyncio.AbstractEventLoop):
         self._ready: deque[asyncio.Handle] = deque()
         self._timers: list[tuple[float, int, asyncio.TimerHandle]] = []
         self._timer_count = 0
-        self._executor: Callable[[Callable[[], Any]], "Future[Any]"] | None = None
+        self._executor: Callable[[Callable[[], Any]], Future[Any]] | None = None
         schedule.actor("loop", lambda: self._ready, self._run)
         schedule.actor("time", lambda: self._timers, self._pass)
 
@@ -98,7 +99,7 @@ class Loop(asyncio.AbstractEventLoop):
         self.tasks.append(task)
         return task
 
-    def run_in_executor(self, executor: Any, function: Any, *args: Any) -> Any:
+    def run_in_executor(self, _: Any, function: Any, *args: Any) -> Any:
         assert self._executor is not None
         return asyncio.wrap_future(self._executor(lambda: function(*args)), loop=self)
 
@@ -116,10 +117,8 @@ class Loop(asyncio.AbstractEventLoop):
         self.dead = True
         for task in self.tasks:
             task._log_destroy_pending = False  # type: ignore[attr-defined]
-            try:
+            with suppress(Exception, Finding):
                 task.get_coro().close()  # type: ignore[union-attr]
-            except (Exception, Finding) as last_words:
-                del last_words
 
 
 class Thread:
@@ -192,10 +191,8 @@ class SimulatedThreads(Threads):
         """A new thread, for its owner to schedule."""
 
         def guarded() -> None:
-            try:
+            with suppress(Finding, GreenletExit):  # the model knows
                 run()
-            except (Finding, GreenletExit):
-                pass  # the model knows
 
         thread = Thread(self._hub, guarded)
         self._all = [each for each in self._all if not each.done]

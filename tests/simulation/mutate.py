@@ -1,4 +1,4 @@
-"""The test of the test: each patch in mutants/ puts a fault back in that was there once. After how many lives is it found?"""
+"""The test of the test: each patch in mutants/ puts back in a fault that was there once. Is it found, and how soon?"""
 
 import re
 import shutil

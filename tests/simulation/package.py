@@ -1,10 +1,10 @@
 """Another copy of the server's package in place of the installed one: to be called before anything imports it."""
 
 import sys
+from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
-from collections.abc import Sequence
 
 NAME = "dynhull_server"
 
@@ -13,9 +13,7 @@ class _Finder(MetaPathFinder):
     def __init__(self, folder: str) -> None:
         self._folder = folder
 
-    def find_spec(
-        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+    def find_spec(self, name: str, path: Sequence[str] | None = None, _: ModuleType | None = None) -> ModuleSpec | None:
         if name == NAME:
             return PathFinder.find_spec(name, [self._folder])
         return PathFinder.find_spec(name, path) if name.startswith(NAME + ".") else None

@@ -1,7 +1,7 @@
-"""What happens in a simulated run, as data: lives of a server, what clients do in each, what fails, and how a life ends.
+"""What happens in a simulated run, as data: lives of a server, what clients do, what fails, and how a life ends.
 
-A plan is a dictionary that JSON can hold, so that one that found something can be shrunk and kept. The schedule, that is
-who comes when, is drawn from the plan's seed and nothing else.
+A plan is a dictionary that JSON can hold, so that one that found something can be shrunk and kept. The schedule, which
+says who comes when, is drawn from the plan's seed and nothing else.
 
     {"seed": 7, "layer": "core", "limits": {...},
      "lives": [{"clients": [[operation, ...], ...], "end": "kill", "after": 40}, ...],

@@ -1,9 +1,11 @@
 """Plays a plan: its lives one after the other on one storage, each with a look at all promises at its end."""
 
+import logging
 import traceback
 from dataclasses import dataclass
 from typing import Any
 
+import dynhull_server
 from dynhull_server.state.limits import Limits
 from dynhull_server.storage.memory import MemoryStorage
 
@@ -35,7 +37,17 @@ class Outcome:
 
 
 def play(plan: Plan) -> Outcome:
-    """Play a plan to its end, or to the first broken promise."""
+    """Play a plan to its end, or to the first broken promise. Nothing is logged."""
+    log = logging.getLogger(dynhull_server.__name__)
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        return _play(plan)
+    finally:
+        log.setLevel(level)
+
+
+def _play(plan: Plan) -> Outcome:
     limits = Limits(**plan["limits"])
     model, schedule = Model(limits), Schedule(plan["seed"])
     storage = _storage(plan, model)

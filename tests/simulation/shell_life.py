@@ -1,7 +1,6 @@
 """One life of the real engine, with its supervisor, housekeeping, recalls and watches, on a simulated machine."""
 
 import asyncio
-import logging
 from collections import deque
 from collections.abc import Callable, Coroutine
 from contextlib import aclosing
@@ -33,8 +32,6 @@ MANY_TURNS = 20_000
 
 SNAPSHOT_POINTS = 2
 SYNC_SECONDS = 0.5
-
-logging.getLogger("dynhull_server").setLevel(logging.CRITICAL + 1)
 
 
 class WatchedSupervisor(Supervisor):

@@ -1,4 +1,4 @@
-"""Makes a plan that found something small: as long as it finds the same, it loses lives, clients, operations and faults."""
+"""Makes a plan that found something small: it loses lives, clients, operations and faults while it finds the same."""
 
 import copy
 from collections.abc import Iterator

@@ -1,7 +1,7 @@
 """The real storage on SQLite, on a disk that fails when the plan says so.
 
-A kill takes a copy of the database and its log, as they are between two calls, and leaves the rest behind. Torn pages and
-checkpoints in the middle of a commit are not simulated: SQLite does its work within one turn.
+A kill takes a copy of the database and its log, as they are between two calls, and leaves the rest behind. Torn pages
+and checkpoints in the middle of a commit are not simulated: SQLite does its work within one turn.
 """
 
 import shutil
@@ -130,7 +130,7 @@ class _FaultyDisk(Disk):
         self._opened.append(opened)
         return opened
 
-    def sync(self, file: IO[bytes]) -> None:
+    def sync(self, _: IO[bytes]) -> None:
         _fail(self.fault("fsync"), OSError)
 
     def connect(self, database: Path, access: Access) -> sqlite3.Connection:

@@ -14,7 +14,7 @@ from simulation.play import play
 
 FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
 # Plans of each layer, a few seconds together.
-PLANS = {"core": 1000, "shell": 200, "sqlite": 10}
+PLANS = {"core": 700, "shell": 150, "sqlite": 15}
 # The first seed: other plans than those of the command line.
 FIRST = 5 * 10**6
 # Faults that are found in a second; `python -m simulation mutants` has all of them.
