@@ -273,7 +273,7 @@ class Client:
         if not seen:
             return
         uid, revision, _ = seen[-1 - op["back"] % len(seen)]
-        revision = max(0, revision - op["back"])
+        revision = max(min(1, revision), revision - op["back"])  # of revision 0 there is nothing to mistake
         asked = self.model.ask(name)
         try:
             vertices = await self.server.recall(name, uid, revision)
