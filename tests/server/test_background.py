@@ -59,6 +59,23 @@ def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_p
         assert scrape(metrics)['dynhull_background_unwell{work="checkpoint"}'] == 0
 
 
+def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None:
+    log = tmp_path / "data" / "dynhull.db-wal"
+    points = np.random.default_rng(8).normal(size=(50, 2000, 2))
+    with (
+        faulty_server(tmp_path, complaints="unwell: health is NOT_SERVING") as (server, faults),
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("a")
+        (faults / "checkpoint").touch()
+        wait_until(lambda: health(server.address) == NOT_SERVING)
+        for each in points:
+            client.apply("a", insert=each)
+        assert log.stat().st_size > points.nbytes
+        (faults / "checkpoint").unlink()
+        wait_until(lambda: client.apply("a", insert=points[0]) and log.stat().st_size <= 2**18)
+
+
 def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Path) -> None:
     with faulty_server(tmp_path, complaints="this is a bug") as (server, faults):
         (faults / "impossible").touch()
