@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -74,6 +75,22 @@ def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None
         assert log.stat().st_size > points.nbytes
         (faults / "checkpoint").unlink()
         wait_until(lambda: client.apply("a", insert=points[0]) and log.stat().st_size <= 2**18)
+
+
+def test_a_disk_that_hangs_makes_the_server_unwell(tmp_path: Path) -> None:
+    with (
+        faulty_server(tmp_path, complaints="a commit is under way for") as (server, faults),
+        HullClient(server.address) as client,
+        ThreadPoolExecutor() as threads,
+    ):
+        client.create_hull("a")
+        (faults / "hang").touch()
+        applied = threads.submit(client.apply, "a", insert=[[1, 2]])
+        wait_until(lambda: health(server.address) == NOT_SERVING)
+        assert not applied.done()
+        (faults / "hang").unlink()
+        assert applied.result().revision == 1
+        wait_until(lambda: health(server.address) == SERVING)
 
 
 def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Path) -> None:

@@ -329,7 +329,7 @@ class Core:
         if trip.before is not None and trip.has_records:
             self._examine(trip, effects)  # the batches are in its state
         else:
-            self._again(queue, trip, effects)
+            self._again(queue, trip)
 
     def _refuse_changes(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
         """Refuse the changes of the trip, and stop the streams they come from."""
@@ -349,7 +349,7 @@ class Core:
                 streams.add(id(stream))
         effects.append(Told(refused))
 
-    def _again(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+    def _again(self, queue: _Queue, trip: Trip) -> None:
         """Nothing of the trip was kept: what it read must be read again."""
         reads = [request for request in trip.requests if type(request) is ReadHull and not request.abandoned]
         for request in reads:
@@ -386,7 +386,7 @@ class Core:
             assert trip.failure is not None  # or it would not have been examined
             if trip.unknown:
                 self._refuse_changes(trip, _not_stored(trip.failure), effects)
-            self._again(queue, trip, effects)
+            self._again(queue, trip)
         self._go_on(queue, effects)
 
     def _not_examined(self, event: NotExamined, effects: list[Effect]) -> None:
