@@ -1,8 +1,8 @@
 """The simulation from the command line.
 
-    python -m simulation run --seconds 60 --seed 1     random plans of all layers; exit code 1 on a finding
-    python -m simulation replay FILE                   one plan that was kept
-    python -m simulation mutants                       after how many lives the simulation finds each fault put back in
+python -m simulation run --seconds 60 --seed 1     random plans of all layers; exit code 1 on a finding
+python -m simulation replay FILE                   one plan that was kept
+python -m simulation mutants                       after how many lives the simulation finds each fault put back in
 """
 
 import argparse

@@ -66,9 +66,9 @@ def _live(
     layer: str, life: dict[str, Any], limits: Limits, model: Model, schedule: Schedule, storage: FaultyStorage
 ) -> None:
     schedule.clear()
-    model.new_life()
     storage.calm = True
     server: CoreServer | ShellServer = LAYERS[layer](limits, storage, model, schedule)
+    model.new_life()
     server.check()
     storage.calm = False
     for number, operations in enumerate(life["clients"]):
