@@ -142,7 +142,7 @@ class Server:
         self._calls.ready()
         self._health.set(SERVING, SCRUB)
         self._serving = True
-        self._well_or_not(None)
+        self._well_or_not(self._supervisor.reason)
         if self._tokens is not None:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
             self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)

@@ -1,15 +1,20 @@
 """Runs the command that follows, with a storage that fails while a file of that name is in the folder given first.
 
-commit: a commit raises an I/O error after it has been kept. settle: what became of it cannot be decided. checkpoint:
-an I/O error. impossible: a checkpoint raises what it never should. thread: the committing thread ends.
+Patience is a second, and the log's bound a quarter of a megabyte.
+
+commit: a commit raises an I/O error after it has been kept. hang: it takes until the file is gone. settle: what became
+of it cannot be decided. checkpoint: an I/O error. impossible: a checkpoint raises what it never should. thread: the
+committing thread ends.
 """
 
 import errno
 import runpy
 import sys
+import time
 from pathlib import Path
 
-from dynhull_server.engine import supervisor
+from dynhull_server.engine import engine, supervisor
+from dynhull_server.storage.sqlite import storage
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 FAULTS = Path(sys.argv[1])
@@ -27,6 +32,8 @@ def no_disk() -> OSError:
 class Faulty(SQLiteStorage):
     def commit(self, changes):
         fails("thread", SystemExit())
+        while (FAULTS / "hang").exists():
+            time.sleep(0.05)
         super().commit(changes)
         fails("commit", no_disk())
 
@@ -45,5 +52,7 @@ if __name__ == "__main__":
 
     app.SQLiteStorage = Faulty
     supervisor.PATIENCE = 1.0
+    engine.STUCK = 0.5
+    storage.CHECKPOINT_BYTES, storage.LONGEST_LOG_BYTES = 2**17, 2**18
     sys.argv = sys.argv[2:]
     runpy.run_path(sys.argv[0], run_name="__main__")

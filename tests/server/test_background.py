@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -57,6 +58,39 @@ def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_p
         (faults / "checkpoint").unlink()
         wait_until(lambda: health(server.address) == SERVING)
         assert scrape(metrics)['dynhull_background_unwell{work="checkpoint"}'] == 0
+
+
+def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None:
+    log = tmp_path / "data" / "dynhull.db-wal"
+    points = np.random.default_rng(8).normal(size=(50, 2000, 2))
+    with (
+        faulty_server(tmp_path, complaints="unwell: health is NOT_SERVING") as (server, faults),
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("a")
+        (faults / "checkpoint").touch()
+        wait_until(lambda: health(server.address) == NOT_SERVING)
+        for each in points:
+            client.apply("a", insert=each)
+        assert log.stat().st_size > points.nbytes
+        (faults / "checkpoint").unlink()
+        wait_until(lambda: client.apply("a", insert=points[0]) and log.stat().st_size <= 2**18)
+
+
+def test_a_disk_that_hangs_makes_the_server_unwell(tmp_path: Path) -> None:
+    with (
+        faulty_server(tmp_path, complaints="a commit is under way for") as (server, faults),
+        HullClient(server.address) as client,
+        ThreadPoolExecutor() as threads,
+    ):
+        client.create_hull("a")
+        (faults / "hang").touch()
+        applied = threads.submit(client.apply, "a", insert=[[1, 2]])
+        wait_until(lambda: health(server.address) == NOT_SERVING)
+        assert not applied.done()
+        (faults / "hang").unlink()
+        assert applied.result().revision == 1
+        wait_until(lambda: health(server.address) == SERVING)
 
 
 def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Path) -> None:

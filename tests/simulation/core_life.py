@@ -13,6 +13,7 @@ from typing import Any
 from dynhull.arrays import Points
 from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.group_commit import GroupCommit
+from dynhull_server.engine.threads import Clock
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.core import Core
 from dynhull_server.state.errors import HullNotFoundError, HullReplacedError, RefusedError, StoppingError
@@ -117,7 +118,7 @@ class CoreServer:
             kept = storage.read(row.number)
             self.core.restore(row, HullState(limits, row.max_points, kept, now=0.0), len(kept.records))
         threads: Any = NoThreads()
-        self._commits = GroupCommit(storage, threads, lambda _: None, lambda _: None)
+        self._commits = GroupCommit(storage, threads, Clock(), lambda _: None, lambda _: None)
         self._events: deque[Event] = deque()
         self._stepping = False
         self._now = 0.0

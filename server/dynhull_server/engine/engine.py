@@ -54,6 +54,8 @@ if TYPE_CHECKING:
 TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
 # Seconds between two looks at the clock: producers are forgotten after a day.
 TICK = 1.0
+# Seconds that a commit may take before it is reported as failing: a disk that hangs raises nothing.
+STUCK = 10.0
 
 log = logging.getLogger(__name__)
 
@@ -108,6 +110,7 @@ class Engine:
         self._commits = GroupCommit(
             self._storage,
             threads,
+            clock,
             lambda error: self._from_thread(partial(self._commit_reported, error)),
             lambda error: self._from_thread(partial(self._supervisor.died, "commits", error)),
         )
@@ -351,7 +354,11 @@ class Engine:
             self._idle.set()
 
     async def _tick(self) -> None:
-        self.dispatch(Tick(self._machine.clock.monotonic()))
+        now = self._machine.clock.monotonic()
+        self.dispatch(Tick(now))
+        since = self._commits.since
+        if since is not None and now - since > STUCK:
+            self._supervisor.failed("commits", TimeoutError(f"a commit is under way for {now - since:.0f} s"))
 
     def _birth(self) -> Birth:
         return Birth(self._machine.token(), self._machine.clock.wall())

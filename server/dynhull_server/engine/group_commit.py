@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..state.records import Change
 from ..storage.port import NotCommittedError, Step, Storage
-from .threads import Inbox, Threads
+from .threads import Clock, Inbox, Threads
 
 # What became of a commit: None, or why it failed, and whether it is unknown if it did.
 Done = Callable[[Exception | None, bool], None]
@@ -27,20 +27,27 @@ class GroupCommit:
     Args:
         storage: where to.
         threads: makes the thread.
+        clock: time.
         report: called in the thread with what failed in a commit; with None when one has succeeded.
         died: called in the thread when it ends though it should not.
+
+    Attributes:
+        since: when what is under way began, on the clock; None while nothing is.
     """
 
     def __init__(
         self,
         storage: Storage,
         threads: Threads,
+        clock: Clock,
         report: Callable[[BaseException | None], None],
         died: Callable[[BaseException], None],
     ) -> None:
         self._storage = storage
         self._report = report
+        self._clock = clock
         self._undecided = False
+        self.since: float | None = None
         self._inbox: Inbox[_Waiting] = threads.inbox()
         self._thread = threads.spawn("commits", self._run, died)
 
@@ -59,11 +66,13 @@ class GroupCommit:
 
     def _run(self) -> None:
         while group := self._inbox.take():
+            self.since = self._clock.monotonic()
             if self._decided(group):
                 self._commit([each for each in group if each.changes])
                 for each in group:
                     if not each.changes:
                         each.done(None, False)
+            self.since = None
 
     def _decided(self, group: list[_Waiting]) -> bool:
         """Whether nothing of earlier commits is unknown; otherwise the group has been refused."""

@@ -44,6 +44,10 @@ class Supervisor:
         clock: time.
         changed: called when the server becomes unwell or well, with the reason or None.
         fatal: called with the reason when the process has to end.
+
+    Attributes:
+        works: how each piece of work fares.
+        reason: why the server is unwell; None where it is well.
     """
 
     def __init__(self, clock: Clock, changed: Callable[[str | None], None], fatal: Callable[[str], None]) -> None:
@@ -51,7 +55,7 @@ class Supervisor:
         self._changed = changed
         self._fatal = fatal
         self._tasks: list[asyncio.Task[None]] = []
-        self._reason: str | None = None
+        self.reason: str | None = None
         self.works: dict[str, Health] = {}
 
     def every(self, seconds: float, name: str, work: Callable[[], Awaitable[object]]) -> None:
@@ -121,9 +125,9 @@ class Supervisor:
 
     def _tell(self) -> None:
         reason = next((health.unwell for health in self.works.values() if health.unwell is not None), None)
-        if reason == self._reason:
+        if reason == self.reason:
             return
-        self._reason = reason
+        self.reason = reason
         if reason is None:
             log.warning("well again")
         else:
