@@ -130,7 +130,7 @@ def _trace(plans: int) -> int:
     from .play import play
 
     for seed in range(plans):
-        outcome = play(random_plan(seed, ("core", "shell")[seed % 2]))
+        outcome = play(random_plan(seed, ("core", "shell", "sqlite")[seed % 3]))
         print(seed, outcome.trace, outcome.finding)
     return 0
 
