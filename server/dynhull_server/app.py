@@ -227,7 +227,7 @@ class Server:
 
 def _storage(settings: Settings) -> Storage:
     if settings.in_memory:
-        return MemoryStorage(forgets=True)
+        return MemoryStorage(keeps=False)
     return SQLiteStorage(settings.data, settings.durability)
 
 

@@ -31,7 +31,6 @@ from dynhull_server.state.events import (
     Examined,
     Failed,
     Gone,
-    Moved,
     NotExamined,
     ReadHull,
     Request,
@@ -149,6 +148,8 @@ class CoreServer:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Told():
+                if effect.moved is not None:
+                    self.schedule.note((effect.moved.uid, effect.moved.counts.revision))
                 for request in effect.requests:
                     self.schedule.note((type(request).__name__, str(request.error)))
                     request.to.tell(request)
@@ -160,8 +161,6 @@ class CoreServer:
                 self._settle(effect)
             case Retry():
                 self._pauses.append(effect.ticket)
-            case Moved():
-                self.schedule.note((effect.hull.uid, effect.hull.counts.revision))
 
     def _commit(self, trip: Trip, changes: list[Any]) -> None:
         if self._storage.immediate:

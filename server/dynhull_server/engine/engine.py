@@ -23,7 +23,6 @@ from ..state.events import (
     Examined,
     Failed,
     Gone,
-    Moved,
     NotExamined,
     Request,
     Retried,
@@ -98,7 +97,13 @@ class Engine:
         self._turns, self.reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
         self.disk = threads.pool("disk", DISK_THREADS)
         contents: Contents = await self.run(self.disk, partial(self._storage.open, progress))
-        self._core = Core(self._limits, contents.next_number, clock.monotonic(), immediate=self._storage.immediate)
+        self._core = Core(
+            self._limits,
+            contents.next_number,
+            clock.monotonic(),
+            immediate=self._storage.immediate,
+            keeps=self._storage.keeps,
+        )
         progress(0, len(contents.hulls))
         for done, row in enumerate(contents.hulls, start=1):
             kept = await self.run(self.disk, partial(self._storage.read, row.number))
@@ -222,7 +227,8 @@ class Engine:
             while True:
                 for effect in self._core.step(event):
                     self._carry_out(effect)
-                self._notice_idle()
+                if self._idle is not None:
+                    self._notice_idle()
                 if not self._events:
                     return
                 event = self._events.popleft()
@@ -269,12 +275,12 @@ class Engine:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Told():
+                if effect.moved is not None:
+                    self._move(effect.moved)
                 for request in effect.requests:
                     request.to.tell(request)
             case Commit():
                 self._commit(effect.ticket, effect.changes)
-            case Moved():
-                self._move(effect.hull)
             case Compute():
                 self._compute(effect.ticket)
             case Examine():

@@ -36,7 +36,6 @@ from .events import (
     Examined,
     Failed,
     Gone,
-    Moved,
     NotExamined,
     ReadHull,
     Request,
@@ -51,7 +50,7 @@ from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
 from .records import HullRow
-from .trip import Trip
+from .trip import Place, Trip
 
 # Requests for at most this many points together run at once: a tenth of a millisecond.
 SMALL = 128
@@ -101,11 +100,21 @@ class Core:
         next_number: greater than the number of every hull there has ever been.
         now: seconds on a clock that never goes back.
         immediate: whether a Commit is done when it is carried out, and cannot fail: then nothing is said of it.
+        keeps: whether batches are to be kept at all.
     """
 
-    def __init__(self, limits: Limits, next_number: int = 1, now: float = 0.0, *, immediate: bool = False) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        next_number: int = 1,
+        now: float = 0.0,
+        *,
+        immediate: bool = False,
+        keeps: bool = True,
+    ) -> None:
         self._limits = limits
         self._immediate = immediate
+        self._keeps = keeps
         self._next_number = next_number
         self._now = now
         self._queues: dict[str, _Queue] = {}
@@ -182,7 +191,8 @@ class Core:
                 effects.append(Told([request]))
             else:
                 self._begin(queue, [request], request.rows, effects)
-                self._go_on(queue, effects)
+                if queue.hull is None or queue.waiting:
+                    self._go_on(queue, effects)
             return
         queue.waiting.append(request)
         if queue.ill is not None:
@@ -216,13 +226,12 @@ class Core:
 
     def _begin(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
         hull = queue.hull
-        number, refusal = 0, None
+        trip = queue.trip = Trip(queue.name, hull, requests, self._now, keeps=self._keeps)
+        self._trips += 1
         if hull is None:
-            number, refusal = self._next_number, self._no_more_hulls()
+            trip.may_make(Place(self._next_number, self._no_more_hulls(), self._limits))
             self._next_number += 1
             self._creating += 1
-        trip = queue.trip = Trip(queue.name, hull, requests, number, refusal, self._limits, self._now)
-        self._trips += 1
         if rows > SMALL:
             effects.append(Compute(trip))
             return
@@ -263,17 +272,21 @@ class Core:
             self._fail(queue, trip, MemoryError("a batch was applied in part"), effects)
             return
         changes = trip.changes()
-        if not changes:
-            self._end(queue, trip, effects)
+        if changes:
+            effects.append(Commit(trip, changes))
+            if not self._immediate:
+                return
+        elif not trip.applied:
+            self._end(queue, trip, effects, None)
             return
-        effects.append(Commit(trip, changes))
-        if self._immediate:
-            self._keep(queue, trip, effects)
+        self._keep(queue, trip, effects)
 
-    def _end(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+    def _end(self, queue: _Queue, trip: Trip, effects: list[Effect], moved: Hull | None) -> None:
         """The trip is over: tell its callers."""
         requests = trip.requests
-        effects.append(Told(requests if len(requests) == 1 and not requests[0].abandoned else _present(requests)))
+        if len(requests) > 1 or requests[0].abandoned:
+            requests = [request for request in requests if not request.abandoned]
+        effects.append(Told(requests, moved))
         self._over(queue, trip)
 
     def _over(self, queue: _Queue, trip: Trip) -> None:
@@ -299,18 +312,17 @@ class Core:
     def _keep(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
         """The changes of the trip are there: everybody may see them."""
         before, after = trip.before, trip.after
-        queue.hull = after
-        if before is not None and after is None:
-            before.ended = True
-            del self._hulls[queue.name]
-            effects.append(Moved(before))
         if after is not None:
-            if before is None:
-                self._hulls[queue.name] = after
             after.counts = after.state.counts
             after.unsaved += trip.unsaved
-            effects.append(Moved(after))
-        self._end(queue, trip, effects)
+        if after is not before:
+            queue.hull = after
+            if before is not None:
+                before.ended = True
+                del self._hulls[queue.name]
+            if after is not None:
+                self._hulls[queue.name] = after
+        self._end(queue, trip, effects, after or before)
 
     def _failed(self, event: Failed, effects: list[Effect]) -> None:
         trip = event.ticket
@@ -326,7 +338,7 @@ class Core:
         """Nothing of the trip is kept."""
         trip.failure = error
         self._refuse_changes(trip, _not_stored(error), effects)
-        if trip.before is not None and trip.has_records:
+        if trip.before is not None and (trip.applied or trip.torn):
             self._examine(trip, effects)  # the batches are in its state
         else:
             self._again(queue, trip)
@@ -440,10 +452,6 @@ class Core:
         """The next start will find out what became of the trip."""
         self._over(queue, trip)
         self._go_on(queue, effects)
-
-
-def _present(requests: list[Request]) -> list[Request]:
-    return [request for request in requests if not request.abandoned]
 
 
 def _not_stored(error: Exception) -> NotStoredError:

@@ -221,16 +221,13 @@ class Retry:
 
 @dataclass(slots=True)
 class Told:
-    """Tell the callers of requests their results or errors, in this order."""
+    """Tell the callers of requests their results or errors, in this order.
+
+    First, whoever waits for `moved` may look: it has a new revision, or it is no more.
+    """
 
     requests: list[Request]
+    moved: "Hull | None" = None
 
 
-@dataclass(slots=True)
-class Moved:
-    """A hull has a new revision, or it is no more: whoever waits for that may look."""
-
-    hull: "Hull"
-
-
-Effect = Compute | Commit | Examine | Retry | Told | Moved
+Effect = Compute | Commit | Examine | Retry | Told

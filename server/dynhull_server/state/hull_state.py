@@ -68,15 +68,15 @@ class HullState:
         """The number of vertices when somebody last looked."""
         return len(self._vertices)
 
-    def apply(self, write: Write, now: float) -> tuple[Applied, Record | None]:
-        """Apply a batch as the next revision; what it did, and what to keep: nothing of a duplicate.
+    def apply(self, write: Write, now: float, records: list[Record] | None) -> Applied:
+        """Apply a batch as the next revision, and put it to the records where there are such.
 
         Raises:
             Exception: what refuses the batch; nothing has changed.
         """
         counts = self.counts
         if write.producer and not self._producers.is_new(write.producer, write.sequence, write.owner, now):
-            return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True), None
+            return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True)
         batch = write.make()
         if counts.points + batch.growth > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
@@ -92,10 +92,13 @@ class HullState:
         if write.producer:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
         self.counts = Counts(applied.revision, applied.points, self.hull.distinct)
-        lenient = applied.missing > 0
-        record = Record(applied.revision, batch.inserts, batch.deletes, write.producer, write.sequence, lenient)
+        if records is not None:
+            lenient = applied.missing > 0
+            records.append(
+                Record(applied.revision, batch.inserts, batch.deletes, write.producer, write.sequence, lenient)
+            )
         self.torn = False
-        return applied, record
+        return applied
 
     def vertices(self) -> Points:
         """The vertices; the very same array for as long as the hull has not changed."""

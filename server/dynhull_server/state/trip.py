@@ -1,11 +1,22 @@
 """One trip of a hull's work: requests that run together, and whose changes are committed together."""
 
+from dataclasses import dataclass
+
 from .errors import HullExistsError, HullNotFoundError
 from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch
 from .hull import Hull
 from .hull_state import EMPTY, HullState
 from .limits import Limits
 from .records import Append, Change, Create, Delete, HullRow, Record
+
+
+@dataclass(slots=True)
+class Place:
+    """What a new hull needs: a number, or why there may be no more hulls; and the limits on its state."""
+
+    number: int
+    refusal: Exception | None
+    limits: Limits
 
 
 class Trip:
@@ -15,55 +26,48 @@ class Trip:
         name: the hull's name.
         hull: the hull there is of that name.
         requests: what is to be done.
-        number: for a hull that the trip may make.
-        refusal: why the trip may not make one; None where it may.
-        limits: for its state.
         now: seconds on a clock that never goes back.
+        keeps: whether the storage keeps batches.
 
     Attributes:
         before: the hull before the trip; None where there was none.
         after: the hull after it.
+        applied: whether any batch was applied.
         unsaved: points in the batches applied.
+        torn: whether a batch was applied in part: memory ran out in the middle of it.
         failure: why it could not be committed.
         unknown: whether it may have been committed all the same.
     """
 
     __slots__ = (
-        "_limits",
         "_now",
-        "_number",
+        "_place",
         "_records",
-        "_refusal",
         "after",
+        "applied",
         "before",
         "failure",
         "name",
         "requests",
+        "torn",
         "unknown",
         "unsaved",
     )
+    _place: Place
 
-    def __init__(
-        self,
-        name: str,
-        hull: Hull | None,
-        requests: list[Request],
-        number: int,
-        refusal: Exception | None,
-        limits: Limits,
-        now: float,
-    ) -> None:
+    def __init__(self, name: str, hull: Hull | None, requests: list[Request], now: float, *, keeps: bool) -> None:
         self.name = name
         self.before = self.after = hull
         self.requests = requests
+        self.applied = self.torn = self.unknown = False
         self.unsaved = 0
         self.failure: Exception | None = None
-        self.unknown = False
-        self._number = number
-        self._refusal = refusal
-        self._limits = limits
         self._now = now
-        self._records: list[Record] = []
+        self._records: list[Record] | None = [] if keeps else None
+
+    def may_make(self, place: Place) -> None:
+        """There is no hull; the trip may make one."""
+        self._place = place
 
     def run(self) -> None:
         """Do what is requested; results and errors are put into the requests."""
@@ -77,32 +81,23 @@ class Trip:
                 request.error = error
                 if type(request) is WriteBatch and request.stream is not None:
                     request.stream.stopped = True
-                if self.torn:  # what comes after would run on a part of a batch
+                if self.after is not None and self.after.state.torn:
+                    self.torn = True  # what comes after would run on a part of a batch
                     return
 
     def changes(self) -> list[Change]:
         """What has to be kept."""
-        before, after = self.before, self.after
+        before, after, records = self.before, self.after, self._records
         if after is before:
-            return [Append(after.row.number, self._records)] if self._records and after is not None else []
+            return [Append(after.row.number, records)] if records and after is not None else []
         changes: list[Change] = []
         if after is not None:
             changes.append(Create(after.row))
-        if self._records and after is not None:
-            changes.append(Append(after.row.number, self._records))
+            if records:
+                changes.append(Append(after.row.number, records))
         if before is not None and after is None:
             changes.append(Delete(before.row.number))
         return changes
-
-    @property
-    def has_records(self) -> bool:
-        """Whether any batch was applied."""
-        return bool(self._records) or self.torn
-
-    @property
-    def torn(self) -> bool:
-        """Whether a batch was applied in part: memory ran out in the middle of it."""
-        return self.after is not None and self.after.state.torn
 
     def landed(self, found: HullState | None) -> bool:
         """Whether the trip is committed, given what the storage has of the hull: all changes are kept, or none."""
@@ -136,13 +131,13 @@ class Trip:
         hull = self.after
         if hull is None or (stream is not None and stream.hull is not hull):
             hull = self._hull_for(request)
-        request.result, record = hull.state.apply(request.write, self._now)
+        request.result = applied = hull.state.apply(request.write, self._now, self._records)
         self.after = hull
         if stream is not None:
             stream.hull = hull
-        if record is not None:
-            self._records.append(record)
-            self.unsaved += len(record.inserts) + len(record.deletes)
+        if not applied.duplicate:
+            self.applied = True
+            self.unsaved += applied.inserted + applied.deleted
 
     def _hull_for(self, request: WriteBatch) -> Hull:
         """The hull to write to, a new one where there is none."""
@@ -161,10 +156,10 @@ class Trip:
         return hull.state.counts, request.function(hull.state)
 
     def _new_hull(self, request: CreateHull | WriteBatch) -> Hull:
-        if self._refusal is not None:
-            raise self._refusal
-        birth = request.birth
-        assert birth is not None
+        place, birth = self._place, request.birth
+        if place.refusal is not None:
+            raise place.refusal
+        assert birth is not None  # or the request would have been refused
         most = request.max_points if type(request) is CreateHull else 0
-        row = HullRow(self._number, self.name, birth.uid, birth.created, most)
-        return Hull(row, HullState(self._limits, most, EMPTY, self._now))
+        row = HullRow(place.number, self.name, birth.uid, birth.created, most)
+        return Hull(row, HullState(place.limits, most, EMPTY, self._now))

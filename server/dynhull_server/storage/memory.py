@@ -36,13 +36,13 @@ class MemoryStorage:
     """Hulls in memory.
 
     Args:
-        forgets: keep the hulls' rows only, no batches: then nothing can be read back.
+        keeps: keep batches and snapshots; otherwise the hulls' rows only, and nothing can be read back.
     """
 
     immediate = True
 
-    def __init__(self, *, forgets: bool = False) -> None:
-        self._forgets = forgets
+    def __init__(self, *, keeps: bool = True) -> None:
+        self.keeps = keeps
         self._hulls: dict[int, _Hull] = {}
         self._next_number = 1
         self._turn = Lock()  # commits and reads may come from different threads
@@ -56,8 +56,7 @@ class MemoryStorage:
     def commit(self, changes: Sequence[Change | Step]) -> None:
         """Keep the changes."""
         with self._turn:
-            if not self._forgets:  # with nothing to compare, this would cost for nothing
-                self._examine(changes)
+            self._examine(changes)
             for change in changes:
                 self._carry_out(change)
 
@@ -72,7 +71,7 @@ class MemoryStorage:
     def read(self, number: int, until: int = NEWEST) -> Kept:
         """A hull as it was at a revision. DamagedError where its batches were not kept."""
         hull = self._hulls[number]
-        if self._forgets:
+        if not self.keeps:
             raise DamagedError(f"the batches of {hull.row.name} were not kept")
         if until < self.oldest(number):
             raise DamagedError(f"revision {until} of hull {hull.row.name!r} is not kept any more")
@@ -86,13 +85,13 @@ class MemoryStorage:
     def oldest(self, number: int) -> int:
         """The oldest revision that `read` can go back to."""
         hull = self._hulls[number]
-        if self._forgets:
+        if not self.keeps:
             return NEWEST
         return hull.snapshots[0].revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
 
     def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
         """One step."""
-        if not self._forgets:
+        if self.keeps:
             yield _Snapshot(number, revision, points, dict(producers))
 
     def sweep(self) -> Iterator[Step]:
@@ -142,8 +141,7 @@ class MemoryStorage:
     def _carry_out(self, change: Change | Step) -> None:
         match change:
             case Append():
-                if not self._forgets:
-                    self._append(change)
+                self._append(change)
             case Create():
                 self._hulls[change.row.number] = _Hull(change.row)
                 self._next_number = max(self._next_number, change.row.number + 1)

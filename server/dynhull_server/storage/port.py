@@ -69,9 +69,11 @@ class Storage(Protocol):
 
     Attributes:
         immediate: commits take no time, and cannot fail: they need no thread.
+        keeps: it keeps batches; otherwise it wants to see none.
     """
 
     immediate: bool
+    keeps: bool
 
     def open(self, progress: Progress) -> Contents:
         """Examine what is there, repair what can be, and take it up. Called once, before everything else.

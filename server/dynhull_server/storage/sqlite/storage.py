@@ -86,6 +86,7 @@ class SQLiteStorage:
     """
 
     immediate = False
+    keeps = True
 
     def __init__(self, path: Path, durability: Durability = Durability.SYNC, disk: Disk | None = None) -> None:
         self._folder = Folder(path, disk or Disk())
