@@ -284,7 +284,7 @@ class Core:
     def _end(self, queue: _Queue, trip: Trip, effects: list[Effect], moved: Hull | None) -> None:
         """The trip is over: tell its callers."""
         requests = trip.requests
-        if len(requests) > 1 or requests[0].abandoned:
+        if len(requests) != 1 or requests[0].abandoned:
             requests = [request for request in requests if not request.abandoned]
         effects.append(Told(requests, moved))
         self._over(queue, trip)
