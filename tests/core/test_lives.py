@@ -19,7 +19,9 @@ def test_random_lives():
 def test_a_fault_is_found_and_can_be_lived_again(monkeypatch):
     """A tree that forgets the lower chain's upkeep on deletes."""
     repair = HullTree._climb_removed
-    monkeypatch.setattr(HullTree, "_climb_removed", lambda tree, path, p, side: side == 1 or repair(tree, path, p, side))
+    monkeypatch.setattr(
+        HullTree, "_climb_removed", lambda tree, path, p, side: side == 1 or repair(tree, path, p, side)
+    )
     _, failure = lives.survive(range(60))
     assert failure.startswith("seed ")
     seed = int(failure.split()[1])

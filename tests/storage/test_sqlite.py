@@ -5,7 +5,6 @@ import sqlite3
 
 import numpy as np
 import pytest
-from dynhull_server.state.hull_state import replayed
 from folders import (
     DATABASE,
     FORMAT_1,
@@ -22,6 +21,7 @@ from folders import (
     stopped,
 )
 
+from dynhull_server.state.hull_state import replayed
 from dynhull_server.state.records import Append, Delete, HullRow
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
