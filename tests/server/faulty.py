@@ -17,7 +17,7 @@ from dynhull_server.engine import engine, supervisor
 from dynhull_server.storage.sqlite import storage
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
-FAULTS = Path(sys.argv[1])
+FAULTS = Path(sys.argv[1] if __name__ == "__main__" else ".")
 
 
 def fails(name: str, error: BaseException) -> None:

@@ -161,6 +161,31 @@ def test_a_writer_finds_out_and_goes_on(tmp_path: Path) -> None:
         assert set(client.count("a", points.reshape(-1, 2)).counts.tolist()) == {1}
 
 
+def test_nothing_is_acknowledged_into_a_folder_that_is_gone(tmp_path: Path) -> None:
+    with (
+        server_process("--data", str(tmp_path / "data"), complaints="moved or deleted under the server") as server,
+        HullClient(server.address, retries=0) as client,
+    ):
+        client.create_hull("a")
+        client.apply("a", insert=[[0, 0]])
+        (tmp_path / "data").rename(tmp_path / "away")
+        wait_until(lambda: not written(client))
+        with pytest.raises(UnavailableError, match="put it back"):
+            client.apply("a", insert=[[1, 1]])
+        kept = client.get_hull("a").info.revision
+        (tmp_path / "away").rename(tmp_path / "data")
+        wait_until(lambda: written(client))
+        assert client.get_hull("a").info.revision == kept + 1
+
+
+def written(client: HullClient) -> bool:
+    try:
+        client.apply("a", insert=[[2, 2]])
+    except UnavailableError:
+        return False
+    return True
+
+
 def test_without_descriptors_what_was_acknowledged_stays_and_all_goes_on_afterwards(tmp_path: Path) -> None:
     data = str(tmp_path / "data")
     points = np.random.default_rng(6).normal(size=(600, 5, 2))

@@ -38,6 +38,9 @@ class MemoryDisk(Disk):
             return None
         return self._keep.execute("PRAGMA page_count").fetchone()[0]
 
+    def identity(self, _):
+        return 0, 0
+
     def open(self, _):
         return io.BytesIO()
 

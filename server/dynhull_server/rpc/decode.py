@@ -24,7 +24,7 @@ LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
 NO_POINTS = np.empty((0, 2))
 MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
-LARGEST_SEQUENCE = 2**63 - 1
+LARGEST_INTEGER = 2**63 - 1
 
 
 class InvalidFieldError(Exception):
@@ -63,8 +63,8 @@ def decode_sequence(producer: str, sequence: int) -> int:
     """A number where there is a producer, 0 where there is none."""
     if not producer and sequence:
         raise InvalidFieldError("sequence", sequence, "only a producer numbers its batches")
-    if producer and not 1 <= sequence <= LARGEST_SEQUENCE:
-        raise InvalidFieldError("sequence", sequence, f"a producer numbers its batches from 1 to {LARGEST_SEQUENCE}")
+    if producer and not 1 <= sequence <= LARGEST_INTEGER:
+        raise InvalidFieldError("sequence", sequence, f"a producer numbers its batches from 1 to {LARGEST_INTEGER}")
     return sequence
 
 
@@ -72,6 +72,8 @@ def decode_max_points(config: hull_pb2.HullConfig) -> int:
     """The limit on the points of a hull to be; as yet there is one identity."""
     if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
         raise InvalidFieldError("config.identity", config.identity, "not an identity this server knows")
+    if config.max_points > LARGEST_INTEGER:
+        raise InvalidFieldError("config.max_points", config.max_points, f"must be at most {LARGEST_INTEGER}")
     return int(config.max_points)
 
 

@@ -408,7 +408,7 @@ class Core:
             return
         queue.ill = event.error
         if trip.unknown:
-            self._refuse_changes(trip, OutcomeUnknownError(str(event.error)), effects)
+            self._refuse_changes(trip, OutcomeUnknownError(str(event.error) or type(event.error).__name__), effects)
         reads = [request for request in trip.requests if not request.abandoned]
         trip.requests = []
         queue.waiting[:0] = reads
@@ -456,8 +456,10 @@ class Core:
 
 def _not_stored(error: Exception) -> NotStoredError:
     full = getattr(error, "full", False)
-    return DiskFullError(str(error)) if full else NotStoredError(str(error))
+    reason = str(error) or type(error).__name__
+    return DiskFullError(reason) if full else NotStoredError(reason)
 
 
 def _ill(error: Exception) -> NotStoredError:
-    return NotStoredError(f"the hull's last commit failed, and the disk cannot be read ({error}): try again later")
+    reason = str(error) or type(error).__name__
+    return NotStoredError(f"the hull's last commit failed, and it cannot be read again yet ({reason}): try again later")

@@ -46,7 +46,7 @@ class LimitExceededError(RefusedError):
     """
 
     def __init__(self, limit: str, maximum: float) -> None:
-        super().__init__(f"the server's limit {limit} is {maximum}")
+        super().__init__(f"the limit {limit} is {maximum}")
         self.limit = limit
         self.maximum = maximum
 

@@ -44,6 +44,14 @@ class Disk:
         except FileNotFoundError:
             return None
 
+    def identity(self, file: Path) -> tuple[int, int] | None:
+        """What tells a file from another one that is put in its place, None where there is none."""
+        try:
+            stat = file.stat()
+        except FileNotFoundError:
+            return None
+        return stat.st_dev, stat.st_ino
+
     def open(self, file: Path) -> IO[bytes]:
         """A file to read, or to `sync`."""
         return file.open("rb")

@@ -97,6 +97,7 @@ class SQLiteStorage:
         self._writer: sqlite3.Connection | None = None
         self._housekeeping = Lock()
         self._log_in_doubt = False
+        self._gone: Path | None = None
         self._under_way: dict[int, set[int]] = {}  # chunks of snapshots that are being written
         self._open = ExitStack()
 
@@ -118,6 +119,9 @@ class SQLiteStorage:
                 self._begin_log_anew(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
                 self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
+                self._files = {
+                    file: self._folder.disk.identity(file) for file in (self._folder.database, self._folder.log)
+                }
             except sqlite3.OperationalError as error:
                 raise StorageError(f"{self._folder.database} cannot be opened: {error}") from error
             except sqlite3.Error as error:
@@ -145,7 +149,15 @@ class SQLiteStorage:
         """Keep all of the changes or none."""
         if self._unsettled:
             raise StorageError("the outcome of the commit before is not known yet")
-        self._write(Group(self._ledger, changes))  # type: ignore[arg-type]  # steps are ours
+        if self._gone is not None:
+            raise NotCommittedError(_gone(self._gone))
+        try:
+            group = Group(self._ledger, changes)  # type: ignore[arg-type]  # steps are ours
+        except NotCommittedError:
+            raise
+        except Exception as error:  # a value that has no place in a row, or no memory
+            raise NotCommittedError(f"nothing was written: {error or type(error).__name__}") from error
+        self._write(group)
 
     @_in_words()
     def settle(self) -> None:
@@ -318,9 +330,14 @@ class SQLiteStorage:
     def checkpoint(self) -> None:
         """Copy the log into the database beside commits, when it is long, then begin it anew.
 
-        One that grows makes every commit wait where the file system writes its own journal.
+        One that grows makes every commit wait where the file system writes its own journal. While one of the files has
+        been moved or deleted, nothing is committed: what was written would be lost.
         """
-        if (self._folder.disk.size(self._folder.log) or 0) > CHECKPOINT_BYTES:
+        disk = self._folder.disk
+        self._gone = next((file for file, identity in self._files.items() if disk.identity(file) != identity), None)
+        if self._gone is not None:
+            raise StorageError(_gone(self._gone))
+        if (disk.size(self._folder.log) or 0) > CHECKPOINT_BYTES:
             with self._housekeeping:
                 for mode in ("PASSIVE", "RESTART"):  # for the second, little is left to copy
                     self._copy_log(mode)
@@ -426,6 +443,10 @@ class SQLiteStorage:
 
 
 def _not_committed(error: BaseException) -> NotCommittedError:
-    if getattr(error, "sqlite_errorcode", None) in NOTHING_WRITTEN:
+    if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
         return NotCommittedError("the disk is full: make room, and writes are taken again", full=True)
     return NotCommittedError(f"nothing was written: {str(error) or type(error).__name__}")
+
+
+def _gone(file: Path) -> str:
+    return f"{file} was moved or deleted under the server: put it back, or restart the server"
