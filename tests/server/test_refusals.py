@@ -45,6 +45,13 @@ INVALID_REQUESTS = {
         None,
         "77",
     ),
+    "more points than can be counted": (
+        "CreateHull",
+        lambda hull: pb.CreateHullRequest(name=hull, config=hull_pb2.HullConfig(max_points=2**63)),
+        "config.max_points",
+        None,
+        str(2**63),
+    ),
     "a prefix no name has": ("ListHulls", lambda _: pb.ListHullsRequest(prefix="%"), "prefix", None, "%"),
     "a negative page": ("ListHulls", lambda _: pb.ListHullsRequest(page_size=-1), "page_size", None, "-1"),
     "a token of another prefix": (
