@@ -80,29 +80,30 @@ class HullService:
     async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
         call.batches = 0
         summary = pb.IngestResponse()
-        streamed = await self._batches(call)
-        if self._engine.has(streamed.name):
-            counts = self._engine.get(streamed.name).counts
-            summary.revision, summary.point_count = counts.revision, counts.points
-        async with aclosing(streamed.applied()) as batches:
-            async for _, applied in batches:
-                call.batches += 1
-                summary.duplicates += applied.duplicate
-                summary.inserted += applied.inserted
-                summary.deleted += applied.deleted
-                summary.missing += applied.missing
-                summary.revision, summary.point_count = applied.revision, applied.points
+        with await self._batches(call) as streamed:
+            if self._engine.has(streamed.name):
+                counts = self._engine.get(streamed.name).counts
+                summary.revision, summary.point_count = counts.revision, counts.points
+            while await streamed.more():
+                for _, applied in streamed.applied():
+                    call.batches += 1
+                    summary.duplicates += applied.duplicate
+                    summary.inserted += applied.inserted
+                    summary.deleted += applied.deleted
+                    summary.missing += applied.missing
+                    summary.revision, summary.point_count = applied.revision, applied.points
         summary.batches = call.batches - summary.duplicates
         return summary
 
     async def Stream(self, _: object, call: Call) -> None:
         call.batches = 0
-        async with aclosing((await self._batches(call)).applied()) as batches:
-            async for sequence, applied in batches:
-                call.batches += 1
-                response = pb.StreamResponse(sequence=sequence)
-                encode.encode_applied(applied, response.result)
-                await call.write(response)
+        with await self._batches(call) as streamed:
+            while await streamed.more():
+                for sequence, applied in streamed.applied():
+                    call.batches += 1
+                    response = pb.StreamResponse(sequence=sequence)
+                    encode.encode_applied(applied, response.result)
+                    await call.write(response)
 
     async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
         name = decode.decode_name(request.name)

@@ -3,8 +3,8 @@
 import asyncio
 import time
 from collections import deque
-from collections.abc import AsyncGenerator
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, Self
 
 from ..engine.engine import Engine
 from ..state.batch import Applied
@@ -33,6 +33,8 @@ def decode_write(request: Any, message_bytes: int, producer: str, owner: str) ->
 class StreamedBatches:
     """The batches of a call to one hull: one task reads and applies them, its caller tells what they did.
 
+    A context manager: it reads inside, and batches that have not begun when it ends are not applied.
+
     Args:
         call: the call.
         first: its first message, which names the hull and may name a producer.
@@ -60,33 +62,41 @@ class StreamedBatches:
         self._failure: Exception | None = None
         self._take(first)
 
-    async def applied(self) -> AsyncGenerator[tuple[int, Applied], None]:
-        """The sequence number of each batch, and what it did.
+    def __enter__(self) -> Self:
+        self._reading = asyncio.create_task(self._read())
+        self._reading.add_done_callback(lambda _: self._notify())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._reading.cancel()
+        self._batches.close()
+
+    async def more(self) -> bool:
+        """Wait until batches have been applied, to be taken with `applied`; False after the last.
 
         What refuses a batch is raised after the ones before it, DrainingError after those that are under way.
         """
         batches = self._batches
-        reading = asyncio.create_task(self._read())
-        reading.add_done_callback(lambda _: self._notify())
-        try:
-            while True:
-                while batches.applied:
-                    sequence, applied = batches.applied.popleft()
-                    self._room.set()
-                    self._metrics.batches.applied(applied, time.perf_counter() - self._arrivals.popleft())
-                    yield sequence, applied
-                if batches.refusal is not None:
-                    self._metrics.batches.refused()
-                    raise batches.refusal.with_traceback(None)
-                if reading.done() and not batches.batches:
-                    if self._failure is not None:
-                        raise self._failure
-                    return
-                self._news = asyncio.get_running_loop().create_future()
-                await self._news
-        finally:
-            reading.cancel()
-            batches.close()
+        while not batches.applied:
+            if batches.refusal is not None:
+                self._metrics.batches.refused()
+                raise batches.refusal.with_traceback(None)
+            if self._reading.done() and not batches.batches:
+                if self._failure is not None:
+                    raise self._failure
+                return False
+            self._news = asyncio.get_running_loop().create_future()
+            await self._news
+        return True
+
+    def applied(self) -> Iterator[tuple[int, Applied]]:
+        """The sequence number of each batch that has been applied, and what it did."""
+        applied = self._batches.applied
+        while applied:
+            sequence, outcome = applied.popleft()
+            self._room.set()
+            self._metrics.batches.applied(outcome, time.perf_counter() - self._arrivals.popleft())
+            yield sequence, outcome
 
     def _notify(self) -> None:
         if self._news is not None and not self._news.done():
