@@ -172,7 +172,7 @@ def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
 @needs_proc
 def test_a_large_answer_is_given_up_when_its_caller_goes() -> None:
     """What it costs after that is less than an answer about a tenth as many entries."""
-    entries = np.random.default_rng(12).uniform(0, 1, (500_000, 2))
+    entries = np.random.default_rng(12).uniform(0, 1, (300_000, 2))
 
     def diagram(count: int) -> grpc.Future:
         packed = entries[:count].tobytes()
