@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from itertools import repeat
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import pytest
 from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
+from processor import wait_for_rest
 from server_process import PATIENCE, run, server_process
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -121,18 +121,6 @@ def test_what_a_writer_that_has_gone_left_behind_does_not_hold_up_the_end() -> N
         for channel in channels:
             channel.close()
         server.process.terminate()  # in peace, and without a word
-
-
-def wait_for_rest(pid: int) -> None:
-    """Until the process has used no processor time for a while."""
-
-    def used() -> list[str]:
-        return Path(f"/proc/{pid}/stat").read_text().split()[13:15]
-
-    before = None
-    while (now := used()) != before:
-        before = now
-        time.sleep(0.3)
 
 
 def test_a_signal_that_another_thread_gets_ends_the_server() -> None:

@@ -6,7 +6,10 @@ from concurrent.futures import ThreadPoolExecutor
 import grpc
 import numpy as np
 import pytest
+from patience import wait_until
+from processor import needs_proc, processor_time, wait_for_rest
 from refusal import refusal
+from server_process import server_process
 
 from dynhull import DynamicHull
 from dynhull_client import HullClient, HullEmptyError
@@ -164,3 +167,28 @@ def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
         assert written >= 5
         expected = DynamicHull(np.column_stack((np.cos(angles), np.sin(angles)))).distance(rows)
         np.testing.assert_array_equal(reading.result().distances, expected)
+
+
+@needs_proc
+def test_a_large_answer_is_given_up_when_its_caller_goes() -> None:
+    """What it costs after that is less than an answer about a tenth as many entries."""
+    entries = np.random.default_rng(12).uniform(0, 1, (300_000, 2))
+
+    def diagram(count: int) -> grpc.Future:
+        packed = entries[:count].tobytes()
+        return stub.PhaseDiagram.future(pb.PhaseDiagramRequest(name="a", entries=points_pb2.Points(packed=packed)))
+
+    with server_process() as server, grpc.insecure_channel(server.address) as channel:
+        stub, pid = HullServiceStub(channel), server.process.pid
+        stub.CreateHull(pb.CreateHullRequest(name="a"))
+        stub.Apply(pb.ApplyRequest(name="a", batch={"inserts": {"coordinates": [0, 0, 0.5, -1, 1, 0]}}))
+        begun = processor_time(pid)
+        diagram(len(entries) // 10).result()
+        tenth = processor_time(pid) - begun
+        begun = processor_time(pid)
+        call = diagram(len(entries))
+        wait_until(lambda: processor_time(pid) > begun + tenth)
+        assert call.cancel()
+        gone = processor_time(pid)
+        wait_for_rest(pid)
+        assert processor_time(pid) - gone < tenth

@@ -29,7 +29,7 @@ def test_a_change_makes_the_new_hull_of_the_old(old: list[tuple[float, float]], 
     event = EngineChange(COUNTS, before, after, difference(before, after))
     copy = HullCopy()
     copy.update(Snapshot(1, 0, before, None))
-    copy.update(decode_event(encode_event(event, points_pb2.POINT_ENCODING_PACKED, False)))
+    copy.update(decode_event(encode_event(event, points_pb2.POINT_ENCODING_PACKED)))
     assert copy.vertices.tolist() == after.tolist()
     assert copy.revision == 2
 

@@ -2,15 +2,15 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points
+
+from .steps import Run
 
 # Lists of so many vertices together are compared at once, on the event loop.
 FEW = 256
@@ -38,7 +38,7 @@ class Differences:
         run: calls a function in a thread.
     """
 
-    def __init__(self, run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
+    def __init__(self, run: Run) -> None:
         self._run = run
         self._recent: OrderedDict[tuple[int, int], tuple[Points, Points, asyncio.Future[Difference]]] = OrderedDict()
 

@@ -94,7 +94,7 @@ class Engine:
         """
         self._loop = asyncio.get_running_loop()
         clock, threads = self._machine.clock, self._machine.threads
-        self._turns, self.reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
+        self._turns, self._reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
         self.disk = threads.pool("disk", DISK_THREADS)
         contents: Contents = await self.run(self.disk, partial(self._storage.open, progress))
         self._core = Core(
@@ -151,7 +151,7 @@ class Engine:
 
     def _join(self) -> None:
         self._commits.close()
-        for pool in (self._turns, self.reads, self.disk):
+        for pool in (self._turns, self._reads, self.disk):
             pool.shutdown()
         self._storage.close()
 
@@ -256,6 +256,10 @@ class Engine:
     async def run(self, pool: Pool, function: Callable[[], Any]) -> Any:
         """What a function returns, called in a pool. A caller that is cancelled stops waiting; the function runs on."""
         return await asyncio.wrap_future(pool.submit(function))
+
+    async def aside(self, function: Callable[[], Any]) -> Any:
+        """What a step of a large read returns, called beside the turns of the hulls."""
+        return await self.run(self._reads, function)
 
     def commit(self, changes: list[Any]) -> "asyncio.Future[None]":
         """Commit steps of a snapshot or sweep among the batches of everybody; the future has what failed."""

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from ..state.hull_state import Counts, HullState
 from ..state.sample import sample
 from .difference import Differences
 from .recalls import Recalls
+from .steps import BLOCK, in_blocks
 from .verification import Verification, verify
 from .waiter import Waiter
 
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
     from .engine import Engine
 
 T = TypeVar("T")
-
-# A question about more points than these is answered beside the hull's turn, this many at a time: a read holds up the
-# writes behind it for some milliseconds, and a caller that has gone costs no more than one block.
-BLOCK = 8192
 
 
 class LiveHull:
@@ -42,7 +39,7 @@ class LiveHull:
     """
 
     def __init__(self, engine: "Engine", hull: Hull, recalls: Recalls) -> None:
-        self.differences = Differences(partial(engine.run, engine.reads))
+        self.differences = Differences(engine.aside)
         self._engine = engine
         self._hull = hull
         self._recalls = recalls
@@ -121,19 +118,19 @@ class LiveHull:
         Returns:
             The counts of the one revision that was asked, and an array of the answers.
         """
-        if rows <= BLOCK:
+        if rows <= BLOCK:  # these hold up the writes behind them for some milliseconds
             return await self.read(lambda state: question(state.hull, slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision)
         outline = await self._hull_of(vertices)
-        return counts, await self._in_blocks(partial(question, outline), rows)
+        return counts, await in_blocks(self._engine.aside, partial(question, outline), rows)
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
         """How many times each of some points is there."""
         if len(xy) <= BLOCK:
             return await self.read(lambda state: state.hull.count_many(xy), len(xy), min_revision)
         counts, stored = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
-        hull: DynamicHull = await self._engine.run(self._engine.reads, partial(DynamicHull, stored))
-        return counts, await self._in_blocks(lambda rows: hull.count_many(xy[rows]), len(xy))
+        hull: DynamicHull = await self._engine.aside(partial(DynamicHull, stored))
+        return counts, await in_blocks(self._engine.aside, lambda rows: hull.count_many(xy[rows]), len(xy))
 
     async def support(self, directions: Checked, min_revision: int = 0) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
@@ -150,14 +147,14 @@ class LiveHull:
         counts, (points, vertices) = await self.read(
             lambda state: (state.hull.points(), state.vertices()), self.counts.points, min_revision
         )
-        return counts, await verify(points, vertices, partial(self._engine.run, self._engine.reads))
+        return counts, await verify(points, vertices, self._engine.aside)
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
         """At most `size` of the points. Writes go on while they are chosen."""
         counts, points = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
         if len(points) <= size:
             return counts, points
-        return counts, await self._engine.run(self._engine.reads, partial(sample, points, size))
+        return counts, await self._engine.aside(partial(sample, points, size))
 
     async def last_sequence(self, producer: str) -> int:
         """The last number of a producer that was applied, 0 where there is none."""
@@ -207,14 +204,7 @@ class LiveHull:
     async def _hull_of(self, vertices: Points) -> DynamicHull:
         """A hull of its own with these vertices: several large reads of one revision share it."""
         if self._outline is None or self._outline[0] is not vertices:
-            made: DynamicHull = await self._engine.run(self._engine.reads, partial(DynamicHull, vertices))
+            made: DynamicHull = await self._engine.aside(partial(DynamicHull, vertices))
             self._outline = vertices, made
             return made
         return self._outline[1]
-
-    async def _in_blocks(self, question: Callable[[slice], Any], rows: int) -> Any:
-        answers = [
-            await self._engine.run(self._engine.reads, partial(question, slice(first, min(first + BLOCK, rows))))
-            for first in range(0, rows, BLOCK)
-        ]
-        return np.concatenate(answers)

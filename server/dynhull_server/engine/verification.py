@@ -4,10 +4,8 @@ import asyncio
 import json
 import sys
 import time
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +15,7 @@ from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
 from . import chan_process
+from .steps import Run
 
 # So many points take a thread a third of a second, about as long as a process takes to start.
 LARGE = 20_000
@@ -45,7 +44,7 @@ class Verification:
     seconds: float
 
 
-async def verify(points: Points, vertices: Points, run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> Verification:
+async def verify(points: Points, vertices: Points, run: Run) -> Verification:
     """Compare `vertices`, a live hull's, with the hull of `points` computed anew, in a thread: `run` calls it there."""
     if KERNEL == "cpp" or len(points) < LARGE:  # the kernel leaves the interpreter to others
         recomputed, rounds, seconds = await run(partial(_recompute, points))

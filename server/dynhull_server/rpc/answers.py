@@ -1,10 +1,10 @@
-"""What hulls are for, worked out from their vertices: long work for large hulls."""
+"""What hulls are for, worked out from their vertices: long work for large hulls, in steps."""
 
-import asyncio
-from collections.abc import Callable, Sequence
-from typing import TypeVar
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import DynamicHull, measure
 from dynhull.arrays import Points
@@ -13,31 +13,23 @@ from dynhull.margin import max_margin
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
+from ..engine.steps import BLOCK, Run, in_blocks
 from ..state.hull_state import Counts
 from .encode import encode_measures, encode_points
 
-Answer = TypeVar("Answer")
 Encoding = points_pb2.PointEncoding
 
-# With so few the trip to another thread would be a good part of the time.
-FEW_ROWS = 16
 
-
-async def aside(answer: Callable[[], Answer], rows: int) -> Answer:
-    """What a function that looks at so many rows returns: called in another thread unless they are few."""
-    return answer() if rows <= FEW_ROWS else await asyncio.to_thread(answer)
-
-
-def measures(counts: Counts, vertices: Points, encoding: Encoding) -> pb.GetMeasuresResponse:
+async def measures(counts: Counts, vertices: Points, encoding: Encoding, run: Run) -> pb.GetMeasuresResponse:
     """All measures of a hull."""
-    (x, y), radius = measure.min_circle(vertices)
+    (x, y), radius = await run(partial(measure.min_circle, vertices))
     return pb.GetMeasuresResponse(
         revision=counts.revision,
-        measures=encode_measures(vertices),
-        diameter=measure.diameter(vertices),
-        width=measure.width(vertices),
-        min_box=encode_points(measure.min_box(vertices), encoding),
-        min_perimeter_box=encode_points(measure.min_perimeter_box(vertices), encoding),
+        measures=await encode_measures(vertices, run),
+        diameter=await run(partial(measure.diameter, vertices)),
+        width=await run(partial(measure.width, vertices)),
+        min_box=encode_points(await run(partial(measure.min_box, vertices)), encoding),
+        min_perimeter_box=encode_points(await run(partial(measure.min_perimeter_box, vertices)), encoding),
         min_circle_x=x,
         min_circle_y=y,
         min_circle_radius=radius,
@@ -64,34 +56,63 @@ def separation(
     )
 
 
-def phase_diagram(counts: Counts, vertices: Points, entries: Points, encoding: Encoding) -> pb.PhaseDiagramResponse:
+async def phase_diagram(
+    counts: Counts, vertices: Points, entries: Points, encoding: Encoding, run: Run
+) -> pb.PhaseDiagramResponse:
     """The phase diagram of entries that are compositions and energies, and what it says of others."""
-    diagram = PhaseDiagram(vertices)
-    found = diagram.decompose(entries[:, 0])
-    return pb.PhaseDiagramResponse(
-        revision=counts.revision,
-        stable=encode_points(diagram.stable(), encoding),
-        energies_above_hull=diagram.energy_above_hull(entries),
-        left=encode_points(found.phases[:, 0], encoding),
-        right=encode_points(found.phases[:, 1], encoding),
-        left_shares=found.shares[:, 0],
-        right_shares=found.shares[:, 1],
+    diagram: PhaseDiagram = await run(partial(PhaseDiagram, vertices))
+    stable = await run(diagram.stable)
+
+    def decomposed(rows: slice) -> npt.NDArray[np.float64]:
+        """(k, 2, 3) the phases to the left and right, each with its share."""
+        found = diagram.decompose(entries[rows, 0])
+        return np.concatenate((found.phases, found.shares[:, :, np.newaxis]), axis=2)
+
+    parts = await in_blocks(run, decomposed, len(entries))
+    energies = await in_blocks(run, lambda rows: diagram.energy_above_hull(entries[rows]), len(entries))
+    response: pb.PhaseDiagramResponse = await run(
+        lambda: pb.PhaseDiagramResponse(
+            revision=counts.revision,
+            stable=encode_points(stable, encoding),
+            energies_above_hull=energies,
+            left=encode_points(parts[:, 0, :2], encoding),
+            right=encode_points(parts[:, 1, :2], encoding),
+            left_shares=parts[:, 0, 2],
+            right_shares=parts[:, 1, 2],
+        )
     )
+    return response
 
 
-def frontier(
-    counts: Counts, vertices: Points, points: Points, rates: Sequence[float], encoding: Encoding
+async def frontier(
+    counts: Counts, vertices: Points, points: Points, rates: Sequence[float], encoding: Encoding, run: Run
 ) -> pb.FrontierResponse:
     """The efficient frontier of risks and returns, and what it says of others. Without vertices, there are no rates."""
-    offers = Frontier(vertices)
-    efficient = offers.efficient()
-    turns = Frontier(efficient).tangencies()  # those beyond the greatest return left out
-    tangencies = np.array([offers.tangency(rate) for rate in rates]).reshape(-1, 2)
-    return pb.FrontierResponse(
-        revision=counts.revision,
-        efficient=encode_points(efficient, encoding),
-        turning_rates=turns.rates,
-        dominated=offers.dominated(points),
-        tangencies=encode_points(tangencies, encoding),
-        sharpe_ratios=[offers.sharpe_ratio(rate) for rate in rates],
+    offers: Frontier = await run(partial(Frontier, vertices))
+    efficient: Points = await run(offers.efficient)
+
+    def turns(rows: slice) -> npt.NDArray[np.float64]:
+        """The rates at which the tangency leaves these corners: none for those beyond the greatest return."""
+        return Frontier(efficient[rows.start : rows.stop + 1]).tangencies().rates
+
+    def tangencies(rows: slice) -> Points:
+        return np.array([offers.tangency(rate) for rate in rates[rows]]).reshape(-1, 2)
+
+    def ratios(rows: slice) -> npt.NDArray[np.float64]:
+        return np.array([offers.sharpe_ratio(rate) for rate in rates[rows]])
+
+    turning_rates = await in_blocks(run, turns, max(len(efficient) - 1, 0))
+    block = max(BLOCK, len(efficient))  # for each the whole frontier is read
+    dominated = await in_blocks(run, lambda rows: offers.dominated(points[rows]), len(points), block)
+    touched, sharpe_ratios = [await in_blocks(run, each, len(rates)) for each in (tangencies, ratios)]
+    response: pb.FrontierResponse = await run(
+        lambda: pb.FrontierResponse(
+            revision=counts.revision,
+            efficient=encode_points(efficient, encoding),
+            turning_rates=turning_rates,
+            dominated=dominated,
+            tangencies=encode_points(touched, encoding),
+            sharpe_ratios=sharpe_ratios,
+        )
     )
+    return response

@@ -1,6 +1,6 @@
 """Values to messages."""
 
-import asyncio
+from functools import partial
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from dynhull.arrays import Points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.live_hull import LiveHull
+from ..engine.steps import Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
@@ -36,13 +37,13 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     return message
 
 
-def encode_measures(vertices: Points) -> hull_pb2.Measures:
-    """The measures of the hull with these vertices."""
-    x, y = measure.centroid(vertices)
-    min_x, min_y, max_x, max_y = measure.bounds(vertices)
+async def encode_measures(vertices: Points, run: Run) -> hull_pb2.Measures:
+    """The measures of the hull with these vertices, a step each."""
+    x, y = await run(partial(measure.centroid, vertices))
+    min_x, min_y, max_x, max_y = await run(partial(measure.bounds, vertices))
     return hull_pb2.Measures(
-        area=measure.area(vertices),
-        perimeter=measure.perimeter(vertices),
+        area=await run(partial(measure.area, vertices)),
+        perimeter=await run(partial(measure.perimeter, vertices)),
         centroid_x=x,
         centroid_y=y,
         min_x=min_x,
@@ -63,8 +64,8 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
     result.duplicate = applied.duplicate
 
 
-def encode_event(event: Event, encoding: points_pb2.PointEncoding, measures: bool) -> hull_service_pb2.WatchResponse:
-    """What a watcher is told."""
+def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_service_pb2.WatchResponse:
+    """What a watcher is told, but for measures."""
     message = hull_service_pb2.WatchResponse(revision=event.counts.revision, point_count=event.counts.points)
     match event:
         case Snapshot():
@@ -79,21 +80,21 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding, measures: boo
             message.change.rotation = event.difference.rotation
         case Progress():
             message.progress.SetInParent()
-            return message
         case _:
             message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
-    if measures and event.vertices is not None:
-        message.measures.CopyFrom(encode_measures(event.vertices))
     return message
 
 
-async def encode_event_aside(
-    event: Event, encoding: points_pb2.PointEncoding, measures: bool
+async def encode_measured_event(
+    event: Event, encoding: points_pb2.PointEncoding, run: Run
 ) -> hull_service_pb2.WatchResponse:
-    """`encode_event`, in another thread where it takes long."""
-    if isinstance(event, Progress) or not measures:
-        return encode_event(event, encoding, measures)
-    return await asyncio.to_thread(encode_event, event, encoding, measures)
+    """What a watcher is told, with the measures of the hull where the event has its vertices."""
+    if isinstance(event, Progress):
+        return encode_event(event, encoding)
+    message: hull_service_pb2.WatchResponse = await run(partial(encode_event, event, encoding))
+    if event.vertices is not None:
+        message.measures.CopyFrom(await encode_measures(event.vertices, run))
+    return message
 
 
 def encode_verification(

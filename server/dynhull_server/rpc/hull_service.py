@@ -1,6 +1,5 @@
 """HullService: what dynhull.v1 promises, a method an RPC. The contract documents the methods."""
 
-import asyncio
 import time
 from contextlib import aclosing
 
@@ -11,6 +10,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ..engine.engine import Engine
 from ..engine.live_hull import LiveHull
+from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..state.errors import HullEmptyError
@@ -176,7 +176,7 @@ class HullService:
             await hull.reached(request.min_revision)
             return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
         counts, vertices = await hull.vertices(request.min_revision)
-        measures = await asyncio.to_thread(encode.encode_measures, vertices)
+        measures = await encode.encode_measures(vertices, self._run(len(vertices)))
         return pb.GetHullResponse(
             hull=encode.encode_hull(hull, counts),
             vertices=encode.encode_points(vertices, encoding),
@@ -187,7 +187,7 @@ class HullService:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         counts, vertices = await hull.vertices(request.min_revision)
-        return await asyncio.to_thread(answers.measures, counts, vertices, encoding)
+        return await answers.measures(counts, vertices, encoding, self._run(len(vertices)))
 
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
@@ -201,7 +201,10 @@ class HullService:
         for each, (_, vertices) in found.items():
             if not len(vertices):
                 raise HullEmptyError(each.name)
-        return await asyncio.to_thread(answers.separation, *found[hull], *found[other], encoding)
+        response: pb.SeparateResponse = await self._engine.aside(
+            lambda: answers.separation(*found[hull], *found[other], encoding)
+        )
+        return response
 
     async def PhaseDiagram(self, request: pb.PhaseDiagramRequest, call: Call) -> pb.PhaseDiagramResponse:
         hull = self._read(call, request.name)
@@ -210,7 +213,7 @@ class HullService:
         counts, vertices = await hull.vertices(request.min_revision)
         ENTRIES.require(hull.name, vertices)
         rows = len(vertices) + len(entries)
-        return await answers.aside(lambda: answers.phase_diagram(counts, vertices, entries, encoding), rows)
+        return await answers.phase_diagram(counts, vertices, entries, encoding, self._run(rows))
 
     async def Frontier(self, request: pb.FrontierRequest, call: Call) -> pb.FrontierResponse:
         hull = self._read(call, request.name)
@@ -222,7 +225,7 @@ class HullService:
         if rates and not len(vertices):
             raise HullEmptyError(hull.name)
         rows = len(vertices) + len(points) + len(rates)
-        return await answers.aside(lambda: answers.frontier(counts, vertices, points, rates, encoding), rows)
+        return await answers.frontier(counts, vertices, points, rates, encoding, self._run(rows))
 
     async def Verify(self, request: pb.VerifyRequest, call: Call) -> pb.VerifyResponse:
         hull = self._read(call, request.name)
@@ -266,9 +269,16 @@ class HullService:
                 while True:
                     with call.cutoff():
                         event = await anext(events)
-                        message = await encode.encode_event_aside(event, encoding, request.include_measures)
+                        if request.include_measures:
+                            message = await encode.encode_measured_event(event, encoding, self._engine.aside)
+                        else:
+                            message = encode.encode_event(event, encoding)
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
+
+    def _run(self, rows: int) -> Run:
+        """Where the steps of an answer that looks at so many rows are called."""
+        return at_once if rows <= FEW_ROWS else self._engine.aside
 
     # Names
 
