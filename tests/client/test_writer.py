@@ -135,12 +135,12 @@ def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: t
                 acknowledged(writer, 300)
                 first.process.kill()
                 assert writer.sequence < 2000
-                second = stack.enter_context(server_process(*data, killed=True))
+                second = stack.enter_context(server_process(*data, killed=True, torn=True))
                 way.server = second.address
                 acknowledged(writer, 1000)
                 second.process.kill()
                 assert writer.sequence < 2000
-                way.server = stack.enter_context(server_process(*data)).address
+                way.server = stack.enter_context(server_process(*data, torn=True)).address
             hull = client.get_hull("a")
             assert (hull.revision, writer.sequence, hull.info.points) == (2000, 2000, 10_000)
             assert hull.vertices.tolist() == DynamicHull(MANY.reshape(-1, 2)).vertices().tolist()
