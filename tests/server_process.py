@@ -33,8 +33,8 @@ def server_process(
     """`dynhull serve` on a free port, in memory unless the options name a folder.
 
     It must end with `code`, unless it was `killed`, and have nothing to complain about but what is expected. Its log is
-    of warnings and worse, unless the options say otherwise. With `torn`, the server before it was killed while it wrote: it
-    may say that it dropped the commit that was under way.
+    of warnings and worse, unless the options say otherwise. With `torn`, the server before it was killed while it
+    wrote: it may say that it dropped the commit that was under way.
     """
     memory = [] if "--data" in options else ["--in-memory"]
     command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *memory, *options]
