@@ -88,13 +88,13 @@ async def large_reads(address: str, other: str) -> None:
             row(f"{work}, given up after 0.3 s", *await waits(writer, "round", given_up))
 
 
-async def resuming(address: str) -> None:
+async def resuming(address: str, what: str, points: np.ndarray) -> None:
     async with grpc.aio.insecure_channel(address, options=UNLIMITED) as channel:
         stub = HullServiceStub(channel)
         for name in ("large", "small"):
             await stub.CreateHull(pb.CreateHullRequest(name=name))
         size = RESUMED // BATCHES
-        for block in on_circle(RESUMED).reshape(BATCHES, size, 2):
+        for block in points.reshape(BATCHES, size, 2):
             newest = await apply(stub, "large", block)
         uid = (await stub.GetHull(pb.GetHullRequest(name="large", view=pb.HULL_VIEW_BASIC))).hull.uid
 
@@ -107,7 +107,7 @@ async def resuming(address: str) -> None:
         async def all_resume() -> None:
             await asyncio.gather(*(resume(i) for i in range(WATCHERS)))
 
-        row(f"{WATCHERS} watchers of {RESUMED:,} points resume", *await waits(stub, "small", all_resume))
+        row(f"{WATCHERS} watchers of {RESUMED:,} {what} resume", *await waits(stub, "small", all_resume))
 
 
 def main() -> None:
@@ -115,11 +115,15 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path(), help="where to put the data (default: here)")
     options = parser.parse_args()
     print("| beside | writes | median ms | longest ms | all took ms |\n|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory(dir=options.folder) as data:
-        with server.running([*OPTIONS, "--in-memory"]) as address:
-            asyncio.run(large_reads(address, address))
-        with server.running([*OPTIONS, "--data", data]) as address:
-            asyncio.run(resuming(address))
+    with server.running([*OPTIONS, "--in-memory"]) as address:
+        asyncio.run(large_reads(address, address))
+    clouds = {"points": np.random.default_rng(5).normal(size=(RESUMED, 2)), "vertices": on_circle(RESUMED)}
+    for what, points in clouds.items():
+        with (
+            tempfile.TemporaryDirectory(dir=options.folder) as data,
+            server.running([*OPTIONS, "--data", data]) as address,
+        ):
+            asyncio.run(resuming(address, what, points))
 
 
 if __name__ == "__main__":
