@@ -1,7 +1,6 @@
 """Drives the core: hands in requests and what became of effects, one at a time, and carries the effects out."""
 
 import asyncio
-import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -55,8 +54,6 @@ TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
 TICK = 1.0
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises nothing.
 STUCK = 10.0
-
-log = logging.getLogger(__name__)
 
 
 class Engine:
@@ -326,8 +323,10 @@ class Engine:
             return
 
         def settled(error: Exception | None, _: bool) -> None:
-            event = None if error is None else NotExamined(effect.ticket, error)
-            self._from_thread(partial(self._read_for, effect) if event is None else partial(self.dispatch, event))
+            if error is None:
+                self._from_thread(partial(self._read_for, effect))
+            else:
+                self._from_thread(partial(self.dispatch, NotExamined(effect.ticket, error)))
 
         self._commits.settle(settled)
 
@@ -354,7 +353,7 @@ class Engine:
     def _commit_reported(self, error: BaseException | None) -> None:
         if error is None:
             self._supervisor.succeeded("commits")
-            if not any(True for _ in self._core.ill):
+            if self._supervisor.fails("examination") and not self._core.ill:  # which looks at every hull
                 self._supervisor.succeeded("examination")
         else:
             self._supervisor.failed("commits", error)

@@ -10,7 +10,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from ..state.errors import RefusedError, StoppingError
+from ..state.errors import RefusedError, StoppingError, words
 from ..storage.port import StorageError
 from .threads import Clock
 
@@ -72,26 +72,31 @@ class Supervisor:
         health.failures += 1
         if health.failing_since is None:
             health.failing_since = now
-            log.warning("background work failed", extra={"work": name, "reason": _words(error)})
+            log.warning("background work failed", extra={"work": name, "reason": words(error)})
         if not isinstance(error, PASSING):
             log.error("background work failed; this is a bug", extra={"work": name}, exc_info=error)
         if health.unwell is None and (now - health.failing_since >= PATIENCE or not isinstance(error, PASSING)):
-            health.unwell = f"{name}: {_words(error)}"
+            health.unwell = f"{name}: {words(error)}"
             self._tell()
 
     def succeeded(self, name: str) -> None:
         """Some work has been done."""
-        health = self.works.get(name)
-        if health is None or health.failing_since is None:
+        if not self.fails(name):
             return
+        health = self.works[name]
         health.failing_since = health.unwell = None
         log.info("background work goes on", extra={"work": name})
         self._tell()
 
+    def fails(self, name: str) -> bool:
+        """Whether some work has failed and not yet succeeded again."""
+        health = self.works.get(name)
+        return health is not None and health.failing_since is not None
+
     def died(self, name: str, error: BaseException) -> None:
         """Some work has ended, and cannot be begun again: the process ends."""
         log.critical("background work has died: the server ends", extra={"work": name}, exc_info=error)
-        self._fatal(f"{name}: {_words(error)}")
+        self._fatal(f"{name}: {words(error)}")
 
     def failing_seconds(self, health: Health) -> float:
         """For how long some work has been failing; 0 while it succeeds."""
@@ -136,7 +141,3 @@ class Supervisor:
 
 
 PASSING = (OSError, StorageError, RefusedError, MemoryError)
-
-
-def _words(error: BaseException) -> str:
-    return str(error) or type(error).__name__

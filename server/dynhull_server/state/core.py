@@ -9,9 +9,8 @@ next one, and no reader sees what could be taken back. A queue has one trip at a
 server: a caller that goes away is not told, and nothing else changes.
 """
 
-from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sortedcontainers import SortedDict
 
@@ -22,6 +21,7 @@ from .errors import (
     NotStoredError,
     OutcomeUnknownError,
     StoppingError,
+    words,
 )
 from .events import (
     Commit,
@@ -51,6 +51,9 @@ from .hull_state import HullState
 from .limits import Limits
 from .records import HullRow
 from .trip import Place, Trip
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 # Requests for at most this many points together run at once: a tenth of a millisecond.
 SMALL = 128
@@ -164,9 +167,9 @@ class Core:
         return self._trips > 0
 
     @property
-    def ill(self) -> Iterator[tuple[str, Exception]]:
-        """The names about which nothing is known, and why."""
-        return ((queue.name, queue.ill) for queue in self._queues.values() if queue.ill is not None)
+    def ill(self) -> bool:
+        """Whether there is a name about which nothing is known."""
+        return any(queue.ill is not None for queue in self._queues.values())
 
     def state_of(self, name: str) -> str:
         """The state of a name: absent, there, creating, deleting or unknown."""
@@ -408,7 +411,7 @@ class Core:
             return
         queue.ill = event.error
         if trip.unknown:
-            self._refuse_changes(trip, OutcomeUnknownError(str(event.error) or type(event.error).__name__), effects)
+            self._refuse_changes(trip, OutcomeUnknownError(words(event.error)), effects)
         reads = [request for request in trip.requests if not request.abandoned]
         trip.requests = []
         queue.waiting[:0] = reads
@@ -456,10 +459,10 @@ class Core:
 
 def _not_stored(error: Exception) -> NotStoredError:
     full = getattr(error, "full", False)
-    reason = str(error) or type(error).__name__
-    return DiskFullError(reason) if full else NotStoredError(reason)
+    return DiskFullError(words(error)) if full else NotStoredError(words(error))
 
 
 def _ill(error: Exception) -> NotStoredError:
-    reason = str(error) or type(error).__name__
-    return NotStoredError(f"the hull's last commit failed, and it cannot be read again yet ({reason}): try again later")
+    return NotStoredError(
+        f"the hull's last commit failed, and it cannot be read again yet ({words(error)}): try again later"
+    )

@@ -1,6 +1,11 @@
 """What the engine refuses, and why. A refused request has changed nothing."""
 
 
+def words(error: BaseException) -> str:
+    """What went wrong: a MemoryError, for one, has no message."""
+    return str(error) or type(error).__name__
+
+
 class RefusedError(Exception):
     """A request that cannot be granted."""
 

@@ -20,6 +20,7 @@ from threading import Lock
 
 from dynhull.arrays import Points
 
+from ...state.errors import words
 from ...state.records import Change, HullRow, Kept
 from ..durability import Durability
 from ..port import (
@@ -156,7 +157,7 @@ class SQLiteStorage:
         except NotCommittedError:
             raise
         except Exception as error:  # a value that has no place in a row, or no memory
-            raise NotCommittedError(f"nothing was written: {error or type(error).__name__}") from error
+            raise _not_committed(error) from error
         self._write(group)
 
     @_in_words()
@@ -445,7 +446,7 @@ class SQLiteStorage:
 def _not_committed(error: BaseException) -> NotCommittedError:
     if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
         return NotCommittedError("the disk is full: make room, and writes are taken again", full=True)
-    return NotCommittedError(f"nothing was written: {str(error) or type(error).__name__}")
+    return NotCommittedError(f"nothing was written: {words(error)}")
 
 
 def _gone(file: Path) -> str:
