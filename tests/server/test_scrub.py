@@ -21,7 +21,8 @@ from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.engine.verification import LARGE, Verification
 from dynhull_server.state.batch import Batch
-from dynhull_server.state.hull_state import HullState, Write
+from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.storage.memory import MemoryStorage
 
@@ -48,7 +49,7 @@ async def engine_in_memory() -> AsyncIterator[Engine]:
 
 
 async def insert(engine: Engine, name: str, points: np.ndarray) -> None:
-    await engine.apply(name, Write(lambda: Batch(points, NONE, 0, False), len(points)), create=True)
+    await engine.apply(name, WriteBatch(len(points), lambda: Batch(points, NONE, 0, False)), create=True)
 
 
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:

@@ -25,7 +25,7 @@ from dynhull_server.state.errors import (
     SequenceGapError,
     StoppingError,
 )
-from dynhull_server.state.hull_state import Write
+from dynhull_server.state.events import WriteBatch
 
 from .model import Asked, Content, Model
 from .plan import Operation
@@ -45,7 +45,7 @@ class Server(Protocol):
     async def delete_at_once(self, name: str, times: int) -> None:
         """Remove a hull, again and again; whatever the answers are."""
 
-    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
+    async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         """Apply a batch."""
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
@@ -179,8 +179,8 @@ class Client:
                 stream.write(write)
                 while len(under_way) >= op["window"] and self._take(op, opened, stream, under_way, producer):
                     await self.server.news(stream)
-                if stream.refusal is not None:
-                    return
+                if stream.refusal is not None and len(under_way) >= op["window"]:
+                    return  # a smaller window goes on: what it writes must not be applied
             while under_way and self._take(op, opened, stream, under_way, producer):
                 await self.server.news(stream)
         finally:
@@ -214,11 +214,13 @@ class Client:
             return ""
         return "shared" if op.get("shared") else self.producer
 
-    def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, Write]:
+    def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, WriteBatch]:
         attempt = self.model.attempt()
         deletes = NO_POINTS
         seen = self.seen.get(op["name"])
-        if "delete" in op and seen and seen[-1][2]:
+        if op.get("delete") == "nowhere" and attempt % 3:  # else nothing that is right would follow a refused batch
+            deletes = np.array([[-1.0, 1.0]])
+        elif "delete" in op and seen and seen[-1][2]:
             x = float(seen[-1][2][0])
             deletes = np.array([[x, x * x]])
         x = float(attempt)
@@ -226,7 +228,7 @@ class Client:
         if "torn" in op:
             self.model.faulty = True
             batch = TornBatch(batch, op["torn"])
-        return attempt, Write(lambda: batch, op["rows"], producer, sequence, self.producer)
+        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer)
 
     def _applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:
         self.model.applied(asked, attempt, applied, producer, sequence)

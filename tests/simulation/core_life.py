@@ -41,7 +41,7 @@ from dynhull_server.state.events import (
     Told,
     WriteBatch,
 )
-from dynhull_server.state.hull_state import HullState, Write
+from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
@@ -162,8 +162,8 @@ class CoreServer:
             case Retry():
                 self._pauses.append(effect.ticket)
 
-    def _commit(self, trip: Trip, changes: list[Any]) -> None:
-        if self._storage.immediate:
+    def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
+        if trip is None:
             self._storage.commit(changes)
             return
 
@@ -231,9 +231,11 @@ class CoreServer:
             self.dispatch(request)
         await Wait(lambda: all(request.to.told for request in requests))
 
-    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
-        birth = self._birth() if create else None
-        applied: Applied = await self._ask(WriteBatch(Answer(), name, write, birth, rows=write.rows))
+    async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
+        write.to, write.name = Answer(), name
+        if create:
+            write.birth = self._birth()
+        applied: Applied = await self._ask(write)
         return applied
 
     def stream(self, name: str, *, create: bool) -> BatchStream:

@@ -64,7 +64,7 @@ def random_plan(seed: int, layer: str) -> Plan:
     names = NAMES[: draw.randint(1, 3)]
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
     weights["write"] += 1
-    immediate = layer != "sqlite" and draw.random() < 0.03
+    immediate = layer != "sqlite" and draw.random() < 0.1
     return {
         "seed": seed,
         "layer": layer,
@@ -100,7 +100,7 @@ def _operation(draw: random.Random, names: tuple[str, ...], weights: dict[str, i
         op["numbered"] = draw.random() < 0.5
         op["rows"] = draw.choice((1, 1, 1, 200, 200, 200_000))
         if draw.random() < 0.2:
-            op["delete"] = draw.choice(("strict", "lenient"))
+            op["delete"] = draw.choice(("strict", "lenient", "nowhere"))
         if draw.random() < 0.03:
             op["torn"] = draw.randint(1, 4)
         if do == "stream":

@@ -14,7 +14,8 @@ from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.engine.watch import watch
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
-from dynhull_server.state.hull_state import HullState, Write
+from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 
 from .clients import Client
@@ -112,7 +113,7 @@ class ShellServer:
     async def delete_at_once(self, name: str, times: int) -> None:
         await asyncio.gather(*(self._engine.delete(name) for _ in range(times)), return_exceptions=True)
 
-    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
+    async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         return await self._engine.apply(name, write, create=create)
 
     def stream(self, name: str, *, create: bool) -> BatchStream:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from ..state.events import Birth, Gone, Request, Stream, WriteBatch
 from ..state.hull import Hull
-from ..state.hull_state import Write
 
 if TYPE_CHECKING:
     from ..state.batch import Applied
@@ -42,21 +41,23 @@ class BatchStream:
         """The hull, once it is there."""
         return self._stream.hull
 
-    def write(self, write: Write) -> None:
+    def write(self, request: WriteBatch) -> None:
         """Send a batch on its way."""
         self.batches += 1
-        self.rows += write.rows
-        stream = self._stream
-        birth = self._birth() if stream.hull is None else None
-        self._engine.dispatch(WriteBatch(self, stream.name, write, birth, stream, rows=write.rows))
+        self.rows += request.rows
+        stream = request.stream = self._stream
+        request.to, request.name = self, stream.name
+        if stream.hull is None:
+            request.birth = self._birth()
+        self._engine.dispatch(request)
 
     def tell(self, request: Request) -> None:
         """A batch has been applied or refused."""
         assert type(request) is WriteBatch  # nothing else is asked for
         self.batches -= 1
-        self.rows -= request.write.rows
+        self.rows -= request.rows
         if request.error is None:
-            self.applied.append((request.write.sequence, request.result))
+            self.applied.append((request.sequence, request.result))
         else:
             self.refusal = request.error
         self._notify()

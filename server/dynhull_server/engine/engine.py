@@ -32,7 +32,7 @@ from ..state.events import (
     WriteBatch,
 )
 from ..state.hull import Hull
-from ..state.hull_state import HullState, Write
+from ..state.hull_state import HullState
 from ..state.limits import Limits
 from ..state.trip import Trip
 from ..storage.port import Contents, Progress, Storage
@@ -194,13 +194,15 @@ class Engine:
         """Remove the hull of that name, or raise HullNotFoundError or NotStoredError."""
         await self.ask(DeleteHull(Waiter(), name))
 
-    async def apply(self, name: str, write: Write, *, create: bool) -> Applied:
+    async def apply(self, name: str, request: WriteBatch, *, create: bool) -> Applied:
         """Apply a batch as the next revision of a hull, or raise what refuses it.
 
         With `create`, a hull that is not there is made for it.
         """
-        birth = self._birth() if create else None
-        applied: Applied = await self.ask(WriteBatch(Waiter(), name, write, birth, rows=write.rows))
+        request.to, request.name = Waiter(), name
+        if create:
+            request.birth = self._birth()
+        applied: Applied = await self.ask(request)
         return applied
 
     def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:
@@ -299,8 +301,8 @@ class Engine:
             if hull.ended:
                 del self._live[hull]
 
-    def _commit(self, trip: Trip, changes: list[Any]) -> None:
-        if self._storage.immediate:
+    def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
+        if trip is None:  # the storage is immediate
             self._storage.commit(changes)
             return
 

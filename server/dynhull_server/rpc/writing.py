@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from ..engine.engine import Engine
 from ..state.batch import Applied
-from ..state.hull_state import Write
+from ..state.events import WriteBatch
 from . import decode
 from .calls import Call
 from .metrics import Metrics
@@ -18,12 +18,12 @@ MOST_ROWS = 65_536
 MOST_BATCHES = 1_024
 
 
-def decode_write(request: Any, message_bytes: int, producer: str, owner: str) -> Write:
+def decode_write(request: Any, message_bytes: int, producer: str, owner: str) -> WriteBatch:
     """The batch of a request, to be decoded when its turn comes; `owner` is who answers for the producer."""
     batch = request.batch
-    return Write(
-        lambda: decode.decode_batch(batch),
+    return WriteBatch(
         message_bytes // decode.BYTES_PER_POINT,  # about: to look at the points is to copy them
+        lambda: decode.decode_batch(batch),
         producer,
         decode.decode_sequence(producer, request.sequence),
         owner,
@@ -126,6 +126,6 @@ class StreamedBatches:
             if message.sequence:
                 raise decode.InvalidFieldError("sequence", message.sequence, "there is no batch to number")
             return
-        write = decode_write(message, self._call.message_bytes, self._producer, self._call.owner)
+        request = decode_write(message, self._call.message_bytes, self._producer, self._call.owner)
         self._arrivals.append(time.perf_counter())
-        self._batches.write(write)
+        self._batches.write(request)

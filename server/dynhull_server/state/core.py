@@ -49,8 +49,8 @@ from .events import (
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import HullRow
-from .trip import Place, Trip
+from .records import Append, HullRow, Record
+from .trip import Place, Trip, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -189,9 +189,11 @@ class Core:
         if queue is None:
             queue = self._queues[name] = _Queue(name)
         if queue.trip is None and not self._stopping and not request.abandoned:
-            if type(request) is ReadHull and request.rows <= SMALL:
+            if request.rows <= SMALL and type(request) is ReadHull:
                 self._read(queue, request)
                 effects.append(Told([request]))
+            elif self._immediate and queue.hull is not None and request.rows <= SMALL and type(request) is WriteBatch:
+                self._write(queue, queue.hull, request, effects)
             else:
                 self._begin(queue, [request], request.rows, effects)
                 if queue.hull is None or queue.waiting:
@@ -213,6 +215,25 @@ class Core:
             request.result = hull.counts, request.function(hull.state)
         except Exception as error:  # whatever it is, it belongs to the caller
             request.error = error
+
+    def _write(self, queue: _Queue, hull: Hull, request: WriteBatch, effects: list[Effect]) -> None:
+        """A small batch for a hull that is there needs no trip where commits are immediate: in memory most are so."""
+        if request.stream is not None and request.stream.stopped:
+            return
+        records: list[Record] | None = [] if self._keeps else None
+        applied = write(request, hull, self._now, records)
+        if applied is not None:
+            if records:
+                effects.append(Commit(None, [Append(hull.row.number, records)]))
+            hull.counts = hull.state.counts
+            effects.append(Told([request], None if applied.duplicate else hull))
+        elif hull.state.torn:
+            trip = queue.trip = Trip(queue.name, hull, [request], self._now, keeps=self._keeps)
+            trip.torn = True
+            self._trips += 1
+            self._ran(queue, trip, effects)
+        else:
+            effects.append(Told([request]))
 
     def _gone(self, event: Gone, _: list[Effect]) -> None:
         event.what.leave()
@@ -276,7 +297,7 @@ class Core:
             return
         changes = trip.changes()
         if changes:
-            effects.append(Commit(trip, changes))
+            effects.append(Commit(None if self._immediate else trip, changes))
             if not self._immediate:
                 return
         elif not trip.applied:

@@ -1,14 +1,16 @@
 """What the core is told, and what it asks for. A ticket is a trip of one hull's work; only the core looks into it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from .hull_state import HullState, Write
 from .records import Change, Kept
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .batch import Batch
     from .hull import Hull
+    from .hull_state import HullState
     from .trip import Trip
 
 
@@ -64,19 +66,27 @@ class DeleteHull(Request):
 
 @dataclass(slots=True, eq=False)
 class WriteBatch(Request):
-    """Apply a batch. The result is what it did.
+    """Apply a batch, of about `rows` points. The result is what it did.
 
     Attributes:
-        name: the hull's.
-        write: the batch.
+        make: decodes it, and raises what is wrong with it.
+        producer: who numbers it; empty where it is not numbered.
+        sequence: its number.
+        owner: the caller who answers for the producer.
+        name: the hull's; like the rest and `to`, whoever sends the request on its way says it.
         birth: of the hull, where it is to be made if it is not there; None where that is to be refused.
         stream: the stream that the batch is part of.
     """
 
-    name: str
-    write: Write
-    birth: Birth | None = None
-    stream: "Stream | None" = None
+    to: Any = field(default=None, init=False)
+    rows: int
+    make: "Callable[[], Batch]"
+    producer: str = ""
+    sequence: int = 0
+    owner: str = ""
+    name: str = field(default="", init=False)
+    birth: Birth | None = field(default=None, init=False)
+    stream: "Stream | None" = field(default=None, init=False)
 
 
 @dataclass(slots=True, eq=False)
@@ -84,7 +94,7 @@ class ReadHull(Request):
     """Read a hull. The result is the counts at one revision, and what `function` returned at it."""
 
     hull: "Hull"
-    function: Callable[[HullState], Any]
+    function: "Callable[[HullState], Any]"
 
 
 @dataclass(slots=True, eq=False)
@@ -146,7 +156,7 @@ class Examined:
     """What the storage has of a hull: None where there is none."""
 
     ticket: "Trip"
-    state: HullState | None
+    state: "HullState | None"
 
 
 @dataclass(slots=True)
@@ -191,9 +201,9 @@ class Compute:
 
 @dataclass(slots=True)
 class Commit:
-    """Keep all of the changes or none; then say Committed or Failed."""
+    """Keep all of the changes or none; then say Committed or Failed, or nothing where there is no ticket."""
 
-    ticket: "Trip"
+    ticket: "Trip | None"
     changes: list[Change]
 
 
@@ -207,7 +217,7 @@ class Examine:
     ticket: "Trip"
     number: int
     settle: bool
-    load: Callable[[Kept], HullState]
+    load: "Callable[[Kept], HullState]"
 
 
 @dataclass(slots=True)

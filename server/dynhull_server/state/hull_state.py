@@ -1,36 +1,26 @@
 """One hull: its points, its revision, its producers, and the vertices that somebody has been told."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from .batch import Applied, Batch, apply_batch
+from .batch import Applied, apply_batch
 from .errors import LimitExceededError, PointMissingError
 from .history import History
 from .limits import Limits
 from .producers import Producers
 from .records import Kept, Record
 
+if TYPE_CHECKING:
+    from .events import WriteBatch
+
 # Batches are replayed together up to this many points: as a set, which is many times faster.
 REPLAYED_TOGETHER = 65_536
-
-
-@dataclass(slots=True)
-class Write:
-    """A batch to come, of about `rows` points: `make` decodes it and raises what is wrong with it.
-
-    Without a `producer` it is not numbered. `owner` is the caller who answers for the producer.
-    """
-
-    make: Callable[[], Batch]
-    rows: int
-    producer: str = ""
-    sequence: int = 0
-    owner: str = ""
 
 
 @dataclass(slots=True)
@@ -68,7 +58,7 @@ class HullState:
         """The number of vertices when somebody last looked."""
         return len(self._vertices)
 
-    def apply(self, write: Write, now: float, records: list[Record] | None) -> Applied:
+    def apply(self, write: "WriteBatch", now: float, records: list[Record] | None) -> Applied:
         """Apply a batch as the next revision, and put it to the records where there are such.
 
         Raises:

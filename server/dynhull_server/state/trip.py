@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from .batch import Applied
 from .errors import HullExistsError, HullNotFoundError
 from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch
 from .hull import Hull
@@ -78,12 +79,9 @@ class Trip:
                 else:
                     request.result = self._do(request)
             except Exception as error:  # whatever it is, it belongs to the caller
-                request.error = error
-                if type(request) is WriteBatch and request.stream is not None:
-                    request.stream.stopped = True
-                if self.after is not None and self.after.state.torn:
-                    self.torn = True  # what comes after would run on a part of a batch
-                    return
+                refuse(request, error)
+            if self.torn:  # what comes after would run on a part of a batch
+                return
 
     def changes(self) -> list[Change]:
         """What has to be kept."""
@@ -124,30 +122,22 @@ class Trip:
         raise AssertionError(f"no request: {request}")
 
     def _write(self, request: WriteBatch) -> None:
-        stream = request.stream
+        stream, hull = request.stream, self.after
         if stream is not None and stream.stopped:
             request.abandoned = True
             return
-        hull = self.after
-        if hull is None or (stream is not None and stream.hull is not hull):
-            hull = self._hull_for(request)
-        request.result = applied = hull.state.apply(request.write, self._now, self._records)
+        if hull is None:
+            if request.birth is None or (stream is not None and stream.hull is not None):
+                raise HullNotFoundError(self.name)
+            hull = self._new_hull(request)
+        applied = write(request, hull, self._now, self._records)
+        self.torn = hull.state.torn
+        if applied is None:
+            return
         self.after = hull
-        if stream is not None:
-            stream.hull = hull
         if not applied.duplicate:
             self.applied = True
             self.unsaved += applied.inserted + applied.deleted
-
-    def _hull_for(self, request: WriteBatch) -> Hull:
-        """The hull to write to, a new one where there is none."""
-        if request.stream is not None and request.stream.hull not in (None, self.after):
-            raise HullNotFoundError(self.name)
-        if self.after is not None:
-            return self.after
-        if request.birth is None:
-            raise HullNotFoundError(self.name)
-        return self._new_hull(request)
 
     def _read(self, request: ReadHull) -> object:
         hull = self.after
@@ -163,3 +153,25 @@ class Trip:
         most = request.max_points if type(request) is CreateHull else 0
         row = HullRow(place.number, self.name, birth.uid, birth.created, most)
         return Hull(row, HullState(place.limits, most, EMPTY, self._now))
+
+
+def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:
+    """Apply a batch to a hull; what came of it is put into the request. None where it was refused."""
+    stream = request.stream
+    try:
+        if stream is not None and stream.hull is not hull and stream.hull is not None:
+            raise HullNotFoundError(hull.name)
+        request.result = applied = hull.state.apply(request, now, records)
+    except Exception as error:  # whatever it is, it belongs to the caller
+        refuse(request, error)
+        return None
+    if stream is not None:
+        stream.hull = hull
+    return applied
+
+
+def refuse(request: Request, error: Exception) -> None:
+    """Answer a request with an error. Nothing that follows it in a stream is applied."""
+    request.error = error
+    if type(request) is WriteBatch and request.stream is not None:
+        request.stream.stopped = True
