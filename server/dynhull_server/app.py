@@ -45,7 +45,7 @@ LAST_WORDS = 1.0
 # Milliseconds between signs of life on a quiet connection, and until one without an answer is given up.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
 # Bytes of each call that a client may send before they are read.
-LOOKAHEAD = 256 * 2**10
+LOOKAHEAD = 2**20
 # Milliseconds until a connection must be one of HTTP/2.
 HANDSHAKE_TIMEOUT = 10_000
 

@@ -4,7 +4,7 @@ import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from ...state.records import Kept
@@ -194,7 +194,7 @@ def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
     report = _report(findings, opened.notes)
     if report.fatal:
         raise DamagedError(f"it is damaged, so it was not copied: {'; '.join(report.fatal)}")
-    findings.ledger.totals = replace(findings.ledger.totals, mode=STOPPED)
+    findings.ledger.totals = findings.ledger.totals._replace(mode=STOPPED)
     if opened.version < FORMAT:
         migrate(connection, findings.ledger)
     else:

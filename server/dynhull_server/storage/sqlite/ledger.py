@@ -187,7 +187,7 @@ class Group:
         self.statements: list[Statement] = []
         for change in changes:
             self._take(change)
-        self._totals = replace(self._totals, commits=self._totals.commits + 1)
+        self._totals = self._totals._replace(commits=self._totals.commits + 1)
         self.statements.append((UPDATE_TOTALS, self._totals.row))
 
     def adopt(self) -> None:
@@ -233,7 +233,7 @@ class Group:
         rows = HullRows(row, stored)
         self._now[row.number] = _Now(rows, 0, stored, 0)
         next_number = max(self._totals.next_number, row.number + 1)
-        self._totals = replace(self._totals.plus(1, 0, stored), next_number=next_number)
+        self._totals = self._totals.plus(1, 0, stored)._replace(next_number=next_number)
         self.statements.append((INSERT_HULL, (row.number, row.name, row.uid, row.created, row.max_points, stored)))
         self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
 

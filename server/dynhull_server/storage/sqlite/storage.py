@@ -14,7 +14,6 @@ import sqlite3
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 
@@ -172,7 +171,7 @@ class SQLiteStorage:
         totals, _ = read_totals(connection)
         if totals is None:
             raise DamagedError(f"{self._folder.database}: the totals are damaged: restore a backup")
-        connection.execute(UPDATE_TOTALS, replace(totals, commits=totals.commits + 1).row)
+        connection.execute(UPDATE_TOTALS, totals._replace(commits=totals.commits + 1).row)
         connection.execute("COMMIT")
         self._set_synchronous(connection)
         with self._housekeeping:
@@ -394,7 +393,7 @@ class SQLiteStorage:
         self._set_synchronous(connection)
 
     def _in_mode(self, mode: int) -> Ledger:
-        self._ledger.totals = replace(self._ledger.totals, mode=mode)
+        self._ledger.totals = self._ledger.totals._replace(mode=mode)
         return self._ledger
 
     def _begin_log_anew(self, own: Totals | None) -> None:

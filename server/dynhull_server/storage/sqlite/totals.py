@@ -1,8 +1,7 @@
 """The row that says what there must be: kept twice, renewed in each commit."""
 
 import sqlite3
-from dataclasses import astuple, dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 from ..durability import Durability
 from .encoding import checksum
@@ -15,8 +14,7 @@ STOPPED = 0
 MODES = {Durability.SYNC: 1, Durability.INTERVAL: 2, Durability.NONE: 3}
 
 
-@dataclass(frozen=True, slots=True)
-class Totals:
+class Totals(NamedTuple):
     """What there must be.
 
     Attributes:
@@ -39,13 +37,12 @@ class Totals:
     def plus(self, hulls: int, batches: int, checksums: int) -> Self:
         """After rows have come or, with negative numbers, gone."""
         total = (self.sum + checksums) % 2**SUM_BITS
-        return replace(self, hulls=self.hulls + hulls, batches=self.batches + batches, sum=total)
+        return self._replace(hulls=self.hulls + hulls, batches=self.batches + batches, sum=total)
 
     @property
     def row(self) -> tuple[int, ...]:
         """As it is stored, with its checksum."""
-        values = astuple(self)
-        return *values, checksum(b"", *values)
+        return *self, checksum(b"", *self)
 
 
 def read_totals(connection: sqlite3.Connection) -> tuple[Totals | None, bool]:
