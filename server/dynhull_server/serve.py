@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from . import logs
 from .app import Server
 from .flags import with_settings
+from .malloc import return_large_blocks
 from .progress import progress_bar
 from .settings import Settings
 from .storage.port import StorageError
@@ -28,6 +29,7 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
     logs.configure(settings.log_level, settings.log_format)
+    return_large_blocks()
     try:
         asyncio.run(_serve(settings))
     except RuntimeError as error:

@@ -2,14 +2,12 @@
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import grpc
 import numpy as np
-import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
+from live_engine import engine_in_memory, insert
 from patience import wait_until
 from server_process import server_process
 
@@ -17,17 +15,9 @@ from dynhull import DynamicHull
 from dynhull_client import HullClient
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.scrub import Scrub
-from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.engine.verification import LARGE, Verification
-from dynhull_server.state.batch import Batch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
-from dynhull_server.state.limits import Limits
-from dynhull_server.storage.memory import MemoryStorage
-
-LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, max_producers_per_caller=10, history_bytes=10**6)
-NONE = np.empty((0, 2))
 
 
 class Liar(DynamicHull):
@@ -35,21 +25,6 @@ class Liar(DynamicHull):
 
     def vertices(self) -> np.ndarray:
         return super().vertices()[1:]
-
-
-@asynccontextmanager
-async def engine_in_memory() -> AsyncIterator[Engine]:
-    machine = Machine()
-    supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
-    engine = Engine(LIMITS, MemoryStorage(), supervisor, machine)
-    await engine.start(lambda *_: None)
-    yield engine
-    await supervisor.stop()
-    await engine.close()
-
-
-async def insert(engine: Engine, name: str, points: np.ndarray) -> None:
-    await engine.apply(name, WriteBatch(len(points), lambda: Batch(points, NONE, 0, False)), create=True)
 
 
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:

@@ -134,7 +134,8 @@ class ShellServer:
         return hull.uid, counts.revision, vertices
 
     async def recall(self, name: str, uid: str, revision: int) -> Points | None:
-        return await self._engine.get(name).recall(uid, revision)
+        async with self._engine.get(name).recalled(uid, revision) as vertices:
+            return vertices
 
     async def last(self, name: str, producer: str) -> int:
         return await self._engine.get(name).last_sequence(producer)

@@ -14,8 +14,8 @@ from .steps import Run
 
 # Lists of so many vertices together are compared at once, on the event loop.
 FEW = 256
-# Differences of one hull that are kept for the next watcher.
-KEPT = 8
+# Differences of one hull that are kept for the next watcher, and bytes of the vertices they are between.
+KEPT, KEPT_BYTES = 8, 32 * 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,7 @@ class Differences:
 
     def __init__(self, run: Run) -> None:
         self._run = run
+        self._turn = asyncio.Lock()
         self._recent: OrderedDict[tuple[int, int], tuple[Points, Points, asyncio.Future[Difference]]] = OrderedDict()
 
     async def between(self, old: Points, new: Points) -> Difference:
@@ -49,13 +50,25 @@ class Differences:
         # The arrays are kept beside the result, so that their ids stay theirs.
         key = id(old), id(new)
         if key not in self._recent:
-            computing = asyncio.ensure_future(self._run(partial(difference, old, new)))
+            computing = asyncio.ensure_future(self._compute(old, new))
             computing.add_done_callback(partial(self._computed, key))
             self._recent[key] = old, new, computing
-            if len(self._recent) > KEPT:
-                self._recent.popitem(last=False)
+            self._forget()
         # A watcher that leaves does not take the result away from the others.
         return await asyncio.shield(self._recent[key][2])
+
+    async def _compute(self, old: Points, new: Points) -> Difference:
+        async with self._turn:  # each takes several times the memory of the vertices
+            computed: Difference = await self._run(partial(difference, old, new))
+        return computed
+
+    def _forget(self) -> None:
+        """Keep the newest."""
+        total = 0
+        for number, (key, (old, new, computing)) in enumerate(reversed(list(self._recent.items()))):
+            total += old.nbytes + new.nbytes
+            if number and (number >= KEPT or total > KEPT_BYTES) and computing.done():
+                del self._recent[key]
 
     def _computed(self, key: tuple[int, int], computing: "asyncio.Future[Difference]") -> None:
         if computing.cancelled() or computing.exception() is not None:

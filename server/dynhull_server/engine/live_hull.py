@@ -1,7 +1,8 @@
 """What callers see of one hull: reads of one revision, waiting for the next, and earlier revisions."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
@@ -163,8 +164,9 @@ class LiveHull:
 
     # Revisions
 
-    async def recall(self, uid: str, revision: int) -> Points | None:
-        """The vertices at an earlier revision, None where nobody was told them.
+    @asynccontextmanager
+    async def recalled(self, uid: str, revision: int) -> AsyncIterator[Points | None]:
+        """The vertices at an earlier revision, None where nobody was told them; to be held for a moment.
 
         Raises:
             HullReplacedError: this is not the hull of that uid.
@@ -179,9 +181,11 @@ class LiveHull:
                 raise
             remembered = error.oldest
         else:
-            return vertices
+            yield vertices
+            return
         try:
-            return await self._recalls.vertices(self._hull, revision)
+            async with self._recalls.vertices(self._hull, revision) as recalled:
+                yield recalled
         except RevisionForgottenError as error:
             oldest = min(remembered, error.oldest)
             raise RevisionForgottenError(revision, oldest, error.newest) from None

@@ -2,28 +2,41 @@
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from dynhull.arrays import Points
 
-from ..state.errors import HullNotFoundError, NotStoredError, RefusedError, RevisionForgottenError
+from ..state.errors import HullNotFoundError, NotStoredError, RevisionForgottenError
 from ..state.hull import Hull
 from ..state.hull_state import replay, replayed
 from ..state.records import Kept
 from ..storage.port import DamagedError, Storage, StorageError
 
-Answer = Points | RefusedError
+Answer = Points | Exception
 # How reading fails where the machine has run out of something.
 UNREADABLE = (StorageError, OSError, MemoryError)
+# Bytes of vertices that callers hold at a time, about: further revisions are read after these.
+MOST_BYTES = 64 * 2**20
+
+
+@dataclass(slots=True, eq=False)
+class _Recall:
+    """One revision: the callers that wait for it or hold its vertices, and how many bytes these take."""
+
+    future: "asyncio.Future[Points]"
+    callers: int = 0
+    bytes: int = 0
 
 
 class Recalls:
     """Answers what a hull was at earlier revisions.
 
-    The disk is read for one hull at a time, and at once for all revisions of it that are asked for: so a hundred
-    watchers that resume after a restart cost what one does, in time and in memory.
+    The disk is read for one hull at a time, and at once for all revisions of it that are asked for, as many as may be
+    held together: so a hundred watchers that resume after a restart cost about what one does.
 
     Args:
         storage: where hulls are kept.
@@ -33,47 +46,73 @@ class Recalls:
     def __init__(self, storage: Storage, run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
         self._storage = storage
         self._run = run
-        self._wanted: dict[Hull, dict[int, asyncio.Future[Points]]] = defaultdict(dict)
+        self._wanted: dict[Hull, dict[int, _Recall]] = defaultdict(dict)
         self._reading: asyncio.Task[None] | None = None
+        self._held = 0
+        self._room = asyncio.Event()
 
-    async def vertices(self, hull: Hull, revision: int) -> Points:
-        """The vertices at a revision that has been.
+    @asynccontextmanager
+    async def vertices(self, hull: Hull, revision: int) -> AsyncIterator[Points]:
+        """The vertices at a revision that has been; to be held no longer than the context.
 
         Raises:
             RevisionForgottenError: it is older than what the storage has kept.
             NotStoredError: the storage cannot be read.
         """
-        wanted = self._wanted[hull]
-        if revision not in wanted:
-            wanted[revision] = asyncio.get_running_loop().create_future()
-            wanted[revision].add_done_callback(_looked_at)
+        recall = self._wanted[hull].get(revision)
+        if recall is None:
+            recall = self._wanted[hull][revision] = _Recall(asyncio.get_running_loop().create_future())
+            recall.future.add_done_callback(_looked_at)
         if self._reading is None or self._reading.done():
             self._reading = asyncio.get_running_loop().create_task(self._read())
-        # A watcher that leaves does not take the answer away from the others.
-        return await asyncio.shield(wanted[revision])
+        recall.callers += 1
+        try:
+            # A watcher that leaves does not take the answer away from the others.
+            yield await asyncio.shield(recall.future)
+        finally:
+            recall.callers -= 1
+            if not recall.callers:
+                self._held -= recall.bytes
+                recall.bytes = 0
+                self._room.set()
 
     async def _read(self) -> None:
         while self._wanted:
             hull, wanted = next(iter(self._wanted.items()))
-            del self._wanted[hull]
             try:
-                answers = await self._run(partial(self._recall, hull, sorted(wanted)))
-            except Exception as error:
-                refusal = NotStoredError(str(error)) if isinstance(error, UNREADABLE) else error
-                answers = dict.fromkeys(wanted, refusal)
+                answers = await self._answers(hull, sorted(wanted))
             except BaseException:
-                for future in wanted.values():
-                    future.cancel()
+                for recall in self._wanted.pop(hull).values():
+                    recall.future.cancel()
                 raise
-            for revision, future in wanted.items():
-                answer = answers[revision]
-                if isinstance(answer, Exception):
-                    future.set_exception(answer)
-                else:
-                    future.set_result(answer)
+            for revision, answer in answers.items():
+                self._tell(wanted.pop(revision), answer)
+            del self._wanted[hull]
+            if wanted:  # after the other hulls
+                self._wanted[hull] = wanted
+            while self._held >= MOST_BYTES:
+                self._room.clear()
+                await self._room.wait()
+
+    async def _answers(self, hull: Hull, revisions: list[int]) -> dict[int, Answer]:
+        try:
+            answers: dict[int, Answer] = await self._run(partial(self._recall, hull, revisions))
+        except Exception as error:
+            refusal = NotStoredError(str(error)) if isinstance(error, UNREADABLE) else error
+            return dict.fromkeys(revisions, refusal)
+        return answers
+
+    def _tell(self, recall: _Recall, answer: Answer) -> None:
+        if isinstance(answer, Exception):
+            recall.future.set_exception(answer)
+            return
+        recall.future.set_result(answer)
+        if recall.callers:
+            recall.bytes = answer.nbytes
+            self._held += answer.nbytes
 
     def _recall(self, hull: Hull, revisions: list[int]) -> dict[int, Answer]:
-        """The vertices at some revisions, in ascending order, or why there are none."""
+        """The vertices at some revisions, in ascending order, or why there are none; as many as there is room for."""
         try:
             return self._recalled(hull, revisions)
         except KeyError:  # deleted meanwhile
@@ -96,21 +135,28 @@ class Recalls:
                 return answers | {revision: RevisionForgottenError(revision, oldest, newest) for revision in left}
             if kept.last_revision != left[-1]:
                 raise DamagedError(f"revision {left[-1]} of {hull.name} was kept, and is not there")
-            answers |= _vertices_at(kept, covered)
+            found = _vertices_at(kept, covered)
+            answers |= found
+            if len(found) < len(covered):
+                return answers
             left = left[: -len(covered)]
         return answers
 
 
-def _vertices_at(kept: Kept, revisions: list[int]) -> dict[int, Answer]:
+def _vertices_at(kept: Kept, revisions: list[int]) -> dict[int, Points]:
+    """The vertices at the first of some revisions, as many as there is room for."""
     live = replayed(Kept(kept.revision, kept.points, {}, []))
-    vertices: dict[int, Answer] = {}
-    position = 0
+    found: dict[int, Points] = {}
+    position = total = 0
     for revision in revisions:
         end = revision - kept.revision
         replay(live, kept.records[position:end])
         position = end
-        vertices[revision] = live.vertices()
-    return vertices
+        found[revision] = live.vertices()
+        total += found[revision].nbytes
+        if total >= MOST_BYTES:
+            break
+    return found
 
 
 def _looked_at(future: "asyncio.Future[Points]") -> None:

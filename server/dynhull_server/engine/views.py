@@ -23,10 +23,10 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The hull is another than at the event before."""
+    """The hull is another than at the event before; `removed` are vertices that it had then."""
 
     counts: Counts
-    before: Points
+    removed: Points
     vertices: Points
     difference: Difference
 
@@ -61,16 +61,11 @@ class View(Protocol):
 
 
 class VerticesView:
-    """The vertices: a snapshot, then changes.
+    """The vertices: a snapshot, then changes."""
 
-    Args:
-        hull: the hull.
-        held: the vertices that the watcher has already.
-    """
-
-    def __init__(self, hull: LiveHull, held: Points | None = None) -> None:
+    def __init__(self, hull: LiveHull) -> None:
         self._hull = hull
-        self._held = np.empty((0, 2)) if held is None else held
+        self._held = np.empty((0, 2))
 
     async def first(self, min_revision: int) -> Event:
         """A snapshot."""
@@ -85,8 +80,36 @@ class VerticesView:
             return Progress(counts)
         change = await self._hull.differences.between(held, vertices)
         if change.removed.size or change.added.size:
-            return Change(counts, held, vertices, change)
+            return Change(counts, held[change.removed], vertices, change)
         return Progress(counts)
+
+
+class ResumedView(VerticesView):
+    """The vertices, for a watcher that holds those of an earlier revision: changes alone.
+
+    Args:
+        hull: the hull.
+        uid: of the hull that the watcher holds.
+        revision: its revision.
+    """
+
+    def __init__(self, hull: LiveHull, uid: str, revision: int) -> None:
+        super().__init__(hull)
+        self._uid = uid
+        self._revision = revision
+
+    async def first(self, min_revision: int) -> Event:
+        """The change since then; a snapshot where nobody was told what the vertices were.
+
+        Raises:
+            HullReplacedError, RevisionForgottenError, NotStoredError: there is no way from there to here.
+        """
+        await self._hull.reached(min_revision)  # beforehand: vertices that are recalled are not held for long
+        async with self._hull.recalled(self._uid, self._revision) as held:
+            if held is None:
+                return await super().first(min_revision)
+            self._held = held
+            return await self.next()
 
 
 class SketchView:

@@ -34,19 +34,11 @@ async def watch(
         HullNotFoundError: the hull has been deleted.
     """
     loop = asyncio.get_running_loop()
-    if since is None:
-        event = await view.first(min_revision)
-        told = loop.time()
+    event = await view.first(min_revision)
+    counts = event.counts
+    told = loop.time()
+    if since is None or counts.revision > since or not isinstance(event, Progress):
         yield event
-        counts = event.counts
-    else:
-        await hull.reached(min_revision)
-        counts = hull.counts
-        told = loop.time()
-        if counts.revision > since:
-            event = await view.next()
-            counts = event.counts
-            yield event
     while True:
         await asyncio.sleep(told + min_interval - loop.time())
         try:

@@ -73,7 +73,7 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
             message.snapshot.vertices.CopyFrom(encode_points(event.vertices, encoding))
         case Change():
             removed, added = event.difference.removed, event.difference.added
-            message.change.removed.CopyFrom(encode_points(event.before[removed], encoding))
+            message.change.removed.CopyFrom(encode_points(event.removed, encoding))
             message.change.removed_indices.extend(removed.tolist())
             message.change.added.CopyFrom(encode_points(event.vertices[added], encoding))
             message.change.added_indices.extend(added.tolist())

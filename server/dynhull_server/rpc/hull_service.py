@@ -11,7 +11,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from ..engine.engine import Engine
 from ..engine.live_hull import LiveHull
 from ..engine.steps import FEW_ROWS, Run, at_once
-from ..engine.views import SketchView, VerticesView, View
+from ..engine.views import ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..state.errors import HullEmptyError
 from . import answers, decode, encode
@@ -246,20 +246,17 @@ class HullService:
         encoding = decode.decode_encoding(request.encoding)
         directions = decode.decode_directions(request.directions) if request.HasField("directions") else None
         resume = decode.decode_resume(request)
-        since = None
         view: View
         if directions is not None:
             view = SketchView(hull, directions, request.include_measures)
         elif resume is None:
             view = VerticesView(hull)
         else:
-            held = await hull.recall(resume.uid, resume.revision)
-            view = VerticesView(hull, held)
-            since = None if held is None else resume.revision
+            view = ResumedView(hull, resume.uid, resume.revision)
         events = watch(
             hull,
             view,
-            since=since,
+            since=None if resume is None else resume.revision,
             min_revision=request.min_revision,
             min_interval=decode.decode_rate(request.max_events_per_second),
             progress_interval=decode.decode_interval(request),
