@@ -3,8 +3,8 @@
     python benchmarks/culling.py [--countries 60] [--questions 200]
 
 The objects are the cities of the countries with the most of them, in degrees. Each gets a circle, a box along the axes,
-a box of least area and its hull, all from the library; `dynhull.gjk.intersect` answers. No convex volume is tighter than
-the hull: what another volume reports beyond it is a false alarm, for a later and more expensive test to reject.
+a box of least area and its hull, all from the library; `dynhull.gjk.intersect` answers. No convex volume is tighter
+than the hull: what another volume reports beyond it is a false alarm, for a later and more expensive test to reject.
 """
 
 import argparse

@@ -180,7 +180,7 @@ def main() -> None:
         for algorithm in ALGORITHMS:
             found = outcome(algorithm, points, options.orders)
             counts = f"{found.runs:>6}{found.wrong:>7}{found.none:>9}"
-            print(f"{name:44}{algorithm.__name__:12}{counts}{found.worst:>11.1g}")
+            print(f"{name:44}{algorithm.__name__:12}{counts}{found.worst:>11.2g}")
     if options.out:
         draw(options.out, options.orders)
 
