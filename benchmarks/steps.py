@@ -103,6 +103,22 @@ def tuples(array: np.ndarray) -> list[Point]:
 
 
 @contextmanager
+def replaced(wrapped: Callable[[Callable[..., int]], Callable[..., int]]) -> Iterator[None]:
+    """Make the tree call `wrapped(predicate)` wherever it evaluates an `orientation` or a `crossing`."""
+    chain_module = nodes.half_chain.__globals__
+    places = [(vars(nodes), "orientation"), (vars(nodes), "crossing"), (vars(tree), "orientation")]
+    places.append((chain_module, "orientation"))
+    originals = [(names, name, names[name]) for names, name in places]
+    for names, name, predicate in originals:
+        names[name] = wrapped(predicate)
+    try:
+        yield
+    finally:
+        for names, name, predicate in originals:
+            names[name] = predicate
+
+
+@contextmanager
 def counted() -> Iterator[list[int]]:
     """Count every sign the tree evaluates, in the list's only entry."""
     total = [0]
@@ -114,17 +130,8 @@ def counted() -> Iterator[list[int]]:
 
         return count
 
-    chain_module = nodes.half_chain.__globals__
-    places = [(vars(nodes), "orientation"), (vars(nodes), "crossing"), (vars(tree), "orientation")]
-    places.append((chain_module, "orientation"))
-    originals = [(names, name, names[name]) for names, name in places]
-    for names, name, predicate in originals:
-        names[name] = counting(predicate)
-    try:
+    with replaced(counting):
         yield total
-    finally:
-        for names, name, predicate in originals:
-            names[name] = predicate
 
 
 def count_steps(name: str, n: int, updates: int, tree_type: type[HullTree] = HullTree) -> Steps:

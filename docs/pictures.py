@@ -19,7 +19,7 @@ from dynhull.convex import ball, convex_combination, minkowski_sum, polygon
 from dynhull.decompose import convex_pieces
 from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram
-from dynhull.gjk import contact
+from dynhull.gjk import contact, intersect
 from dynhull.margin import max_margin
 
 ROOT = Path(__file__).parents[1]
@@ -242,8 +242,99 @@ def sorting(axes) -> None:
     axes.set_title("Numbers on a parabola: the hull visits them in order", fontsize=10)
 
 
+def definitions(axes) -> None:
+    points = np.random.default_rng(12).normal(size=(40, 2))
+    corners = convex_hull(points)
+    for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        axes.axline(p, q, color=GREY, lw=0.6)
+    axes.plot([], [], color=GREY, lw=0.6, label="half-planes that hold every point end at these lines")
+    axes.fill(*corners.T, color=BLUE, alpha=0.15, label="their intersection, the smallest convex set with the points")
+    inside, triangle = np.array([0.4, -0.25]), corners[[1, 4, 6]]
+    axes.fill(*triangle.T, fill=False, ec=ORANGE, lw=1.5)
+    shares = np.linalg.solve(np.vstack([triangle.T, np.ones(3)]), [*inside, 1])
+    for corner, share in zip(triangle, shares, strict=True):
+        axes.plot(*np.array([inside, corner]).T, ":", color=ORANGE)
+        axes.annotate(f"{share:.2f}", (inside + corner) / 2, fontsize=9)
+    axes.plot(*inside, "*", ms=12, color=ORANGE, label="a mixture of three vertices")
+    axes.plot(*points.T, ".", color="k")
+    axes.plot(*corners.T, "o", color=BLUE, label=f"{len(corners)} vertices of {len(points)} points")
+    axes.set(aspect="equal", xlim=(-3.2, 3.2), ylim=(-2.8, 4.2))
+    axes.legend(fontsize=8, loc="upper left")
+    axes.set_title("One hull by three definitions", fontsize=10)
+
+
+def degenerate(axes) -> None:
+    square = [[x, y] for x in (0, 1, 2) for y in (0, 1, 2)]
+    ray = [[0, 0], [1, 0.5], [2, 1], [2, 2], [1, 2], [1, 1], [0.5, 1]]
+    line = [[i / 2, i / 4] for i in range(5)]
+    again = [[0, 0], [2, 0], [1, 2]] * 3
+    shapes = {"points on edges": square, "equal angles": ray, "all on one line": line, "each point three times": again}
+    for i, (name, points) in enumerate(shapes.items()):
+        corner = np.array([3.5 * (i % 2), -3.25 * (i // 2)])
+        points = np.array(points) + corner
+        axes.plot(*closed(convex_hull(points)), color=BLUE)
+        axes.plot(*points.T, ".", color="k")
+        kept = static.graham_scan(points, collinear="keep")
+        axes.plot(*kept.T, "o", ms=11, fillstyle="none", color=ORANGE, label='"keep"' if i == 0 else None)
+        axes.plot(*static.graham_scan(points).T, "o", ms=6, color=BLUE, label='"drop"' if i == 0 else None)
+        axes.annotate(name, (corner[0] + 1, corner[1] - 0.5), fontsize=9, ha="center")
+    axes.set(aspect="equal", xlim=(-0.6, 6.0), ylim=(-4.1, 2.9))
+    axes.axis("off")
+    axes.legend(fontsize=8, loc="upper right", ncols=2)
+    axes.set_title("Four degenerate shapes, and their vertices", fontsize=10)
+
+
+def duality(axes) -> None:
+    hull = DynamicHull(np.random.default_rng(8).uniform(-1, 1, (12, 2)))
+    angle = np.linspace(0, 360, 721)
+    directions = np.column_stack([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    for p in hull.points():
+        axes.plot(angle, directions @ p, color=GREY, lw=0.6)
+    extreme = hull.support(directions)
+    corners, owner = np.unique(extreme, axis=0, return_inverse=True)
+    for i in range(len(corners)):
+        mine = owner.ravel() == i
+        axes.plot(angle[mine], (directions[mine] * extreme[mine]).sum(axis=1), ".", ms=3)
+    axes.plot([], [], color=GREY, lw=0.6, label="each point alone: one wave")
+    axes.plot([], [], color=BLUE, lw=3, label="the hull: the highest wave, a colour for each vertex")
+    axes.set(xlabel="direction, degrees", ylabel="distance of the farthest point along it", xticks=range(0, 361, 90))
+    axes.set_ylim(top=1.9)
+    axes.legend(fontsize=8, loc="upper left")
+    axes.set_title(f"Support function of {len(hull)} points: their hull has {len(corners)} vertices", fontsize=10)
+
+
+def culling(axes) -> None:
+    from matplotlib.patches import Circle
+
+    places, view = cities("IT"), polygon([[-620, -60], [-600, -130], [-150, -300], [-200, 250]])
+    hull = DynamicHull(places)
+    (left, low, right, high), (centre, radius) = hull.bounds, hull.min_circle()
+    volumes = {
+        "circle": (ball(centre, radius), GREEN),
+        "box along the axes": (polygon([[left, low], [right, low], [right, high], [left, high]]), RED),
+        "box of least area": (polygon(hull.min_box()), ORANGE),
+        "hull": (polygon(places), BLUE),
+    }
+    axes.fill(*view.support(outline(ball([0, 0], 1))).T, color=GREY, alpha=0.3, label="view")
+    axes.add_patch(Circle(centre, radius, fill=False, color=GREEN))
+    for name, (shape, colour) in volumes.items():
+        if name != "circle":
+            axes.plot(*closed(convex_hull(shape.points)), color=colour)
+        seen = "in view" if intersect(view, shape) else "out of view"
+        axes.plot([], [], color=colour, label=f"{name}: {seen}")
+    axes.plot(*places.T, ".", ms=2, color="k")
+    axes.set_xlim(right=1400)
+    axes.legend(fontsize=8, loc="upper right")
+    axes.set_title("Cities of Italy: is any of them in view?", fontsize=10)
+    on_a_map(axes)
+
+
 PICTURES: dict[str, Callable] = {
-    f.__name__: f for f in (measures, support, gjk, pieces, margin, defects, phases, frontier, sorting)
+    f.__name__: f
+    for f in (
+        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting),
+        *(definitions, degenerate, duality, culling),
+    )
 }
 
 
