@@ -9,21 +9,24 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from .scene import Mark, Story, Style, chosen
 
 MOST_PANELS, COLUMNS = 40, 4
 MOST_FRAMES = 300
+ENTRIES = 3  # of the legend in a row under an animation
 FRAMES_A_SECOND, LAST_FRAMES = 1.25, 4
 PANEL, FRAME = 3.0, 5.0  # widths in inches
-CAPTION, TITLE = 0.4, 0.5  # heights in inches
+CAPTION, TITLE, LEGEND = 0.4, 0.5, 0.6  # heights in inches
 
 
 def draw_sheet(path: Path, story: Story) -> int:
     """Write a PNG or an SVG, by the name's suffix. Returns the number of steps on it."""
     shown = chosen(len(story.pictures), MOST_PANELS)
     rows = -(-len(shown) // COLUMNS)
-    size = COLUMNS * PANEL, rows * (PANEL * _aspect(story) + CAPTION) + TITLE
+    size = COLUMNS * PANEL, rows * (PANEL * _aspect(story) + CAPTION) + TITLE + LEGEND
     # Text stays text, and the same story makes the same file.
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": story.title}):
         figure, grid = plt.subplots(rows, COLUMNS, figsize=size, dpi=100, squeeze=False, layout="constrained")
@@ -31,7 +34,7 @@ def draw_sheet(path: Path, story: Story) -> int:
             axes.axis("off")
         for axes, i in zip(grid.flat, shown, strict=False):
             _draw(axes, story, i)
-        figure.suptitle(story.title, fontsize=13, parse_math=False)
+        _label(figure, story, len(story.legend))
         figure.savefig(path, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
         plt.close(figure)
     return len(shown)
@@ -40,9 +43,9 @@ def draw_sheet(path: Path, story: Story) -> int:
 def draw_animation(path: Path, story: Story) -> int:
     """Write a GIF with a frame for each step, the last one for longer. Returns the number of steps in it."""
     shown = chosen(len(story.pictures), MOST_FRAMES)
-    size = FRAME, FRAME * _aspect(story) + CAPTION + TITLE
+    size = FRAME, FRAME * _aspect(story) + CAPTION + TITLE + LEGEND
     figure, axes = plt.subplots(figsize=size, dpi=90, layout="constrained")
-    figure.suptitle(story.title, fontsize=12, parse_math=False)
+    _label(figure, story, ENTRIES)
 
     def frame(i: int) -> list[Axes]:
         axes.clear()
@@ -53,6 +56,13 @@ def draw_animation(path: Path, story: Story) -> int:
     animation.save(path, writer=PillowWriter(fps=FRAMES_A_SECOND))  # type: ignore[arg-type]  # takes fractions
     plt.close(figure)
     return len(shown)
+
+
+def _label(figure: Figure, story: Story, columns: int) -> None:
+    """The title above and the legend below."""
+    figure.suptitle(story.title, fontsize=13, parse_math=False)
+    patches = [Patch(color=story.styles[style].colour, label=meaning) for style, meaning in story.legend.items()]
+    figure.legend(handles=patches, loc="outside lower left", ncols=columns, fontsize=8, frameon=False)
 
 
 def _aspect(story: Story) -> float:
@@ -87,6 +97,5 @@ def _draw_mark(axes: Axes, mark: Mark, style: Style, layer: int) -> None:
             axes.plot(xs, ys, "o", color="white", markersize=style.width, zorder=layer)
             axes.plot(xs, ys, "x", color=colour, markersize=style.width, markeredgewidth=1.8, zorder=layer)
         case "number":
-            axes.annotate(
-                mark.text, mark.positions[0], (6, 5), textcoords="offset points", fontsize=style.width, zorder=layer
-            )
+            label = axes.annotate(mark.text, mark.positions[0], (6, 5), textcoords="offset points", zorder=layer)
+            label.set(color=colour, fontsize=style.width)

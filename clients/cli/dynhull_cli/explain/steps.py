@@ -101,7 +101,8 @@ def _apply(now: Step, event: Event) -> Step:
             end = (
                 f"closed: {count} vertices" if closed else f"not closed after {count} steps:\nthrown away, guess again"
             )
-            return replace(now, caption=f"guess {guess}, {end}", triple=(), tangents=())
+            chain = (*now.chain, *now.triple[1:])  # the edge of the last step
+            return replace(now, caption=f"guess {guess}, {end}", chain=chain, triple=(), tangents=())
         case Turn():
             return now
 

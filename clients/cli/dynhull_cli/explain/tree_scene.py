@@ -55,8 +55,7 @@ LEGEND = {
     "changed": "new bridge",
     "old bridge": "old bridge",
     "chain": "chains of a node's children",
-    "bridge": "other bridges",
-    "hull": "hull",
+    "hull": "hull, other bridges",
 }
 RESHAPED = {
     "split": "the leaf has too many points: it is split",
@@ -102,7 +101,7 @@ def tree_story(name: str, points: Sequence[Point]) -> Story:
         tree.insert(*new)
         tree.delete(*old)
     views = [start, *(event.tree for event in tree.events)]
-    height = max((view.height for view in views if view), default=0)
+    height = max((depth for view in views for _, depth in _nodes(view)), default=0)
     where = places(list(dict.fromkeys(points)), stretched=True)
     plan = Plan(where, min(MOST_BETWEEN, (TREE_TOP - TREE_BOTTOM) / max(height, 1)))
     pictures = [Picture(f"the tree of the first {plural(first, 'point', 'points')}", tuple(_tree(start, plan, {})))]
