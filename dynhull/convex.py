@@ -50,7 +50,7 @@ class Cloud:
     """The convex hull of (n, d) points. Support is exact, O(n); of equally far points the lexicographically smallest.
 
     Raises:
-        ValueError, TypeError: no points, or bad ones: the message names the first bad row.
+        ValueError, TypeError: there are no points, or bad ones; the message names the first bad row.
     """
 
     points: Points

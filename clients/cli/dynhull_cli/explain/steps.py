@@ -20,12 +20,12 @@ class Step:
         chain: the points on the chain, from bottom to top.
         finished: chains of earlier passes.
         discarded: points taken off the chain in this pass.
-        triple: the points that are looked at, as a path: three whose turn is evaluated, or a tangent.
+        triple: the points being tested, as a path: three whose turn is evaluated, or a tangent.
         sign: which way they turn.
         groups: vertices of each group's hull.
         tangents: points where tangents from the top of the chain touch the groups.
         hull: the hull's vertices, in the last step only.
-        order: the points of the pass, in the order in which it takes them.
+        order: the points of the pass, in the order in which the pass reads them.
     """
 
     caption: str
@@ -98,9 +98,7 @@ def _apply(now: Step, event: Event) -> Step:
             chain, caption = (*now.chain, vertex), f"tangents from {text(vertex)}\nthe rightmost goes to {text(best)}"
             return replace(now, caption=caption, chain=chain, tangents=tangents, triple=(vertex, best), sign=1)
         case Round(guess, _, count, _, closed):
-            end = (
-                f"closed: {count} vertices" if closed else f"not closed after {count} steps:\nthrown away, guess again"
-            )
+            end = f"closed: {count} vertices" if closed else f"not closed after {count} steps:\ndiscarded, guess again"
             chain = (*now.chain, *now.triple[1:])  # the edge of the last step
             return replace(now, caption=f"guess {guess}, {end}", chain=chain, triple=(), tangents=())
         case Turn():
@@ -108,7 +106,7 @@ def _apply(now: Step, event: Event) -> Step:
 
 
 def cross(turn: Turn) -> str:
-    """The cross product as text: exact where it is short, otherwise rounded; never a zero that is none."""
+    """The cross product as text: exact where it is short, otherwise rounded; "0" only where it is zero."""
     value = turn.cross
     if value.denominator == 1 and abs(value) < 10**6:
         return f"cross product {value.numerator}"
