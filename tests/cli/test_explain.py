@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -10,6 +11,7 @@ from itertools import pairwise
 import pytest
 from killers import KILLERS
 from PIL import Image
+from playwright.sync_api import expect, sync_playwright
 
 from dynhull import DynamicHull
 from dynhull_cli.explain.page import MOST_STEPS
@@ -64,8 +66,10 @@ def test_vector_sheet(example, tmp_path):
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.SVG").read_bytes()
 
 
-def test_animation(example, tmp_path):
-    done = explain("chan", example, "--out", tmp_path / "animation.gif")
+def test_animation(tmp_path):
+    square = tmp_path / "square.csv"
+    square.write_text("x,y\n0,0\n4,0\n4,4\n0,4\n")
+    done = explain("chan", square, "--out", tmp_path / "animation.gif")
     assert done.returncode == 0, done.stderr
     steps = int(re.search(r"(\d+) steps", done.stdout)[1])
     with Image.open(tmp_path / "animation.gif") as animation:
@@ -96,10 +100,34 @@ def test_the_tree_of_the_example(tmp_path):
     assert captions[:3] == [
         "the tree of the first 12 points",
         "insert (8, 9.5):\nis on its leaf's upper and lower chain",
-        "the node's upper bridge is now\nthe tangent from the point",
+        "the upper bridge is now\nthe tangent from the point",
     ]
     assert bridges[2] == ["(2, 9)", "(8, 9.5)"]
     assert steps_in(tmp_path / "page.html", "old bridge")[1][2] == ["(2, 9)", "(5, 6)"]
+
+
+def test_the_page_in_a_browser(tmp_path):
+    """Keys go through the steps; a point says its coordinates; nothing goes to the console."""
+    chromium = shutil.which("chromium")
+    assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
+    assert explain("tree", "--out", tmp_path / "page.html").returncode == 0
+    said = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto((tmp_path / "page.html").as_uri())
+        expect(page.locator("#caption")).to_have_text("1/30 the tree of the first 12 points")
+        expect(page.locator("polyline[stroke-dasharray]")).to_have_count(0)
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowRight")
+        expect(page.locator("#caption")).to_have_text("3/30 the upper bridge is now the tangent from the point")
+        expect(page.locator("polyline[stroke-dasharray]")).to_have_count(1)
+        expect(page.locator("#drawing title", has_text="(8, 9.5)")).not_to_have_count(0)
+        expect(page.locator(".legend")).to_contain_text("old bridge")
+        browser.close()
+    assert not said
 
 
 def test_the_tree_of_own_points(example, tmp_path):

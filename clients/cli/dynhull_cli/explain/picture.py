@@ -26,15 +26,17 @@ def draw_sheet(path: Path, story: Story) -> int:
     """Write a PNG or an SVG, by the name's suffix. Returns the number of steps on it."""
     shown = chosen(len(story.pictures), MOST_PANELS)
     rows = -(-len(shown) // COLUMNS)
-    size = COLUMNS * PANEL, rows * (PANEL * _aspect(story) + CAPTION) + TITLE + LEGEND
+    panel = PANEL * _aspect(story)
+    size = COLUMNS * PANEL, rows * (panel + CAPTION) + TITLE + LEGEND
     # Text stays text, and the same story makes the same file.
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": story.title}):
-        figure, grid = plt.subplots(rows, COLUMNS, figsize=size, dpi=100, squeeze=False, layout="constrained")
+        figure, grid = plt.subplots(rows, COLUMNS, figsize=size, dpi=100, squeeze=False)
         for axes in grid.flat:
             axes.axis("off")
         for axes, i in zip(grid.flat, shown, strict=False):
             _draw(axes, story, i)
         _label(figure, story, len(story.legend))
+        figure.subplots_adjust(hspace=CAPTION / panel, wspace=0)
         figure.savefig(path, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
         plt.close(figure)
     return len(shown)
@@ -44,7 +46,7 @@ def draw_animation(path: Path, story: Story) -> int:
     """Write a GIF with a frame for each step, the last one for longer. Returns the number of steps in it."""
     shown = chosen(len(story.pictures), MOST_FRAMES)
     size = FRAME, FRAME * _aspect(story) + CAPTION + TITLE + LEGEND
-    figure, axes = plt.subplots(figsize=size, dpi=90, layout="constrained")
+    figure, axes = plt.subplots(figsize=size, dpi=90)
     _label(figure, story, ENTRIES)
 
     def frame(i: int) -> list[Axes]:
@@ -59,10 +61,12 @@ def draw_animation(path: Path, story: Story) -> int:
 
 
 def _label(figure: Figure, story: Story, columns: int) -> None:
-    """The title above and the legend below."""
-    figure.suptitle(story.title, fontsize=13, parse_math=False)
+    """The title above and the legend below, and room for both."""
+    height = figure.get_figheight()
+    figure.subplots_adjust(left=0.01, right=0.99, bottom=LEGEND / height, top=1 - (TITLE + CAPTION) / height)
+    figure.suptitle(story.title, fontsize=13, y=1 - TITLE / 2 / height, va="center", parse_math=False)
     patches = [Patch(color=story.styles[style].colour, label=meaning) for style, meaning in story.legend.items()]
-    figure.legend(handles=patches, loc="outside lower left", ncols=columns, fontsize=8, frameon=False)
+    figure.legend(handles=patches, loc="lower left", ncols=columns, fontsize=8, frameon=False)
 
 
 def _aspect(story: Story) -> float:

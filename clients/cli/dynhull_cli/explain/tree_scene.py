@@ -162,7 +162,7 @@ def _in_leaf(begin: Begin, end: End, sides: Sequence[str]) -> str:
 
 
 def _visited(begin: Begin, visit: Visit) -> str:
-    bridge = f"the node's {SIDES[visit.side]} bridge"
+    bridge = f"the {SIDES[visit.side]} bridge"
     if not visit.on_chain:
         return f"{bridge} passes outside\nthe point: it stays, and the climb ends"
     if visit.before != visit.after and begin.kind == "insert":
