@@ -1,4 +1,4 @@
-"""The pictures of the pages on what hulls are for, drawn from real data.
+"""The pictures of the pages: what hulls are for, drawn from real data, and how the tree works, drawn from its events.
 
     pip install -e '.[test]' && python docs/pictures.py [NAME ...]
 
@@ -8,6 +8,7 @@ Finance, formation energies those that come with pymatgen (tests/data/phases.jso
 
 import argparse
 import json
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -21,9 +22,14 @@ from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram
 from dynhull.gjk import contact, intersect
 from dynhull.margin import max_margin
+from dynhull.nodes import UPPER, Leaf, bridge
+from dynhull.predicates import ORIENT_BOUND, UNDERFLOW, orient2d
+from dynhull.trace import Begin, Descent, TracedTree, View, Visit
 
 ROOT = Path(__file__).parents[1]
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999"
+LIGHT = "#DDDDDD"
+LEVELS = ("#000000", "#0072B2", "#009E73", "#E69F00", "#CC79A7")  # the root's first
 YEARS = ("Date", "2006", "2007", "2008", "2009")
 EARTH_DEGREE = 111.2  # kilometres
 
@@ -329,11 +335,202 @@ def culling(axes) -> None:
     on_a_map(axes)
 
 
+class SmallLeaves(TracedTree):
+    """A tree high enough to look at with few points."""
+
+    LEAF = 4
+
+
+def panels(axes, rows: int, columns: int, size: tuple[float, float], **options) -> np.ndarray:
+    """A grid of axes in place of the one."""
+    figure = axes.figure
+    axes.remove()
+    figure.set_size_inches(size)
+    return figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def nodes(view: View, depth: int = 0) -> list[tuple[View, int]]:
+    """A node and all below it, with their depths."""
+    return [(view, depth), *(found for child in view.children for found in nodes(child, depth + 1))]
+
+
+def draw_bars(axes, view: View, colours: dict, width: float = 6) -> None:
+    """Each node as a bar over the x-interval of its points, children below their parent; colours by name."""
+    places = {}
+    for node, depth in nodes(view):
+        left, right = node.points[0][0], node.points[-1][0]
+        places[node.name] = (left + right) / 2, -depth
+        colour = colours.get(node.name, LIGHT)
+        axes.plot([left, right], [-depth, -depth], color=colour, lw=width, solid_capstyle="butt")
+    for node, _ in nodes(view):
+        for child in node.children:
+            axes.plot(*zip(places[node.name], places[child.name], strict=True), color=LIGHT, lw=0.8, zorder=0)
+    axes.margins(y=0.12)
+    axes.axis("off")
+
+
+def draw_leaf_points(axes, view: View) -> None:
+    for node, depth in nodes(view):
+        if not node.children:
+            axes.plot([x for x, _ in node.points], [-depth] * len(node.points), "o", color="w", mec="k", ms=3.5)
+
+
+def how_bridge(axes) -> None:
+    random = np.random.default_rng(21)
+    angle, radius = random.uniform(0, np.pi, (2, 70)), random.uniform(0, 1, (2, 70)) ** 0.2
+    clouds = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1) * [[[1, 1.5]], [[1, 1]]]
+    clouds[1, :, 0] += 2.4
+    leaves = [Leaf(sorted(map(tuple, cloud.tolist()))) for cloud in clouds]
+    chains = [leaf.chains[UPPER] for leaf in leaves]
+    probes: list = []
+    found = bridge(*leaves, UPPER, probes)
+    possible = [(chain[0], chain[-1]) for chain in chains]
+    rows = -(-len(probes) // 3)
+    for panel in (grid := panels(axes, rows, 3, (10, 1.75 * rows))).flat:
+        panel.axis("off")
+    for number, (panel, edges) in enumerate(zip(grid.flat, probes, strict=False), start=1):
+        panel.set(xlim=(-1.2, 3.6), ylim=(-0.1, 1.7), aspect="equal")
+        for i, (leaf, edge, colour) in enumerate(zip(leaves, edges, (BLUE, GREEN), strict=True)):
+            panel.plot(*np.array(leaf.points).T, ".", ms=2, color=LIGHT)
+            panel.plot(*np.array(chains[i]).T, ".-", ms=4, lw=1, color=LIGHT)
+            if number > 1:
+                possible[i] = _narrowed(possible[i], probes[number - 2][i], edge)
+            first, last = (chains[i].index(p) for p in possible[i])
+            panel.plot(*np.array(chains[i][first : last + 1]).T, ".-", ms=5, lw=1, color=colour)
+            panel.plot(*np.array(edge).T, "o-", color=colour, ms=5, lw=3.5)
+            if edge[0] != edge[1]:
+                panel.axline(*edge, color=colour, lw=0.8, ls=":")
+        panel.set_title(f"pair {number}", fontsize=9)
+    panel.plot(*np.array(found).T, "o-", color=RED, lw=2.5)
+    panel.set_title(f"the bridge, after {len(probes) - 1} pairs of edges", fontsize=9)
+
+
+def _narrowed(possible: tuple, edge: tuple, following: tuple) -> tuple:
+    """The part of a chain that can still hold the bridge's end, after a step from one edge to the next."""
+    first, last = possible
+    if following == edge:
+        return possible
+    return (first, edge[0]) if following[1] <= edge[0] else (edge[1], last)
+
+
+def small_tree() -> SmallLeaves:
+    random = np.random.default_rng(5)
+    x = np.arange(24) + random.uniform(-0.3, 0.3, 24)
+    reach = np.sqrt(1 - ((x - 11.5) / 12.5) ** 2)
+    return SmallLeaves(np.column_stack([x, 5 * reach * random.uniform(-1, 1, 24)]))
+
+
+def how_tree(axes) -> None:
+    tree = small_tree()
+    view = tree.view()
+    (top,), (bottom,) = panels(axes, 2, 1, (7.2, 6.4), sharex=True, height_ratios=[3, 2])
+    top.plot(*closed(tree.vertices()), color=LIGHT, lw=9, solid_joinstyle="round", zorder=0)
+    for node, depth in nodes(view):
+        for line in node.bridges or node.chains:
+            top.plot(*np.array(line).T, color=LEVELS[depth], lw=2.8 - 0.5 * depth, ls="-" if node.bridges else ":")
+    top.plot(*tree.points().T, "o", color="k", ms=4)
+    top.set_title("Bridges, each in the colour of its node (dotted: chains of leaves); the hull in grey", fontsize=10)
+    top.axis("off")
+    draw_bars(bottom, view, {node.name: LEVELS[depth] for node, depth in nodes(view)})
+    draw_leaf_points(bottom, view)
+    bottom.set_title("The tree: each node as a bar over the points below it; leaves have up to 4", fontsize=10)
+
+
+def how_climb(axes) -> None:
+    tree = small_tree()
+    tree.insert(6.4, 2.4)
+    tree.delete(*max(tree.chain(UPPER)[1:-1].tolist(), key=lambda p: -abs(p[0] - 12)))  # an end of the root's bridge
+    _, middle = (i for i, event in enumerate(tree.events) if isinstance(event, Begin))
+    grid = panels(axes, 2, 2, (11, 5.6), sharex="col", sharey="row", height_ratios=[3, 2])
+    for (top, bottom), events in zip(grid.T, (tree.events[:middle], tree.events[middle:]), strict=True):
+        _draw_climb(top, bottom, events)
+
+
+def _draw_climb(top, bottom, events) -> None:
+    begin, view = events[0], events[-1].tree
+    descent = next(event for event in events if isinstance(event, Descent))
+    visits = [event for event in events if isinstance(event, Visit)]
+    new = [visit for visit in visits if visit.before != visit.after]
+    upper, lower = view.chains
+    top.plot(*closed(np.array(lower + upper[-2:0:-1])), color=LIGHT, lw=9, solid_joinstyle="round", zorder=0)
+    top.plot(
+        *np.array([p for node, _ in nodes(view) if not node.children for p in node.points]).T, "o", color="k", ms=3
+    )
+    for visit in visits:
+        if visit in new:
+            top.plot(*np.array(visit.before).T, "--", color=RED, lw=1.3)
+        top.plot(*np.array(visit.after).T, "o-", color=ORANGE if visit in new else BLUE, ms=4, lw=2.2)
+    top.plot(*begin.point, "*" if begin.kind == "insert" else "x", color=RED, ms=13, mew=2, zorder=4)
+    top.axis("off")
+    mark = "star" if begin.kind == "insert" else "cross"
+    top.set_title(f"{begin.kind} ({mark}): {len(visits)} bridges looked at, {len(new)} of them new", fontsize=10)
+    colours = dict.fromkeys([descent.leaf], "k")
+    colours |= {visit.node: BLUE for visit in visits} | {visit.node: ORANGE for visit in new}
+    draw_bars(bottom, view, colours)
+    draw_leaf_points(bottom, view)
+    bottom.set_title("orange: new bridge, the old one dashed; blue: stays; black: leaf; grey: not visited", fontsize=9)
+
+
+def how_batch(axes) -> None:
+    from matplotlib import colormaps
+
+    random = np.random.default_rng(8)
+    x = np.linspace(-1, 1, 1536)
+    tree = TracedTree(np.column_stack([x, random.uniform(-1, 1, len(x))]))
+    view = tree.view()
+    for p in random.uniform(-1, 1, (64, 2)):
+        tree.insert(*p)
+    descents = Counter(name for e in tree.events if isinstance(e, Descent) for name in (*e.path, e.leaf))
+    looked_at = Counter((e.node, e.side) for e in tree.events if isinstance(e, Visit))
+    shades = colormaps["Blues"]
+    grid = panels(axes, 2, 1, (9, 6.4))
+    titles = (
+        f"64 points one by one: nodes entered {descents.total()} times, bridges looked at {looked_at.total()} times",
+        f"as a set, each at most once: {len(descents)} nodes, {len(looked_at)} bridges",
+    )
+    for panel, counts, title in zip(grid.flat, (descents, Counter(set(descents))), titles, strict=True):
+        draw_bars(panel, view, {name: shades(np.log2(count + 1) / 10) for name, count in counts.items()}, width=13)
+        for node, depth in nodes(view):
+            middle = (node.points[0][0] + node.points[-1][0]) / 2
+            panel.text(middle, -depth, counts[node.name], ha="center", va="center", fontsize=8)
+        panel.set_title(title, fontsize=10)
+
+
+def how_sign(axes) -> None:
+    from matplotlib.colors import ListedColormap
+
+    b, c = np.array([12.0, 12.0]), np.array([24.0, 24.0])
+
+    def products(origin: np.ndarray, p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        (ux, uy), (vx, vy) = np.moveaxis(p - origin, -1, 0), np.moveaxis(q - origin, -1, 0)
+        return ux * vy, uy * vx
+
+    def plane(step: float) -> np.ndarray:
+        return 0.5 + step * np.stack(np.meshgrid(np.arange(256), np.arange(256)), axis=-1)
+
+    close, wide = plane(2.0**-53), plane(2.0**-51)
+    naive = np.subtract(*products(close, b, c))
+    left, right = products(c, wide, b)
+    sure = np.abs(left - right) > ORIENT_BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
+    pictures = [
+        (np.sign(naive), "the formula in doubles: wrong"),
+        (orient2d(close, b, c), "orient2d, the same points: right"),
+        (np.where(sure, orient2d(wide, b, c), 0), "from 4 times as far: the filter's answer\n(grey: left to integers)"),
+    ]
+    for panel, (signs, title) in zip(panels(axes, 1, 3, (10, 3.9)).flat, pictures, strict=True):
+        panel.imshow(
+            signs, origin="lower", cmap=ListedColormap([ORANGE, GREY, BLUE]), vmin=-1, vmax=1, interpolation="nearest"
+        )
+        panel.set_title(title, fontsize=9)
+        panel.axis("off")
+
+
 PICTURES: dict[str, Callable] = {
-    f.__name__: f
+    f.__name__.replace("_", "-"): f
     for f in (
         *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting),
         *(definitions, degenerate, duality, culling),
+        *(how_bridge, how_tree, how_climb, how_batch, how_sign),
     )
 }
 

@@ -1,7 +1,7 @@
-"""Convex sets known by their support function: the farthest point in any direction.
+"""Convex sets given by their support functions: the farthest point in each direction.
 
-A shape is any object that has the two members of `Convex`; a `DynamicHull` is one. Moving, turning, scaling and adding
-shapes makes new ones that ask the old ones, so a live hull inside stays live.
+A shape is any object with the two members of `Convex`; a `DynamicHull` is one. Moving, turning, scaling and adding
+shapes makes new shapes that query the old ones, so a live hull inside one stays live.
 
 >>> square = box([0, 0], [2, 2])
 >>> capsule([0, 0], [5, 0], radius=1).support([[1, 0], [0, 1]]).tolist()
@@ -12,6 +12,7 @@ shapes makes new ones that ask the old ones, so a live hull inside stays live.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cmp_to_key
 from itertools import product
 from math import cos, isfinite, sin
@@ -21,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Points, as_array, as_directions, as_points, as_rows, as_tuples, as_vector
-from .exact import as_integers
+from .exact import Integers, as_integers, root
 from .predicates import EPSILON, Point, cross_sign
 from .static import convex_hull
 
@@ -30,7 +31,7 @@ Way = tuple[Point, Point, int]
 
 @runtime_checkable
 class Convex(Protocol):
-    """A convex set in two or three dimensions (most functions take any number of them)."""
+    """A convex set in two or three dimensions (most functions accept more)."""
 
     @property
     def dimension(self) -> int:
@@ -49,7 +50,7 @@ class Cloud:
     """The convex hull of (n, d) points. Support is exact, O(n); of equally far points the lexicographically smallest.
 
     Raises:
-        ValueError, TypeError: no points, or bad ones: the message names the first bad row.
+        ValueError, TypeError: there are no points, or bad ones; the message names the first bad row.
     """
 
     points: Points
@@ -58,7 +59,7 @@ class Cloud:
     def __post_init__(self) -> None:
         points = np.unique(as_rows(self.points), axis=0)
         if not len(points):
-            raise ValueError("points are none: an empty set has no support function")
+            raise ValueError("points are empty: an empty set has no support function")
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "_reach", np.abs(points).max(axis=0))
 
@@ -80,7 +81,7 @@ class Cloud:
         with np.errstate(all="ignore"):
             far = self.points @ vector
             error = 4 * len(vector) * EPSILON * (self._reach @ np.abs(vector))
-            # What overflows or underflows is not told apart here.
+            # Overflow and underflow would invalidate the error bound: then every point is compared exactly.
             safe = -900 < largest < 1000
             near = np.flatnonzero(far >= far.max() - 2 * error) if safe else np.arange(len(far))
         if len(near) == 1:
@@ -104,8 +105,7 @@ class Ball:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", as_vector(self.centre, "centre"))
-        if not (isfinite(self.radius) and self.radius >= 0):
-            raise ValueError(f"radius is {self.radius!r}: must be finite and not negative")
+        _check_radius(self.radius)
 
     @property
     def dimension(self) -> int:
@@ -121,15 +121,142 @@ class Ball:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Disk:
+    """A disk in space, at right angles to an axis. Support in exact arithmetic, each coordinate then rounded twice.
+
+    Seen along the axis all its points are equally far; support is the centre.
+
+    Attributes:
+        centre: (3,).
+        axis: (2, 3), two points; only the direction from one to the other matters.
+        radius: of the disk.
+
+    Raises:
+        ValueError: the radius is negative or not finite, the points are not in space, or those of the axis are equal.
+    """
+
+    centre: Points
+    axis: Points
+    radius: float
+    _axis: Integers = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _in_space(self.centre, "centre"))
+        object.__setattr__(self, "axis", np.stack([_in_space(end, "axis") for end in self.axis]))
+        object.__setattr__(self, "_axis", _direction(self.axis)[0])
+        _check_radius(self.radius)
+
+    @property
+    def dimension(self) -> int:
+        """3."""
+        return 3
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, 3) points, each farthest in one of (k, 3) directions."""
+        vectors = as_directions(directions, 3)
+        rims = [_rim(_along_and_across(self._axis, vector)[1], self.radius) for vector in vectors]
+        farthest: Points = self.centre + np.array(rims).reshape(-1, 3)
+        return farthest
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cone:
+    """A cone: the hull of a disk and an apex above its centre. Whether the apex is farthest is decided exactly.
+
+    Support is the apex, or a point of the disk as `Disk` gives it. Where they are equally far, the apex.
+
+    Attributes:
+        base: (3,), the centre of the disk.
+        apex: (3,).
+        radius: of the disk.
+
+    Raises:
+        ValueError: the radius is negative or not finite, base or apex is not a point in space, or they are equal.
+    """
+
+    base: Points
+    apex: Points
+    radius: float
+    _axis: Integers = field(init=False, repr=False)
+    _unit: Fraction = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "base", _in_space(self.base, "base"))
+        object.__setattr__(self, "apex", _in_space(self.apex, "apex"))
+        axis, unit = _direction(np.stack([self.base, self.apex]))
+        object.__setattr__(self, "_axis", axis)
+        object.__setattr__(self, "_unit", unit)
+        _check_radius(self.radius)
+
+    @property
+    def dimension(self) -> int:
+        """3."""
+        return 3
+
+    def support(self, directions: npt.ArrayLike, /) -> Points:
+        """(k, 3) points, each farthest in one of (k, 3) directions."""
+        vectors = as_directions(directions, 3)
+        return np.array([self._farthest(vector) for vector in vectors]).reshape(-1, 3)
+
+    def _farthest(self, vector: Points) -> Points:
+        along, across = _along_and_across(self._axis, vector)
+        height = along * self._unit * int(self._axis @ self._axis)
+        # The apex is higher by `height`, the rim by radius * |across|: compared by their squares.
+        if along >= 0 and height**2 >= Fraction(self.radius) ** 2 * int(across @ across):
+            return self.apex
+        farthest: Points = self.base + _rim(across, self.radius)
+        return farthest
+
+
+def _direction(ends: Points) -> tuple[Integers, Fraction]:
+    """The way from one point to another in integers, and their unit."""
+    (start, end), unit = as_integers(ends)
+    axis = end - start
+    if not axis.any():
+        raise ValueError(f"the axis starts and ends at {tuple(ends[0].tolist())!r}: it has no direction")
+    return axis, unit
+
+
+def _along_and_across(axis: Integers, vector: Points) -> tuple[int, Integers]:
+    """A direction's product with an axis, and its part at right angles times the axis' squared length; exactly."""
+    way, _ = as_integers(vector)
+    along = int(axis @ way)
+    return along, way * int(axis @ axis) - axis * along
+
+
+def _rim(across: Integers, radius: float) -> list[float]:
+    """The vector of length radius in a direction, each coordinate rounded once; zeros where the direction is zero."""
+    square = int(across @ across)
+    if not square:
+        return [0.0, 0.0, 0.0]
+    scale = Fraction(radius) ** 2 / square
+    return [root(x * x * scale) * ((x > 0) - (x < 0)) for x in across.tolist()]
+
+
+def _check_radius(radius: float) -> None:
+    if not (isfinite(radius) and radius >= 0):
+        raise ValueError(f"radius is {radius!r}: must be finite and not negative")
+
+
+def _in_space(value: npt.ArrayLike, name: str) -> Points:
+    vector = as_vector(value, name)
+    if len(vector) != 3:
+        raise ValueError(f"{name} must have shape (3,), got {vector.shape}")
+    return vector
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Sum:
-    """The Minkowski sum of shapes: all sums of one point of each. Support rounds once an addition."""
+    """The Minkowski sum of shapes: all sums of one point of each. Each addition rounds the support once."""
 
     parts: Sequence[Convex]
 
     def __post_init__(self) -> None:
         dimensions = {part.dimension for part in self.parts}
         if len(dimensions) != 1:
-            raise ValueError(f"the shapes of a sum must be some, of one dimension; got {sorted(dimensions)}")
+            raise ValueError(
+                f"a sum needs at least one shape, and all of one dimension; got dimensions {sorted(dimensions)}"
+            )
 
     @property
     def dimension(self) -> int:
@@ -149,7 +276,7 @@ class Mapped:
     Support is that of the shape in the direction rounded once, then rounded once more.
 
     Attributes:
-        stretch: by how much every length grows, where that is the same in all directions, else None.
+        stretch: the factor of every length where it is the same in all directions, else None.
 
     Raises:
         ValueError: the matrix or the offset does not fit the shape, or is not finite.
@@ -179,7 +306,7 @@ class Mapped:
         """(k, d) points, each farthest in one of (k, d) directions."""
         vectors = as_directions(directions, self.dimension)
         turned = vectors @ self.matrix
-        # A direction along which the map flattens everything: every point is farthest.
+        # The map flattens the shape along this direction: every point is farthest.
         turned[~turned.any(axis=1)] = np.eye(self.dimension)[0]
         image: Points = self.shape.support(turned) @ self.matrix.T + self.offset
         return image
@@ -220,6 +347,23 @@ def capsule(p: npt.ArrayLike, q: npt.ArrayLike, radius: float) -> Sum:
     return Sum((ends, Ball(np.zeros(ends.dimension), radius)))
 
 
+def cylinder(p: npt.ArrayLike, q: npt.ArrayLike, radius: float) -> Sum:
+    """The cylinder in space whose axis goes from p to q: all points within a radius of it, between its two disks.
+
+    Support is rounded three times a coordinate.
+
+    Raises:
+        ValueError: the radius is negative or not finite, p or q is not a point in space, or they are equal.
+    """
+    ends = np.stack([_in_space(p, "p"), _in_space(q, "q")])
+    return Sum((Cloud(ends), Disk(np.zeros(3), ends, radius)))
+
+
+def cone(base: npt.ArrayLike, apex: npt.ArrayLike, radius: float) -> Cone:
+    """The cone in space from a disk around `base` to `apex`, the axis at right angles to the disk."""
+    return Cone(_in_space(base, "base"), _in_space(apex, "apex"), radius)
+
+
 def moved(shape: Convex, offset: npt.ArrayLike) -> Mapped:
     """The shape, moved by an offset."""
     return Mapped(shape, np.eye(shape.dimension), as_vector(offset, "offset"), 1.0)
@@ -233,7 +377,7 @@ def rotated(shape: Convex, rotation: float | npt.ArrayLike) -> Mapped:
     """
     if np.ndim(rotation) == 0:
         if shape.dimension != 2:
-            raise ValueError("one angle turns the plane; give a rotation matrix")
+            raise ValueError("rotation is an angle, but the shape is not in the plane: give a rotation matrix")
         angle = float(np.asarray(rotation))
         if not isfinite(angle):
             raise ValueError(f"rotation is {angle!r}: must be finite")
@@ -242,7 +386,7 @@ def rotated(shape: Convex, rotation: float | npt.ArrayLike) -> Mapped:
     if matrix.shape[0] != matrix.shape[1] or not np.allclose(
         matrix @ matrix.T, np.eye(len(matrix)), rtol=0, atol=1e-12
     ):
-        raise ValueError("rotation is no orthogonal matrix")
+        raise ValueError("rotation is not an orthogonal matrix")
     return Mapped(shape, matrix, np.zeros(shape.dimension), 1.0)
 
 
@@ -265,7 +409,7 @@ def minkowski_difference(a: Convex, b: Convex) -> Sum:
 
 
 def convex_combination(a: Convex, b: Convex, share: float) -> Sum:
-    """(1 - share) a + share b, as a becomes b while the share goes from 0 to 1.
+    """(1 - share) a + share b: share 0 is a, share 1 is b, and between them a changes into b.
 
     Raises:
         ValueError: the share is not within 0 and 1.

@@ -147,12 +147,33 @@ class Cursor:
         self.b = self._chain[middle + 1] if middle < self._last else self.a
 
 
-def bridge(left: Tree, right: Tree, side: int) -> Edge:
+def chain_of(tree: Tree, side: int) -> list[Point]:
+    """The chain of a subtree from left to right. O(log n) a vertex."""
+    chain: list[Point] = []
+    stack = [(tree, LOWEST, HIGHEST)]
+    while stack:
+        node, lowest, highest = stack.pop()
+        if isinstance(node, Node):
+            a, b = node.bridges[side]
+            if b <= highest:
+                stack.append((node.right, max(b, lowest), highest))
+            if a >= lowest:
+                stack.append((node.left, lowest, min(a, highest)))
+        else:
+            part = node.chains[side]
+            chain += part[bisect_left(part, lowest) : bisect_right(part, highest)]
+    return chain
+
+
+def bridge(left: Tree, right: Tree, side: int, probes: list[tuple[Edge, Edge]] | None = None) -> Edge:
     """The edge that joins the chains of two subtrees, all of `left` before all of `right`. O(log n) orientations.
 
     With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
     lies outside or on the line through a and b; likewise on the right. Where both edges have each other's ends inside,
     their lines cross between the chains, and on which side of `first`, the least point of the right subtree, decides.
+
+    A list given as `probes` is filled with the pairs of edges that the search compares; an edge from a point to itself
+    is the last vertex left.
     """
     sign = SIGNS[side]
     first = None
@@ -160,6 +181,8 @@ def bridge(left: Tree, right: Tree, side: int) -> Edge:
     while True:
         a, b = left_cursor.a, left_cursor.b
         c, d = right_cursor.a, right_cursor.b
+        if probes is not None:
+            probes.append(((a, b), (c, d)))
         if a is b and c is d:
             return a, c
         start_before = a is not b and (

@@ -5,7 +5,7 @@ holds the points in lexicographic order, up to LEAF of them in a leaf; `nodes.py
 chains and bridges from the leaf up and stops where its point is not on the hull any more, which is early for most.
 """
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -17,9 +17,7 @@ import numpy.typing as npt
 from . import measure
 from .arrays import Points, as_coordinate, as_points
 from .nodes import (
-    HIGHEST,
     LOWER,
-    LOWEST,
     SIDES,
     SIGNS,
     UPPER,
@@ -30,6 +28,7 @@ from .nodes import (
     Tree,
     balanced,
     bridge,
+    chain_of,
     first_point,
     rotate,
     tangent_to_left,
@@ -173,8 +172,7 @@ class HullTree:
             if leaf.add(p, side):
                 changed |= self._climb_added(path, p, side)
         if len(leaf.points) > self.LEAF:
-            half = len(leaf.points) // 2
-            self._replace(path, leaf, Node(Leaf(leaf.points[:half]), Leaf(leaf.points[half:])))
+            self._split(path, leaf)
             self._rebalance(path)
         return changed
 
@@ -199,10 +197,8 @@ class HullTree:
         changed = False
         for side in sides:
             changed |= self._climb_removed(path, p, side)
-        if not leaf.points:
+        if not leaf.points or (len(leaf.points) < self.LEAF // 4 and self._merge(path, leaf)):
             self._rebalance(path)
-        elif len(leaf.points) < self.LEAF // 4:
-            self._merge(path, leaf)
         return changed
 
     def _path(self, p: Point) -> tuple[list[Node], Leaf]:
@@ -216,31 +212,41 @@ class HullTree:
         return path, node
 
     def _climb_added(self, path: list[Node], p: Point, side: int) -> bool:
-        """Repair the bridges above p, new on its leaf's chain, as far as p is on the chain. True where to the root."""
-        sign = SIGNS[side]
-        for node in reversed(path):
-            a, b = node.bridges[side]
-            on_left = p < node.separator
-            turn = sign * orientation(a, b, p)
-            beyond = p < a if on_left else p > b
-            if turn > 0 or (turn == 0 and beyond):
-                if on_left:
-                    node.bridges[side] = p, tangent_to_right(Cursor(node.right, side), p, sign)
-                else:
-                    node.bridges[side] = tangent_to_left(Cursor(node.left, side), p, sign), p
-            elif not beyond:
+        """Repair the bridges above p, new on its leaf's chain. True where p is on the root's chain too."""
+        for node in reversed(path):  # noqa: SIM110  # a generator would cost a tenth of an update
+            if not self._add_at(node, p, side):
                 return False
         return True
 
+    def _add_at(self, node: Node, p: Point, side: int) -> bool:
+        """Repair a node's bridge for p, new on its child's chain. True where p is on the node's chain too."""
+        sign = SIGNS[side]
+        a, b = node.bridges[side]
+        on_left = p < node.separator
+        turn = sign * orientation(a, b, p)
+        beyond = p < a if on_left else p > b
+        if turn > 0 or (turn == 0 and beyond):
+            if on_left:
+                node.bridges[side] = p, tangent_to_right(Cursor(node.right, side), p, sign)
+            else:
+                node.bridges[side] = tangent_to_left(Cursor(node.left, side), p, sign), p
+            return True
+        return beyond
+
     def _climb_removed(self, path: list[Node], p: Point, side: int) -> bool:
-        """Repair the bridges above p, gone from its leaf's chain, as far as p was on it. True where to the root."""
-        for node in reversed(path):
-            a, b = node.bridges[side]
-            if p in (a, b):
-                node.bridges[side] = bridge(node.left, node.right, side)
-            elif a < p < b:
+        """Repair the bridges above p, gone from its leaf's chain. True where p was on the root's chain too."""
+        for node in reversed(path):  # noqa: SIM110  # a generator would cost a tenth of an update
+            if not self._remove_at(node, p, side):
                 return False
         return True
+
+    def _remove_at(self, node: Node, p: Point, side: int) -> bool:
+        """Repair a node's bridge for p, gone from its child's chain. True where p was on the node's chain too."""
+        a, b = node.bridges[side]
+        if p in (a, b):
+            node.bridges[side] = bridge(node.left, node.right, side)
+            return True
+        return not a < p < b
 
     # Shape of the tree
 
@@ -253,6 +259,11 @@ class HullTree:
         else:
             path[-1].right = new
 
+    def _split(self, path: list[Node], leaf: Leaf) -> None:
+        """Halve a leaf that has too many points."""
+        half = len(leaf.points) // 2
+        self._replace(path, leaf, Node(Leaf(leaf.points[:half]), Leaf(leaf.points[half:])))
+
     def _drop(self, path: list[Node], leaf: Leaf) -> None:
         """Take an empty leaf out; its sibling takes their parent's place."""
         if not path:
@@ -261,10 +272,10 @@ class HullTree:
         parent = path.pop()
         self._replace(path, parent, parent.right if parent.left is leaf else parent.left)
 
-    def _merge(self, path: list[Node], leaf: Leaf) -> None:
-        """Give a small leaf's points to the leaf beside it below the same parent, where there is room."""
+    def _merge(self, path: list[Node], leaf: Leaf) -> bool:
+        """Join a small leaf with the leaf beside it below the same parent. False where there is no room."""
         if not path:
-            return
+            return False
         parent = path[-1]
         on_left = parent.left is leaf
         sibling = parent.right if on_left else parent.left
@@ -273,7 +284,7 @@ class HullTree:
             neighbour = sibling.left if on_left else sibling.right
         assert isinstance(neighbour, Leaf)  # a leaf's sibling is one level higher at most
         if len(neighbour.points) + len(leaf.points) > self.LEAF * 3 // 4:
-            return
+            return False
         merged = Leaf(leaf.points + neighbour.points if on_left else neighbour.points + leaf.points)
         path.pop()
         if isinstance(sibling, Node):
@@ -282,7 +293,7 @@ class HullTree:
             sibling.refresh()
         else:
             self._replace(path, parent, merged)
-        self._rebalance(path)
+        return True
 
     def _rebalance(self, path: list[Node]) -> None:
         """Restore the AVL condition along a path, from its end up; stop where nothing changes any more."""
@@ -290,12 +301,16 @@ class HullTree:
             node = path.pop()
             lean = node.left.height - node.right.height
             if abs(lean) > 1:
-                self._replace(path, node, rotate(node, to_right=lean > 0))
+                self._rotate(path, node, to_right=lean > 0)
                 continue
             height = 1 + max(node.left.height, node.right.height)
             if height == node.height:
                 return
             node.height = height
+
+    def _rotate(self, path: list[Node], node: Node, *, to_right: bool) -> None:
+        """Put the higher child of a node in its place."""
+        self._replace(path, node, rotate(node, to_right=to_right))
 
     def _build(self, counts: Counter[Point]) -> None:
         """Start anew from distinct points and how often each is there."""
@@ -342,20 +357,7 @@ class HullTree:
         return self._chain(LOWER) + self._chain(UPPER)[-2:0:-1]
 
     def _chain(self, side: int) -> list[Point]:
-        chain: list[Point] = []
-        stack = [(self._root, LOWEST, HIGHEST)]
-        while stack:
-            node, lowest, highest = stack.pop()
-            if isinstance(node, Node):
-                a, b = node.bridges[side]
-                if b <= highest:
-                    stack.append((node.right, max(b, lowest), highest))
-                if a >= lowest:
-                    stack.append((node.left, lowest, min(a, highest)))
-            elif node is not None:
-                part = node.chains[side]
-                chain += part[bisect_left(part, lowest) : bisect_right(part, highest)]
-        return chain
+        return [] if self._root is None else chain_of(self._root, side)
 
     # Queries
 

@@ -77,10 +77,10 @@ def contact(a: Shape, b: Shape) -> Contact:
     Whether they intersect is decided as by `intersect`. Distance and depth, at every size from the smallest doubles to
     the largest: for points, segments, polygons, polyhedra and live hulls within 1e-12 of the extent of the two sets
     together, wherever they lie; moved, turned, scaled, rounded and added up, within 1e-12 of their largest coordinate;
-    with other curves (a ball scaled unevenly) within 1e-6 of it. Below 1e-300, also within the smallest double; inf
-    beyond the largest. Where floats cannot keep that, the same steps are done in fractions, some thirty times slower.
-    Between unions, all pairs of pieces are looked at: the closest two are told, or the two that overlap most, whose
-    depth is a lower bound of the unions'.
+    with other curves (a cylinder, a cone, a ball scaled unevenly) within 1e-6 of it. Below 1e-300, also within the
+    smallest double; inf beyond the largest. Where floats are not accurate enough, the same steps are repeated in
+    fractions, about thirty times slower. Between unions, all pairs of pieces are compared: the result is that of the
+    closest two, or of the two that overlap most, whose depth is a lower bound of the unions'.
 
     Args:
         a: a convex set, or several whose union is meant.

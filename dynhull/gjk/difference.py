@@ -91,14 +91,14 @@ class Walk:
 class Difference:
     """The set of all p - q, p of a and q of b, scaled by a power of two: squares of its corners are in range."""
 
-    __slots__ = ("_a", "_b", "_exact", "_numbers", "_polytopes", "dimension")
+    __slots__ = ("_a", "_b", "_exact", "_numbers", "dimension", "polytopes")
 
     def __init__(self, a: Convex, b: Convex, numbers: Numbers) -> None:
         self._a = a
         self._b = b
         self._numbers = numbers
         self._exact = isinstance(a, Cloud | DynamicHull) and isinstance(b, Cloud | DynamicHull)
-        self._polytopes = is_polytope(a) and is_polytope(b)
+        self.polytopes = is_polytope(a) and is_polytope(b)
         self.dimension = a.dimension
 
     @property
@@ -108,7 +108,7 @@ class Difference:
 
     def doubt(self) -> None:
         """Have all done again in fractions, unless it is, or the sets are curved: those are only approached."""
-        if self._polytopes and not self._numbers.rational:
+        if self.polytopes and not self._numbers.rational:
             raise NumbersError(replace(self._numbers, rational=True))
 
     def farthest(self, direction: Vector) -> Corner:

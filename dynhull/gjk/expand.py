@@ -16,6 +16,8 @@ from .vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale,
 MOST_ITERATIONS = 512
 # Relative to the size of the difference: a push of less is rounding.
 GAIN = 1e-13
+# The same where a set is curved: its sides would shrink to nothing before they stop growing.
+CURVED_GAIN = 1e-10
 # Of a cross product, relative to its factors.
 CROSS_ERROR = 4 * EPSILON
 # The same: two sides whose distances differ by less may be taken for each other.
@@ -63,6 +65,7 @@ def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
         return Overlap(0.0, flat, _points(weights, [simplex[i] for i in kept]), iterations)
     size = max(length(corner.w) for corner in corners)
     sides = _outward_sides(corners)
+    gain = GAIN if difference.polytopes else CURVED_GAIN
     heap = [(side.distance, i) for i, side in enumerate(sides)]
     heapify(heap)
     gone: set[int] = set()
@@ -73,7 +76,7 @@ def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
         side = sides[i]
         far = difference.farthest(side.normal)
         iterations += 1
-        if dot(far.w, side.normal) - side.distance <= GAIN * size or iterations >= MOST_ITERATIONS:
+        if dot(far.w, side.normal) - side.distance <= gain * size or iterations >= MOST_ITERATIONS:
             break
         seen = _visible(sides, gone, i, far, GAIN * size) if difference.dimension == 3 else [i]
         new = _cone([sides[k] for k in seen], far)

@@ -1,4 +1,4 @@
-"""Static convex hulls: the judges of the dynamic one. All give the same vertices in the same order."""
+"""Static convex hulls, the reference for the dynamic one. All return the same vertices in the same order."""
 
 from .chan import chan
 from .convex_hull import convex_hull

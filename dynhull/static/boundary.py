@@ -1,7 +1,7 @@
-"""The degenerate side of static hulls, in one place: points on the boundary that are not vertices.
+"""Degenerate input of static hulls: points on the boundary that are not vertices.
 
-Duplicates are dropped by each algorithm when it reads its input; what remains are points on one line with others.
-"drop" needs no code of its own: a turn that is not a left turn never makes a vertex. "keep" is what stands here.
+Each algorithm drops duplicates when it reads its input; what remains are points on one line with others. "drop" needs
+no code: a turn that is not a left turn never makes a vertex. This module implements "keep".
 """
 
 from bisect import bisect_left
@@ -11,7 +11,7 @@ from ..predicates import Point, orientation
 
 
 def check_collinear(collinear: str) -> None:
-    """Raise ValueError unless the argument is one of the two words."""
+    """Raise ValueError unless the argument is "drop" or "keep"."""
     if collinear not in ("drop", "keep"):
         raise ValueError(f'collinear must be "drop" or "keep", got {collinear!r}')
 
@@ -30,7 +30,7 @@ def farther_first_on_last_ray(order: list[Point]) -> None:
     """Reverse the points at the last angle, for a Graham scan that keeps boundary points. O(n).
 
     `order` is a pivot and then the others by angle around it, the nearer first. The scan goes out along its first ray
-    and comes back along its last; where all lie on one line there is only the way out.
+    and comes back along its last; points on one line have the first ray only.
     """
     if len(order) < 3 or orientation(order[0], order[1], order[-1]) == 0:
         return

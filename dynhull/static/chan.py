@@ -24,8 +24,8 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     Chan, "Optimal output-sensitive convex hull algorithms in two and three dimensions" (1996). Each round guesses the
     number of vertices: 2, then the square of the last guess. Points are cut into groups of that size, each group's hull
     is computed, and gift wrapping runs across the groups, finding each group's tangent by binary search. A round that
-    does not close within `guess` steps is thrown away. The kernel does it where no trace of single steps is wanted, and
-    lets other Python threads run meanwhile.
+    does not close within `guess` steps is discarded. The kernel runs it unless single steps are traced; other Python
+    threads run meanwhile.
 
     Args:
         xy: (n, 2) array-like of finite numbers.
@@ -110,8 +110,8 @@ def _wrap(start: Point, groups: Sequence[Chains], limit: int, trace: Trace | Non
 def _next(p: Point, lower: Sequence[Point], upper: Sequence[Point]) -> Point:
     """The group's point that has all of the group on or to the left of the ray from p; the farthest of several.
 
-    p is a vertex of the whole hull, so it is a vertex of the group's hull or strictly outside. Where the group is p
-    alone, p. O(log m).
+    p is a vertex of the whole hull, so it is a vertex of the group's hull or strictly outside. Returns p where the
+    group is p alone. O(log m).
     """
     i = bisect_left(lower, p)
     if i < len(lower) and (lower[i] == p or (i > 0 and orientation(lower[i - 1], lower[i], p) < 0)):

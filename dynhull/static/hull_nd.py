@@ -1,6 +1,6 @@
-"""Convex hulls in three and more dimensions: Qhull's, by the conventions of this library.
+"""Convex hulls in three and more dimensions: Qhull with the conventions of this library.
 
-The only part of the library that needs scipy, and the only one whose vertices are not exact: `hull_nd` says how far.
+The only part of the library that needs scipy, and the only one whose vertices are not exact; `hull_nd` gives the bound.
 """
 
 from dataclasses import dataclass
@@ -72,8 +72,8 @@ def hull_nd(points: npt.ArrayLike, merge: bool = False) -> HullND:
     two simplices), and no point lies outside of a face by more than 1e-9 of the points' extent. Hulls of points in one
     plane are exact.
 
-    Flat are only points that lie in a hyperplane exactly, as doubles. Points of a plane turned in space seldom do,
-    since their coordinates are rounded: their hull is of full dimension and a few roundings thick.
+    Points are flat only where they lie exactly in a hyperplane, as doubles. Points of a plane rotated in space rarely
+    do, since their coordinates are rounded: their hull has full dimension and is a few roundings thick.
 
     Args:
         points: (n, d) array-like of finite numbers.

@@ -1,4 +1,4 @@
-"""The Jarvis march, or gift wrapping: from each vertex to the next, looking at every point."""
+"""The Jarvis march, or gift wrapping: from each vertex to the next, comparing all points."""
 
 from collections.abc import Iterable
 
@@ -52,7 +52,7 @@ def jarvis_march(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace 
 def rightmost(p: Point, candidates: Iterable[Point], trace: Trace | None = None) -> Point:
     """The candidate that has no other to the right of the ray from p to it, the farthest of several. O(candidates).
 
-    p is a vertex of the hull of all candidates and itself. p where there is no other point.
+    p is a vertex of the hull of all candidates and itself. Returns p where there is no other point.
     """
     best = p
     for q in candidates:

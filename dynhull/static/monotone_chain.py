@@ -57,7 +57,7 @@ def half_chain(points: Sequence[Point], sign: int) -> list[Point]:
 
 
 def _traced_half_chain(points: Sequence[Point], sign: int, collinear: Collinear, trace: Trace) -> list[Point]:
-    """`half_chain`, telling what it does, and keeping points between vertices where asked to."""
+    """`half_chain` with a trace; with "keep" it keeps the points between vertices."""
     pops_from = 0 if collinear == "drop" else 1
     chain: list[Point] = []
     for p in points:

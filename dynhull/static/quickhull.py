@@ -1,4 +1,4 @@
-"""Quickhull in exact arithmetic: for points that are too flat, or too many of them in one hyperplane, for floats."""
+"""Quickhull in exact arithmetic: for points too flat for floats, or with too many in one hyperplane."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 Integers = npt.NDArray[Any]
-# A normal and an offset, without a common divisor: normal @ x <= offset inside.
+# A normal and an offset without a common divisor; inside, normal @ x <= offset.
 Plane = tuple[int, ...]
 
 
@@ -74,7 +74,7 @@ def independent(vectors: Integers) -> tuple[list[int], list[int]]:
 
 
 def inverse(matrix: Integers) -> Integers:
-    """In rational numbers. The determinant is not zero."""
+    """The inverse in rational numbers. The determinant must not be zero."""
     k = len(matrix)
     rows = np.concatenate([matrix, np.eye(k, dtype=np.int64).astype(object)], axis=1) * Fraction(1)
     for i in range(k):
@@ -88,7 +88,7 @@ def inverse(matrix: Integers) -> Integers:
 
 
 def determinant_sign(matrix: Integers) -> int:
-    """By the same elimination, from the top only."""
+    """The sign of the determinant, by Gaussian elimination in rational numbers."""
     rows = matrix * Fraction(1)
     sign = 1
     for i in range(len(rows)):
@@ -105,7 +105,7 @@ def determinant_sign(matrix: Integers) -> int:
 
 
 def whole(ratios: Iterable[Fraction]) -> list[int]:
-    """In the same direction, of integers."""
+    """Integers in the same ratios."""
     ratios = list(ratios)
     scale = lcm(*(ratio.denominator for ratio in ratios))
     return [int(ratio * scale) for ratio in ratios]
@@ -213,7 +213,7 @@ def _plane(values: list[int]) -> Plane:
 
 
 def _within_faces(facets: list[Facet]) -> set[int]:
-    """Corners that are no extreme points: the normals of the faces around them do not span the space."""
+    """Corners that are not extreme points: the normals of the faces around them do not span the space."""
     around: dict[int, set[Plane]] = {}
     for facet in facets:
         for corner in facet.corners:

@@ -1,4 +1,4 @@
-"""What a static algorithm did, as data: pass a list as `trace` and it is filled with these."""
+"""The events of a static algorithm, which appends them to the list given as `trace`."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -84,8 +84,8 @@ class Round:
 
     Attributes:
         guess: the guessed number of vertices; groups have at most this many points.
-        groups: how many groups.
-        steps: vertices found by gift wrapping before the round closed or was thrown away.
+        groups: the number of groups.
+        steps: vertices found by gift wrapping before the round closed or was discarded.
         cost: the round's cost estimate, n log2(guess).
         closed: whether the hull closed within `guess` steps.
     """
@@ -103,4 +103,4 @@ Collinear = Literal["drop", "keep"]
 
 
 class Rounds(Trace):
-    """A trace for `chan` that takes no steps, only each `Round`: as fast as no trace."""
+    """A trace for `chan` that records each `Round` but no single steps: as fast as no trace."""

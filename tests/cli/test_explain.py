@@ -2,16 +2,24 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
+from itertools import pairwise
 
 import pytest
 from killers import KILLERS
 from PIL import Image
+from playwright.sync_api import expect, sync_playwright
 
+from dynhull import DynamicHull
 from dynhull_cli.explain.page import MOST_STEPS
-from dynhull_cli.explain.picture import places
-from dynhull_cli.explain.steps import chosen, explained
+from dynhull_cli.explain.picture import draw_sheet
+from dynhull_cli.explain.scene import chosen, places
+from dynhull_cli.explain.static_scene import static_story
+from dynhull_cli.explain.steps import explained
+from dynhull_cli.explain.tree_scene import tree_story
 
 EXAMPLE = [(0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (4.0, 4.0), (2.0, 3.0), (0.0, 4.0), (1.0, 2.0), (2.0, 1.0)]
 CORNERS = [(0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (4.0, 4.0), (0.0, 4.0)]
@@ -30,10 +38,13 @@ def example(tmp_path):
     return path
 
 
-def steps_in(page):
+def steps_in(page, style="chain"):
+    """A page's data, and for each step the coordinates of its marks of one style."""
     data = json.loads(re.search(r"const data = (.*);\n", page.read_text(encoding="utf-8"))[1])
     names = data["names"]
-    return data, [[names[i] for i in step.get("chain", [])] for step in data["steps"]]
+    return data, [
+        [names[i] for name, indices, *_ in step["marks"] if name == style for i in indices] for step in data["steps"]
+    ]
 
 
 def test_sheet(example, tmp_path):
@@ -45,8 +56,20 @@ def test_sheet(example, tmp_path):
         assert len(sheet.convert("RGB").getcolors(10**6)) > 10
 
 
-def test_animation(example, tmp_path):
-    done = explain("chan", example, "--out", tmp_path / "animation.gif")
+def test_vector_sheet(example, tmp_path):
+    """Its text is text, and the same points make the same file."""
+    assert explain("graham_scan", example, "--out", tmp_path / "a.svg").returncode == 0
+    drawing = ET.fromstring((tmp_path / "a.svg").read_text(encoding="utf-8"))
+    words = {element.text for element in drawing.iter("{http://www.w3.org/2000/svg}text")}
+    assert {"graham_scan: example.csv", "13/13  the hull: 5 vertices"} <= words
+    draw_sheet(tmp_path / "b.SVG", static_story("graham_scan", "example.csv", EXAMPLE, "drop"))
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.SVG").read_bytes()
+
+
+def test_animation(tmp_path):
+    square = tmp_path / "square.csv"
+    square.write_text("x,y\n0,0\n4,0\n4,4\n0,4\n")
+    done = explain("chan", square, "--out", tmp_path / "animation.gif")
     assert done.returncode == 0, done.stderr
     steps = int(re.search(r"(\d+) steps", done.stdout)[1])
     with Image.open(tmp_path / "animation.gif") as animation:
@@ -61,6 +84,73 @@ def test_page(example, tmp_path):
     assert data["count"] == len(chains) == 13
     assert chains[-2] == ["(0.0, 0.0)", "(4.0, 0.0)", "(5.0, 2.0)", "(4.0, 4.0)"]
     assert data["steps"][-1]["caption"] == "the hull: 5 vertices"
+
+
+def test_the_beginning_of_a_name_is_enough(example, tmp_path):
+    assert explain("graham", example, "--out", tmp_path / "page.html").returncode == 0
+    assert steps_in(tmp_path / "page.html")[0]["title"] == "graham_scan: example.csv"
+
+
+def test_the_tree_of_the_example(tmp_path):
+    done = explain("tree", "--out", tmp_path / "page.html")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == f"8 updates, 30 steps: {tmp_path / 'page.html'}\n"
+    data, bridges = steps_in(tmp_path / "page.html", "new bridge")
+    captions = [step["caption"] for step in data["steps"]]
+    assert captions[:3] == [
+        "the tree of the first 12 points",
+        "insert (8, 9.5):\nis on its leaf's upper and lower chain",
+        "the upper bridge is now\nthe tangent from the point",
+    ]
+    assert bridges[2] == ["(2, 9)", "(8, 9.5)"]
+    assert steps_in(tmp_path / "page.html", "old bridge")[1][2] == ["(2, 9)", "(5, 6)"]
+
+
+def test_the_page_in_a_browser(tmp_path):
+    """Keys go through the steps; a point says its coordinates; nothing goes to the console."""
+    chromium = shutil.which("chromium")
+    assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
+    assert explain("tree", "--out", tmp_path / "page.html").returncode == 0
+    said = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto((tmp_path / "page.html").as_uri())
+        expect(page.locator("#caption")).to_have_text("1/30 the tree of the first 12 points")
+        expect(page.locator("polyline[stroke-dasharray]")).to_have_count(0)
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowRight")
+        expect(page.locator("#caption")).to_have_text("3/30 the upper bridge is now the tangent from the point")
+        expect(page.locator("polyline[stroke-dasharray]")).to_have_count(1)
+        expect(page.locator("#drawing title", has_text="(8, 9.5)")).not_to_have_count(0)
+        expect(page.locator(".legend")).to_contain_text("old bridge")
+        browser.close()
+    assert not said
+
+
+def test_the_tree_of_own_points(example, tmp_path):
+    """Six of eight points are there at first; the last two come and the first two go."""
+    done = explain("tree", example, "--out", tmp_path / "page.html")
+    assert done.stdout.splitlines()[-1].startswith("4 updates, ")
+    data, points = steps_in(tmp_path / "page.html", "point")
+    assert data["title"] == "tree: example.csv"
+    assert set(points[0]) - {""} == {repr(p) for p in EXAMPLE[:6]}
+    assert set(points[-1]) - {""} == {repr(p) for p in EXAMPLE[2:]}
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 30])
+def test_the_tree_shows_the_hull_of_its_points(count):
+    """Points that repeat, among them."""
+    points = [(float(i * i % 11), float(i * 7 % 13)) for i in range(count)] + [(1.0, 1.0)] * 3
+    story = tree_story("points", points)
+    position = {name: place for place, name in story.names.items()}
+    first = len(points) * 3 // 4
+    for picture, window in ((story.pictures[0], points[:first]), (story.pictures[-1], points[-first:])):
+        hull = [mark.positions for mark in picture.marks if mark.style == "hull"]
+        assert hull == [tuple(position[repr(p)] for p in map(tuple, DynamicHull(window).vertices().tolist()))]
+    assert any("more than once" in picture.caption for picture in story.pictures)
 
 
 def test_a_name_cannot_end_the_script(tmp_path):
@@ -87,13 +177,18 @@ def test_long_traces_are_thinned_out_and_say_so(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["graham_scan", "FILE", "--out", "picture.bmp"], "the name must end in .png, .gif or .html"),
+        (["graham_scan", "FILE", "--out", "picture.bmp"], "the name must end in .html, .png, .svg or .gif"),
         (["graham_scan", "FILE", "--x", "east"], "FILE has no column 'east' (--x); it has x, y"),
-        (["quickhull", "FILE"], "quickhull"),
+        (["quickhull", "FILE"], "quickhull: not an algorithm; choose graham_scan, jarvis_march,"),
+        (["tree", "FILE", "--collinear", "keep"], "--collinear keep: the tree keeps vertices only"),
+        (["tree", "MANY"], "has 201 points: a picture of the tree has room for 200"),
     ],
 )
-def test_what_cannot_be_drawn_is_refused(example, arguments, message):
-    done = explain(*[str(example) if argument == "FILE" else argument for argument in arguments])
+def test_what_cannot_be_drawn_is_refused(example, tmp_path, arguments, message):
+    many = tmp_path / "many.csv"
+    many.write_text("x,y\n" + "".join(f"{i},{i * i}\n" for i in range(201)))
+    files = {"FILE": str(example), "MANY": str(many)}
+    done = explain(*[files.get(argument, argument) for argument in arguments])
     assert done.returncode == 2
     assert message.replace("FILE", str(example)) in done.stderr
     assert "Traceback" not in done.stderr
@@ -119,25 +214,41 @@ def test_steps_of_the_worked_example():
     assert list(steps[-1].hull) == CORNERS
 
 
+def test_a_round_of_chan_shows_its_last_edge():
+    steps = explained("chan", EXAMPLE, "drop")
+    ends = [(before, step) for before, step in pairwise(steps) if "closed" in step.caption]
+    assert [len(step.chain) for _, step in ends] == [3, 5, 6]
+    for before, step in ends:
+        assert step.chain[-2:] == before.triple
+    assert list(ends[-1][1].chain) == [*CORNERS, CORNERS[0]]
+
+
 @pytest.mark.parametrize("collinear", ["drop", "keep"])
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("name", ["subnormals and ones", "the largest doubles", "one vertical line", "signed zeros"])
 def test_every_trace_can_be_drawn(algorithm, collinear, name):
     rows = list(dict.fromkeys((x + 0.0, y + 0.0) for x, y in KILLERS[name]))
-    where = places(rows)
-    assert all(-1 <= coordinate <= 1 for place in where.values() for coordinate in place)
-    steps = explained(algorithm, rows, collinear)
-    assert steps[-1].hull
-    for step in steps:
-        drawn = [*step.chain, *step.discarded, *step.triple, *step.tangents, *step.hull, *step.order]
-        assert all(p in where for chain in (*step.finished, *step.groups, drawn) for p in chain)
-        assert "0: left" not in step.caption.replace("10: left", "")
+    story = static_story(algorithm, name, rows, collinear)
+    assert all(-1 <= coordinate <= 1 for place in places(rows).values() for coordinate in place)
+    assert any(mark.style == "hull" for mark in story.pictures[-1].marks)
+    for picture in story.pictures:
+        assert all(position in story.names for mark in picture.marks for position in mark.positions)
+        assert "0: left" not in picture.caption.replace("10: left", "")
 
 
-def test_one_point_and_points_on_a_line(tmp_path):
+@pytest.mark.parametrize("name", ["subnormals and ones", "the largest doubles", "one vertical line", "signed zeros"])
+def test_every_tree_can_be_drawn(name):
+    story = tree_story(name, [(x + 0.0, y + 0.0) for x, y in KILLERS[name]][:60])
+    (left, bottom), (right, top) = story.low, story.high
+    for picture in story.pictures:
+        for mark in picture.marks:
+            assert mark.positions
+            assert all(left <= x <= right and bottom <= y <= top for x, y in mark.positions)
+
+
+@pytest.mark.parametrize("text", ["x,y\n1,2\n", "x,y\n1e308,0\n-1e308,0\n0,0\n"])
+def test_one_point_and_points_on_a_line(tmp_path, text):
     path = tmp_path / "line.csv"
-    for text in ("x,y\n1,2\n", "x,y\n1e308,0\n-1e308,0\n0,0\n"):
-        path.write_text(text)
-        for name in ("a.png", "a.html"):
-            done = explain("jarvis_march", path, "--collinear", "keep", "--out", tmp_path / name)
-            assert done.returncode == 0, done.stderr
+    path.write_text(text)
+    done = explain("jarvis_march", path, "--collinear", "keep", "--out", tmp_path / "sheet.png")
+    assert done.returncode == 0, done.stderr

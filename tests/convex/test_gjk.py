@@ -14,7 +14,21 @@ from judges import fcl_body, fcl_distance
 from oracle import root
 
 from dynhull import DynamicHull
-from dynhull.convex import Cloud, ball, box, capsule, moved, point, polygon, rotated, scaled, segment, sum_of_polygons
+from dynhull.convex import (
+    Cloud,
+    ball,
+    box,
+    capsule,
+    cone,
+    cylinder,
+    moved,
+    point,
+    polygon,
+    rotated,
+    scaled,
+    segment,
+    sum_of_polygons,
+)
 from dynhull.gjk import contact, distance_many, intersect, intersect_many
 from dynhull.static import hull_nd
 
@@ -113,6 +127,25 @@ def test_flat_sets_in_space():
 def bodies():
     random = np.random.default_rng(7)
     return [random.normal(size=(12, 3)) + 1.5 * random.normal(size=3) for _ in range(120)]
+
+
+def test_cylinders_and_cones_against_their_sections():
+    """A point lies to a solid of revolution as it lies to the section in one plane with it."""
+    random = np.random.default_rng(4)
+    for _ in range(40):
+        base, top = random.normal(size=(2, 3))
+        radius, p = random.uniform(0.1, 2), base + random.normal(size=3)
+        height = np.linalg.norm(top - base)
+        along = (p - base) @ (top - base) / height
+        place = point([np.linalg.norm(p - base - along * (top - base) / height), along])
+        for solid, section in (
+            (cylinder(base, top, radius), [[-radius, 0], [radius, 0], [radius, height], [-radius, height]]),
+            (cone(base, top, radius), [[-radius, 0], [radius, 0], [0, height]]),
+        ):
+            found, expected = contact(solid, point(p)), contact(polygon(section), place)
+            assert found.intersect == expected.intersect
+            assert found.distance == pytest.approx(expected.distance, abs=1e-6)
+            assert found.depth == pytest.approx(expected.depth, abs=1e-6)
 
 
 def test_agrees_with_fcl_in_space(bodies):

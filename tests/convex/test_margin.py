@@ -67,7 +67,7 @@ def test_touching_and_overlapping():
 @pytest.mark.parametrize(
     ("a", "b", "message"),
     [
-        ([], [[0, 0]], "points are none"),
+        ([], [[0, 0]], "points are empty"),
         ([[0, 0]], [[0, np.nan]], "points row 0"),
         ([[0, 0]], [[0, 0, 0]], "dimension 2 or 3"),
     ],

@@ -1,9 +1,12 @@
 """Support functions of shapes, against points of these shapes."""
 
+from fractions import Fraction
+from math import inf, nextafter
+
 import numpy as np
 import oracle
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from inputs import any_points, finite, grid_points
 
@@ -13,7 +16,9 @@ from dynhull.convex import (
     ball,
     box,
     capsule,
+    cone,
     convex_combination,
+    cylinder,
     minkowski_difference,
     minkowski_sum,
     moved,
@@ -50,6 +55,50 @@ def test_shapes():
     assert ball([5, 0], 2).support([[3, 4], [0, -1e300]]) == pytest.approx(np.array([[6.2, 1.6], [5, -2]]))
     assert capsule([0, 0, 0], [0, 0, 9], 1).support([[0, 0, 1], [1, 0, 0]]).tolist() == [[0, 0, 10], [1, 0, 0]]
     assert scaled(ball([1, 1], 1), [2, 3]).support([[1, 0], [0, 1]]).tolist() == [[4, 3], [2, 6]]
+
+
+def test_cylinders_and_cones():
+    ways = [[4, 3, 0], [4, 3, 1e-9], [0, 0, 1], [0, 0, -7], [3, -4, -1e300]]
+    upright = cylinder([1, 0, 0], [1, 0, 2], 5)
+    assert upright.support(ways).tolist() == [[5, 3, 0], [5, 3, 2], [1, 0, 2], [1, 0, 0], [4, -4, 0]]
+    assert cone([1, 0, 0], [1, 0, 2], 5).support(ways).tolist() == [
+        [5, 3, 0],
+        [5, 3, 0],
+        [1, 0, 2],
+        [1, 0, 0],
+        [4, -4, 0],
+    ]
+    assert cylinder([0, 0, 0], [1, 1, 0], 0).support([[1, 0, 5]]).tolist() == [[1, 1, 0]]
+    assert cone([0, 0, 0], [1e308, 0, 0], 1e308).support([[-1, 0, -1e-308]]).tolist() == [[0, 0, -1e308]]
+    assert cylinder([0, 0, -1e308], [0, 0, 1e308], 5e-324).support([[5e-324, 0, 0]]).tolist() == [[5e-324, 0, -1e308]]
+
+
+def test_whether_the_apex_or_the_rim_is_farther_is_exact():
+    """In direction (4, 0, 3) both are equally far."""
+    shape = cone([0, 0, 0], [0, 0, 4], 3)
+    ways = [[4, 0, 3], [4, 0, nextafter(3, 0)], [nextafter(4, inf), 0, 3], [4e300, 0, 3e300]]
+    assert shape.support(ways).tolist() == [[0, 0, 4], [3, 0, 0], [3, 0, 0], [0, 0, 4]]
+
+
+coordinates = st.floats(-1e6, 1e6)
+vectors = st.tuples(coordinates, coordinates, coordinates)
+
+
+@given(vectors, vectors, st.floats(0, 1e6), vectors.filter(any))
+def test_disks_are_as_wide_as_their_radius_and_at_right_angles_to_the_axis(p, q, radius, direction):
+    """Each coordinate of the rim against the root of its square, in rational numbers."""
+    axis = [Fraction(b) - Fraction(a) for a, b in zip(p, q, strict=True)]
+    assume(any(axis))
+    way = [Fraction(x) for x in direction]
+    length, along = sum(x * x for x in axis), sum(x * y for x, y in zip(axis, way, strict=True))
+    across = [w - along / length * a for w, a in zip(way, axis, strict=True)]
+    square = sum(x * x for x in across)
+    found = cylinder(p, q, radius).support([direction])[0]
+    end = q if along > 0 or (along == 0 and q < p) else p
+    for got, centre, x in zip(found, end, across, strict=True):
+        out = oracle.root(Fraction(radius) ** 2 * x * x / square) if square else 0
+        error = Fraction(float(got)) - Fraction(centre) - (out if x > 0 else -out)
+        assert abs(error) <= 2.0**-52 * (abs(centre) + float(out)) + 5e-324
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -100,7 +149,7 @@ def test_flat_images():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Cloud([]), "points are none"),
+        (lambda: Cloud([]), "points are empty"),
         (lambda: polygon([[0, 0], [1, np.nan]]), "points row 1 is"),
         (lambda: ball([0, 0], -1), "radius is -1"),
         (lambda: ball([0, 0], np.inf), "radius is inf"),
@@ -109,9 +158,16 @@ def test_flat_images():
         (lambda: segment([0, 0], [0, 0, 0]), "same dimension"),
         (lambda: minkowski_sum(point([0, 0]), point([0, 0, 0])), "of one dimension"),
         (lambda: convex_combination(point([0, 0]), point([1, 1]), 1.5), "share is 1.5"),
-        (lambda: rotated(point([0, 0]), [[1, 1], [0, 1]]), "no orthogonal matrix"),
-        (lambda: rotated(point([0, 0, 0]), 1.0), "one angle turns the plane"),
+        (lambda: rotated(point([0, 0]), [[1, 1], [0, 1]]), "not an orthogonal matrix"),
+        (lambda: rotated(point([0, 0, 0]), 1.0), "rotation is an angle"),
         (lambda: rotated(point([0, 0]), np.nan), "rotation is nan"),
+        (lambda: cylinder([0, 0, 0], [0, 0, 1], -1), "radius is -1"),
+        (lambda: cylinder([1, 2, 3], [1, 2, 3], 1), r"axis starts and ends at \(1.0, 2.0, 3.0\)"),
+        (lambda: cylinder([0, 0], [0, 1], 1), r"p must have shape \(3,\)"),
+        (lambda: cone([0, 0, 0], [0, 0, 0], 1), "axis starts and ends"),
+        (lambda: cone([0, 0, 0], [0, 0, np.nan], 1), "apex row 0"),
+        (lambda: cone([0, 0, 0], [0, 0, 1], np.nan), "radius is nan"),
+        (lambda: cone([0, 0, 0], [0, 0, 1], 1).support([[0, 0, 0]]), "directions row 0"),
         (lambda: moved(point([0, 0]), [1, 2, 3]), "must have shapes"),
         (lambda: point([0, 0]).support([[0, 0]]), "directions row 0"),
         (lambda: ball([0, 0], 1).support([[1, 0], [np.inf, 1]]), "directions row 1"),

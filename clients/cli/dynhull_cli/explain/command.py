@@ -1,5 +1,6 @@
 """The command: `dynhull explain`."""
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -7,57 +8,105 @@ from typing import Annotated
 import typer
 
 from ..csv_points import read_points
-from .page import write_page
-from .picture import draw_animation, draw_sheet
-from .steps import explained
+from .scene import Point, Story
 
-WRITERS = {".png": draw_sheet, ".gif": draw_animation, ".html": write_page}
-
-
-class Algorithm(StrEnum):
-    """The static algorithms that leave a trace."""
-
-    GRAHAM_SCAN = "graham_scan"
-    JARVIS_MARCH = "jarvis_march"
-    CHAN = "chan"
-    MONOTONE_CHAIN = "monotone_chain"
+TREE = "tree"
+ALGORITHMS = ("graham_scan", "jarvis_march", "chan", "monotone_chain", TREE)
+SUFFIXES = (".html", ".png", ".svg", ".gif")
+EXAMPLE: list[Point] = [(7, 3), (13, 8), (2, 9), (10, 1), (0, 4), (12, 5), (4, 2), (15, 6), (9, 7), (5, 6)]
+EXAMPLE += [(14, 2), (3, 5), (8, 9.5), (1, 6), (11, 4), (6, 0)]
 
 
 class Boundary(StrEnum):
-    """What becomes of points on the boundary that are no vertices."""
+    """What happens to points on the boundary that are not vertices."""
 
     DROP = "drop"
     KEEP = "keep"
 
 
 def explain(
-    algorithm: Annotated[Algorithm, typer.Argument(help="The algorithm.")],
-    points: Annotated[Path, typer.Argument(metavar="FILE.csv", exists=True, dir_okay=False, help="Points, one a row.")],
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            metavar="ALGORITHM",
+            help=f"{', '.join(ALGORITHMS[:-1])} or {ALGORITHMS[-1]}; the beginning of a name is enough.",
+            autocompletion=lambda: list(ALGORITHMS),
+        ),
+    ],
+    points: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE.csv", exists=True, dir_okay=False, help="Points, one a row. Default: 16 points."),
+    ] = None,
     out: Annotated[
-        Path, typer.Option(dir_okay=False, help="The file to write: .png (a sheet), .gif (an animation) or .html.")
+        Path,
+        typer.Option(
+            dir_okay=False,
+            help="The file to write: .html (a page to step through), .png or .svg (a sheet) or .gif (an animation).",
+        ),
     ] = Path("dynhull-explain.html"),
     x: Annotated[str | None, typer.Option(help="Column of x. Default: x, lon or longitude.")] = None,
     y: Annotated[str | None, typer.Option(help="Column of y. Default: y, lat or latitude.")] = None,
-    collinear: Annotated[Boundary, typer.Option(help="Boundary points that are no vertices.")] = Boundary.DROP,
+    collinear: Annotated[
+        Boundary, typer.Option(help="Boundary points that are not vertices; a static algorithm only.")
+    ] = Boundary.DROP,
 ) -> None:
-    """Draw, step by step, how an algorithm finds a hull: its chain, the turn it looks at, the points it discards.
+    """Draw, step by step, how an algorithm finds a hull, or how the dynamic tree keeps one.
 
-    A sheet has room for 40 steps, an animation for 300, a page for 2000; of more, an even choice is drawn.
+    Static algorithms: the chain, the turn being tested, the points discarded. Tree: three quarters of the points are
+    in the tree at first; then each further point is inserted and the oldest one deleted, with the nodes visited and
+    the bridges searched anew. Its leaves hold up to 4 points here, so that a few points make a tree.
+
+    A sheet has room for 40 steps, an animation for 300, a page for 2000; if there are more, an even choice is drawn.
     """
     try:
-        write = WRITERS[out.suffix.lower()]
-    except KeyError:
-        typer.echo(f"error: --out {out}: the name must end in .png, .gif or .html", err=True)
-        raise typer.Exit(2) from None
-    try:
-        rows, notes = read_points(points, x, y)
-        xy = [position for _, _, position in rows]
-        steps = explained(algorithm.value, xy, collinear.value)
-        drawn = write(out, f"{algorithm.value}: {points.name}", list(dict.fromkeys(xy)), steps)
+        algorithm, write = _full_name(algorithm), _writer(out)
+        rows, notes = (EXAMPLE, []) if points is None else _read(points, x, y)
+        name = "example" if points is None else points.name
+        story = _story(algorithm, name, rows, collinear)
+        drawn = write(out, story)
     except (ValueError, OSError) as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from None
     for note in notes:
         typer.echo(note)
-    left_out = "" if drawn == len(steps) else f", {drawn:,} of them drawn"
-    typer.echo(f"{len(steps[-1].hull):,} vertices, {len(steps):,} steps{left_out}: {out}")
+    left_out = "" if drawn == len(story.pictures) else f", {drawn:,} of them drawn"
+    typer.echo(f"{story.result}, {len(story.pictures):,} steps{left_out}: {out}")
+
+
+def _full_name(beginning: str) -> str:
+    """The one algorithm whose name begins like this."""
+    found = [name for name in ALGORITHMS if name.startswith(beginning)]
+    if len(found) != 1:
+        raise ValueError(f"{beginning}: not an algorithm; choose {', '.join(ALGORITHMS[:-1])} or {ALGORITHMS[-1]}")
+    return found[0]
+
+
+def _read(path: Path, x: str | None, y: str | None) -> tuple[list[Point], list[str]]:
+    rows, notes = read_points(path, x, y)
+    return [position for _, _, position in rows], notes
+
+
+def _story(algorithm: str, name: str, points: list[Point], collinear: Boundary) -> Story:
+    if algorithm != TREE:
+        from .static_scene import static_story
+
+        return static_story(algorithm, name, points, collinear.value)
+    if collinear is not Boundary.DROP:
+        raise ValueError("--collinear keep: the tree keeps vertices only")
+    from .tree_scene import tree_story
+
+    return tree_story(name, points)
+
+
+def _writer(path: Path) -> Callable[[Path, Story], int]:
+    """What writes a file with this suffix, and returns the number of steps in it."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ValueError(f"--out {path}: the name must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    if suffix == ".html":
+        from .page import write_page
+
+        return write_page
+    from .picture import draw_animation, draw_sheet  # matplotlib takes a second to import
+
+    return draw_animation if suffix == ".gif" else draw_sheet

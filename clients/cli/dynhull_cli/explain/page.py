@@ -1,28 +1,36 @@
-"""Steps as one HTML file that needs nothing else: a drawing to step through."""
+"""A story as one HTML file that needs no other: a drawing to step through."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 
-from .picture import MOST_NUMBERS, places
-from .steps import Point, Step, chosen
+from .scene import Mark, Position, Story, chosen
 
 MOST_STEPS = 2000
 TEMPLATE = files(__package__) / "page.html"
 
 
-def write_page(path: Path, title: str, points: Sequence[Point], steps: Sequence[Step]) -> int:
-    """Write an HTML page. Returns how many steps are in it."""
-    shown = chosen(len(steps), MOST_STEPS)
-    where = places(points)
-    index = {point: i for i, point in enumerate(where)}
+def write_page(path: Path, story: Story) -> int:
+    """Write an HTML page. Returns the number of steps in it."""
+    shown = chosen(len(story.pictures), MOST_STEPS)
+    index: dict[Position, int] = {}
+    steps = [
+        {"number": i + 1, "caption": story.pictures[i].caption, "marks": _by_index(story.pictures[i].marks, index)}
+        for i in shown
+    ]
     data = {
-        "title": title,
-        "places": list(where.values()),
-        "names": [f"({x!r}, {y!r})" for x, y in where],
-        "count": len(steps),
-        "steps": [{"number": i + 1, **_by_index(steps[i], index)} for i in shown],
+        "title": story.title,
+        "styles": {name: asdict(style) for name, style in story.styles.items()},
+        "legend": story.legend,
+        "low": story.low,
+        "high": story.high,
+        "backdrop": _by_index(story.backdrop, index),
+        "count": len(story.pictures),
+        "steps": steps,
+        "places": list(index),
+        "names": [story.names.get(position, "") for position in index],
     }
     # A file name may hold "</script>": no "<" may stand in the script.
     script = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
@@ -30,17 +38,9 @@ def write_page(path: Path, title: str, points: Sequence[Point], steps: Sequence[
     return len(shown)
 
 
-def _by_index(step: Step, index: dict[Point, int]) -> dict[str, object]:
-    """A step with the number of each point instead of its coordinates; empty parts left out."""
-    numbered = step.order if len(step.order) <= MOST_NUMBERS else ()
-    paths = {"chain": step.chain, "discarded": step.discarded, "triple": step.triple, "tangents": step.tangents}
-    values: dict[str, object] = {"caption": step.caption, "sign": step.sign}
-    values |= {name: _numbers(path, index) for name, path in paths.items()}
-    values |= {"hull": _numbers(step.hull, index), "order": _numbers(numbered, index)}
-    values |= {"finished": [_numbers(chain, index) for chain in step.finished]}
-    values |= {"groups": [_numbers(hull, index) for hull in step.groups]}
-    return {name: value for name, value in values.items() if value}
-
-
-def _numbers(points: Sequence[Point], index: dict[Point, int]) -> list[int]:
-    return [index[point] for point in points]
+def _by_index(marks: Iterable[Mark], index: dict[Position, int]) -> list[list[object]]:
+    """Each mark as its style, the numbers of its positions, and its text where it has one."""
+    return [
+        [mark.style, [index.setdefault(p, len(index)) for p in mark.positions], *([mark.text] if mark.text else [])]
+        for mark in marks
+    ]

@@ -1,12 +1,12 @@
-"""From a trace to the steps of a picture: what stands on the chain, which points are looked at, what was discarded."""
+"""From a trace to steps: the chain, the points being tested, the points discarded."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from dynhull import static
-from dynhull.static.trace import Event, Groups, Pop, Push, Round, Scan, Trace, Turn, Wrap
+from dynhull.static.trace import Collinear, Event, Groups, Pop, Push, Round, Scan, Trace, Turn, Wrap
 
-Point = tuple[float, float]
+from .scene import Point, plural, text
 
 TURNS = {1: "left", 0: "straight on", -1: "right"}
 
@@ -20,12 +20,12 @@ class Step:
         chain: the points on the chain, from bottom to top.
         finished: chains of earlier passes.
         discarded: points taken off the chain in this pass.
-        triple: the points that are looked at, as a path: three whose turn is evaluated, or a tangent.
+        triple: the points being tested, as a path: three whose turn is evaluated, or a tangent.
         sign: which way they turn.
         groups: vertices of each group's hull.
         tangents: points where tangents from the top of the chain touch the groups.
         hull: the hull's vertices, in the last step only.
-        order: the points of the pass, in the order in which it takes them.
+        order: the points of the pass, in the order in which the pass reads them.
     """
 
     caption: str
@@ -40,7 +40,7 @@ class Step:
     order: tuple[Point, ...] = ()
 
 
-def explained(algorithm: str, xy: Sequence[Point], collinear: static.trace.Collinear) -> list[Step]:
+def explained(algorithm: str, xy: Sequence[Point], collinear: Collinear) -> list[Step]:
     """The steps of one of the algorithms of `dynhull.static`, by its name."""
     trace: Trace = []
     hull = getattr(static, algorithm)(xy, collinear=collinear, trace=trace)
@@ -67,7 +67,7 @@ def _steps(trace: Trace, hull: Sequence[Point]) -> Iterator[Step]:
             case Scan() | Groups() | Wrap() | Round():
                 now = _apply(now, event)
                 yield now
-    yield Step(f"the hull: {len(hull)} {'vertex' if len(hull) == 1 else 'vertices'}", hull=tuple(hull))
+    yield Step(f"the hull: {plural(len(hull), 'vertex', 'vertices')}", hull=tuple(hull))
 
 
 def _decided(now: Step, turn: Turn, event: Push | Pop) -> Step:
@@ -98,16 +98,15 @@ def _apply(now: Step, event: Event) -> Step:
             chain, caption = (*now.chain, vertex), f"tangents from {text(vertex)}\nthe rightmost goes to {text(best)}"
             return replace(now, caption=caption, chain=chain, tangents=tangents, triple=(vertex, best), sign=1)
         case Round(guess, _, count, _, closed):
-            end = (
-                f"closed: {count} vertices" if closed else f"not closed after {count} steps:\nthrown away, guess again"
-            )
-            return replace(now, caption=f"guess {guess}, {end}", triple=(), tangents=())
+            end = f"closed: {count} vertices" if closed else f"not closed after {count} steps:\ndiscarded, guess again"
+            chain = (*now.chain, *now.triple[1:])  # the edge of the last step
+            return replace(now, caption=f"guess {guess}, {end}", chain=chain, triple=(), tangents=())
         case Turn():
             return now
 
 
 def cross(turn: Turn) -> str:
-    """The cross product as text: exact where it is short, otherwise rounded; never a zero that is none."""
+    """The cross product as text: exact where it is short, otherwise rounded; "0" only where it is zero."""
     value = turn.cross
     if value.denominator == 1 and abs(value) < 10**6:
         return f"cross product {value.numerator}"
@@ -118,15 +117,3 @@ def cross(turn: Turn) -> str:
     if float(rounded) == 0:
         return f"cross product {'> 0, below 5e-324' if value > 0 else '< 0, above -5e-324'}"
     return f"cross product {rounded}"
-
-
-def text(point: Point) -> str:
-    """A point as text, six digits a coordinate."""
-    return f"({point[0]:.6g}, {point[1]:.6g})"
-
-
-def chosen(count: int, most: int) -> list[int]:
-    """Which of `count` steps to draw when there is room for `most`: evenly spread, the first and the last with them."""
-    if count <= most:
-        return list(range(count))
-    return [i * (count - 1) // (most - 1) for i in range(most)]
