@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 from server_process import server_process
 
-collect_ignore = ["reference_pages.py"]  # a program, not a module
+collect_ignore = ["doctest_examples.py", "reference_pages.py"]  # run by mkdocs
 
 PAGES_WITH_A_SERVER = {"client.md"}
 

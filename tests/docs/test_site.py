@@ -1,0 +1,68 @@
+"""Links and images hold where pages are read: on a code host, beside the files, and in the built site."""
+
+import re
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+GENERATED = {ROOT / "docs/reference/commands.md", ROOT / "docs/reference/protocol.md"}
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "deploy").rglob("*.md"), *(ROOT / "docs").rglob("*.md")])
+CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
+TARGET = re.compile(r"\]\(([^)\s]+)[^)]*\)")
+
+
+class Addresses(HTMLParser):
+    """What a page shows and links to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, _: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.found += [value for name, value in attributes if name in ("href", "src") and value]
+
+
+def paths(addresses: list[str]) -> Iterator[str]:
+    """The paths of those addresses that are of this project."""
+    for address in addresses:
+        parts = urlsplit(address)
+        if not parts.scheme and not parts.netloc and parts.path:
+            yield unquote(parts.path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_hold_beside_the_files(page: Path) -> None:
+    text = CODE.sub("", page.read_text())
+    assert "<img" not in text, "an <img> is not rewritten for the site: use ![text](path)"
+    targets = [(page.parent / path).resolve() for path in paths(TARGET.findall(text))]
+    assert [str(target) for target in targets if not target.exists() and target not in GENERATED] == []
+
+
+def test_links_hold_in_the_site(site: Path) -> None:
+    broken = []
+    for page in site.rglob("*.html"):
+        if page.name == "404.html":  # its links are absolute
+            continue
+        addresses = Addresses()
+        addresses.feed(page.read_text())
+        targets = [(page.parent / path).resolve() for path in paths(addresses.found)]
+        broken += [f"{page.relative_to(site)}: {target}" for target in targets if not target.exists()]
+    assert broken == []
+
+
+def test_the_site_needs_no_other_host(site: Path) -> None:
+    loaded = re.compile(r'(?:<script[^>]*\bsrc|<link[^>]*\brel="stylesheet"[^>]*\bhref)="https?:[^"]*"')
+    assert [found for page in site.rglob("*.html") for found in loaded.findall(page.read_text())] == []
+
+
+def test_every_page_is_in_the_navigation(site: Path) -> None:
+    """The build fails on a page that is left out; here, that the front page's menu has them all."""
+    addresses = Addresses()
+    addresses.feed((site / "index.html").read_text())
+    listed = {(site / path).resolve() for path in paths(addresses.found)}
+    pages = {page.parent.resolve() for page in site.rglob("index.html")}
+    assert pages - listed == set()
