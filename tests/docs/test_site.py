@@ -66,3 +66,11 @@ def test_every_page_is_in_the_navigation(site: Path) -> None:
     listed = {(site / path).resolve() for path in paths(addresses.found)}
     pages = {page.parent.resolve() for page in site.rglob("index.html")}
     assert pages - listed == set()
+
+
+def test_lists_and_tables_are_rendered(site: Path) -> None:
+    """Markdown for sites wants blocks inside of a list item to be indented by four spaces; code hosts accept two."""
+    raw = re.compile(r"^(?:<p>)?(?:[*-] |\d+\. |\|).*", re.MULTILINE)
+    code = re.compile(r"<(pre|script|style)\b.*?</\1>", re.DOTALL)
+    left = {page.parent.name: raw.findall(code.sub("", page.read_text())) for page in site.rglob("index.html")}
+    assert {page: lines for page, lines in left.items() if lines} == {}
