@@ -1,5 +1,6 @@
-"""Links and images hold where pages are read: on a code host, beside the files, and in the built site."""
+"""Pages hold where they are read: on a code host, beside the files, and in the built site."""
 
+import importlib
 import re
 from collections.abc import Iterator
 from html.parser import HTMLParser
@@ -74,3 +75,19 @@ def test_lists_and_tables_are_rendered(site: Path) -> None:
     code = re.compile(r"<(pre|script|style)\b.*?</\1>", re.DOTALL)
     left = {page.parent.name: raw.findall(code.sub("", page.read_text())) for page in site.rglob("index.html")}
     assert {page: lines for page, lines in left.items() if lines} == {}
+
+
+def test_the_reference_has_every_exported_name(site: Path) -> None:
+    missing = []
+    for page in ("library", "sdk"):
+        described = set(re.findall(r'id="([\w.]+)"', (site / "reference" / page / "index.html").read_text()))
+        source = (ROOT / "docs/reference" / f"{page}.md").read_text()
+        for module in re.findall(r"^::: ([\w.]+)", source, re.MULTILINE):
+            exported = getattr(importlib.import_module(module), "__all__", [])
+            missing += [f"{module}.{name}" for name in exported if f"{module}.{name}" not in described]
+    assert missing == []
+
+
+def test_examples_in_the_reference_are_code(site: Path) -> None:
+    for page in (site / "reference").rglob("index.html"):
+        assert "<blockquote>" not in page.read_text(), page
