@@ -1,4 +1,4 @@
-"""Extensions of mkdocstrings, for two things that it would show wrong or not at all."""
+"""An extension of mkdocstrings, for two things that it would show wrong or not at all."""
 
 import re
 from textwrap import indent
@@ -10,38 +10,32 @@ import griffe
 DOCTESTS = re.compile(r"^>>>.*?(?=\n\n(?!>>>)|\Z)", re.MULTILINE | re.DOTALL)
 
 
-class DoctestExamples(griffe.Extension):
-    """Puts the doctests of each docstring into a section of examples; Markdown would take them for quotations."""
-
-    def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        mark(obj)
+class Docstrings(griffe.Extension):
+    """Prepares a package that has been read."""
 
     def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
-        mark(pkg)
+        mark_examples(pkg)
+        expose_namesakes(pkg)
 
 
-def mark(documented: griffe.Object) -> None:
+def mark_examples(documented: griffe.Object) -> None:
+    """Put doctests into a section of examples; Markdown would take them for quotations."""
     docstring = documented.docstring
     if docstring is not None:
         docstring.value = DOCTESTS.sub(lambda found: f"Examples:\n{indent(found[0], '    ')}", docstring.value)
+    for member in documented.members.values():
+        if isinstance(member, griffe.Object):
+            mark_examples(member)
 
 
-class NamesakesOfModules(griffe.Extension):
-    """Shows what a package imports from a module of the same name, such as `chan` from `chan.py`, not the module."""
-
-    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
-        expose(pkg)
-
-
-def expose(package: griffe.Module) -> set[str]:
-    """The paths that name something else than a module now."""
+def expose_namesakes(package: griffe.Module) -> set[str]:
+    """Where a package imports `chan` from `chan.py`, let `chan` be the function. Returns the paths changed so."""
     exposed: set[str] = set()
     members = list(package.members.items())
     for name, member in members:
         if isinstance(member, griffe.Module):
-            exposed |= expose(member)
+            exposed |= expose_namesakes(member)
             if package.imports.get(name) == f"{member.path}.{name}":
-                mark(member.members[name])
                 package.members[name] = griffe.Alias(name, member.members[name], parent=package)
                 exposed.add(member.path)
     for name, member in members:
