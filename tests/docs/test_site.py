@@ -1,0 +1,93 @@
+"""Pages hold where they are read: on a code host, beside the files, and in the built site."""
+
+import importlib
+import re
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+GENERATED = {ROOT / "docs/reference/commands.md", ROOT / "docs/reference/protocol.md"}
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "deploy").rglob("*.md"), *(ROOT / "docs").rglob("*.md")])
+CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
+TARGET = re.compile(r"\]\(([^)\s]+)[^)]*\)")
+
+
+class Addresses(HTMLParser):
+    """What a page shows and links to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, _: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.found += [value for name, value in attributes if name in ("href", "src") and value]
+
+
+def paths(addresses: list[str]) -> Iterator[str]:
+    """The paths of those addresses that are of this project."""
+    for address in addresses:
+        parts = urlsplit(address)
+        if not parts.scheme and not parts.netloc and parts.path:
+            yield unquote(parts.path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_hold_beside_the_files(page: Path) -> None:
+    text = CODE.sub("", page.read_text())
+    assert "<img" not in text, "an <img> is not rewritten for the site: use ![text](path)"
+    targets = [(page.parent / path).resolve() for path in paths(TARGET.findall(text))]
+    assert [str(target) for target in targets if not target.exists() and target not in GENERATED] == []
+
+
+def test_links_hold_in_the_site(site: Path) -> None:
+    broken = []
+    for page in site.rglob("*.html"):
+        if page.name == "404.html":  # its links are absolute
+            continue
+        addresses = Addresses()
+        addresses.feed(page.read_text())
+        targets = [(page.parent / path).resolve() for path in paths(addresses.found)]
+        broken += [f"{page.relative_to(site)}: {target}" for target in targets if not target.exists()]
+    assert broken == []
+
+
+def test_the_site_needs_no_other_host(site: Path) -> None:
+    loaded = re.compile(r'(?:<script[^>]*\bsrc|<link[^>]*\brel="stylesheet"[^>]*\bhref)="https?:[^"]*"')
+    assert [found for page in site.rglob("*.html") for found in loaded.findall(page.read_text())] == []
+
+
+def test_every_page_is_in_the_navigation(site: Path) -> None:
+    """The build fails on a page that is left out; here, that the front page's menu has them all."""
+    addresses = Addresses()
+    addresses.feed((site / "index.html").read_text())
+    listed = {(site / path).resolve() for path in paths(addresses.found)}
+    pages = {page.parent.resolve() for page in site.rglob("index.html")}
+    assert pages - listed == set()
+
+
+def test_lists_and_tables_are_rendered(site: Path) -> None:
+    """Markdown for sites wants blocks inside of a list item to be indented by four spaces; code hosts accept two."""
+    raw = re.compile(r"^(?:<p>)?(?:[*-] |\d+\. |\|).*", re.MULTILINE)
+    code = re.compile(r"<(pre|script|style)\b.*?</\1>", re.DOTALL)
+    left = {page.parent.name: raw.findall(code.sub("", page.read_text())) for page in site.rglob("index.html")}
+    assert {page: lines for page, lines in left.items() if lines} == {}
+
+
+def test_the_reference_has_every_exported_name(site: Path) -> None:
+    missing = []
+    for page in ("library", "sdk"):
+        described = set(re.findall(r'id="([\w.]+)"', (site / "reference" / page / "index.html").read_text()))
+        source = (ROOT / "docs/reference" / f"{page}.md").read_text()
+        for module in re.findall(r"^::: ([\w.]+)", source, re.MULTILINE):
+            exported = getattr(importlib.import_module(module), "__all__", [])
+            missing += [f"{module}.{name}" for name in exported if f"{module}.{name}" not in described]
+    assert missing == []
+
+
+def test_examples_in_the_reference_are_code(site: Path) -> None:
+    for page in (site / "reference").rglob("index.html"):
+        assert "<blockquote>" not in page.read_text(), page
