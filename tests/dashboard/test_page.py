@@ -235,7 +235,7 @@ def test_a_refused_token_is_named_as_the_cause(browser: Browser, tmp_path: Path)
     made = subprocess.run([COMMAND, "token", "--read", "fleet"], check=True, capture_output=True, text=True)
     tokens.write_text(made.stdout)
     with (
-        server_process("--in-memory", "--tokens", str(tokens)) as server,
+        server_process("--in-memory", "--tokens", str(tokens), complaints="UNAUTHENTICATED") as server,
         dashboard_process(server.address) as url,
         opened(browser, url, "fleet") as page,
     ):

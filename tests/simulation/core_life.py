@@ -33,12 +33,12 @@ from dynhull_server.state.events import (
     Gone,
     NotExamined,
     ReadHull,
+    Reply,
     Request,
     Retried,
     Retry,
     Stopping,
     Tick,
-    Told,
     WriteBatch,
 )
 from dynhull_server.state.hull_state import HullState
@@ -147,7 +147,7 @@ class CoreServer:
 
     def _carry_out(self, effect: Effect) -> None:
         match effect:
-            case Told():
+            case Reply():
                 if effect.moved is not None:
                     self.schedule.note((effect.moved.uid, effect.moved.counts.revision))
                 for request in effect.requests:

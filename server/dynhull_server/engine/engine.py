@@ -23,12 +23,12 @@ from ..state.events import (
     Failed,
     Gone,
     NotExamined,
+    Reply,
     Request,
     Retried,
     Retry,
     Stopping,
     Tick,
-    Told,
     WriteBatch,
 )
 from ..state.hull import Hull
@@ -277,7 +277,7 @@ class Engine:
 
     def _carry_out(self, effect: Effect) -> None:
         match effect:
-            case Told():
+            case Reply():
                 if effect.moved is not None:
                     self._move(effect.moved)
                 for request in effect.requests:
