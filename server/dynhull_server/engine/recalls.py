@@ -1,4 +1,4 @@
-"""Hulls of earlier revisions, from the storage: whoever asks meanwhile shares one reading of the disk."""
+"""Vertices at earlier revisions, from the storage; concurrent requests share one read of the disk."""
 
 import asyncio
 from collections import defaultdict
@@ -15,18 +15,18 @@ from ..state.records import Kept
 from ..storage.port import DamagedError, Storage, StorageError
 
 Answer = Points | RefusedError
-# How reading fails where the machine has run out of something.
+# The errors of a read when the machine has run out of a resource.
 UNREADABLE = (StorageError, OSError, MemoryError)
 
 
 class Recalls:
-    """Answers what a hull was at earlier revisions.
+    """Reads the vertices of hulls at earlier revisions.
 
-    The disk is read for one hull at a time, and at once for all revisions of it that are asked for: so a hundred
-    watchers that resume after a restart cost what one does, in time and in memory.
+    The disk is read for one hull at a time, once for all revisions requested of it: a hundred watchers that resume
+    after a restart cost as much time and memory as one.
 
     Args:
-        storage: where hulls are kept.
+        storage: keeps the hulls.
         run: calls a function in a thread.
     """
 
@@ -37,19 +37,19 @@ class Recalls:
         self._reading: asyncio.Task[None] | None = None
 
     async def vertices(self, hull: Hull, revision: int) -> Points:
-        """The vertices at a revision that has been.
+        """The vertices at a past revision.
 
         Raises:
-            RevisionForgottenError: it is older than what the storage has kept.
+            RevisionForgottenError: the storage no longer has that revision.
             NotStoredError: the storage cannot be read.
         """
         wanted = self._wanted[hull]
         if revision not in wanted:
             wanted[revision] = asyncio.get_running_loop().create_future()
-            wanted[revision].add_done_callback(_looked_at)
+            wanted[revision].add_done_callback(_retrieve)
         if self._reading is None or self._reading.done():
             self._reading = asyncio.get_running_loop().create_task(self._read())
-        # A watcher that leaves does not take the answer away from the others.
+        # A watcher that disconnects does not cancel the read for the others.
         return await asyncio.shield(wanted[revision])
 
     async def _read(self) -> None:
@@ -73,7 +73,7 @@ class Recalls:
                     future.set_result(answer)
 
     def _recall(self, hull: Hull, revisions: list[int]) -> dict[int, Answer]:
-        """The vertices at some revisions, in ascending order, or why there are none."""
+        """The vertices at some revisions, given in ascending order, or the error for each."""
         try:
             return self._recalled(hull, revisions)
         except KeyError:  # deleted meanwhile
@@ -95,7 +95,7 @@ class Recalls:
                 newest = hull.counts.revision
                 return answers | {revision: RevisionForgottenError(revision, oldest, newest) for revision in left}
             if kept.last_revision != left[-1]:
-                raise DamagedError(f"revision {left[-1]} of {hull.name} was kept, and is not there")
+                raise DamagedError(f"revision {left[-1]} of {hull.name} is missing from the storage")
             answers |= _vertices_at(kept, covered)
             left = left[: -len(covered)]
         return answers
@@ -113,7 +113,7 @@ def _vertices_at(kept: Kept, revisions: list[int]) -> dict[int, Answer]:
     return vertices
 
 
-def _looked_at(future: "asyncio.Future[Points]") -> None:
-    """All who wanted it may have gone: asyncio need not complain that nobody has looked."""
+def _retrieve(future: "asyncio.Future[Points]") -> None:
+    """Retrieve the exception: if all watchers have disconnected, asyncio shall not log it as never retrieved."""
     if not future.cancelled():
         future.exception()

@@ -18,7 +18,7 @@ class Waiter:
         self.future: asyncio.Future[None] | None = None
 
     def tell(self, _: Request) -> None:
-        """The request has been answered."""
+        """Resume the caller: the request has been answered."""
         self.told = True
         if self.future is not None and not self.future.done():
             self.future.set_result(None)
