@@ -176,7 +176,7 @@ def test_tokens_are_read_again_when_they_change(tmp_path: Path) -> None:
     replace(entry("old", [""], [""]))
     options = ("--tokens", str(tokens), "--log-level", "error")
     with (
-        server_process(*options, complaints="stay as they were") as server,
+        server_process(*options, complaints="the tokens do not change") as server,
         HullClient(server.address, token="old") as old,
         HullClient(server.address, token="new") as new,
     ):
