@@ -264,7 +264,7 @@ def test_other_machines_only_with_tls_and_tokens_or_when_told(tmp_path: Path, ce
 @pytest.mark.parametrize(
     ("options", "text", "message"),
     [
-        (["--tls-cert", "x.pem"], None, "--tls-cert and --tls-key go together"),
+        (["--tls-cert", "x.pem"], None, "--tls-cert and --tls-key must be given together"),
         (["--tls-client-ca", "x.pem"], None, "--tls-client-ca needs --tls-cert"),
         (["--tls-cert", "no.pem", "--tls-key", "no.pem"], None, "no.pem"),
         (["--tokens", "no.toml"], None, "no.toml"),

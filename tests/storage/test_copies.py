@@ -297,14 +297,14 @@ def test_check_says_what_is_damaged(paths):
     assert finished.stdout.splitlines() == [
         "fleet: revision 40, 20 rows of batches, snapshots at 20, 30: DAMAGED",
         "whole: revision 2, 2 rows of batches: whole",
-        f"{data}: damaged; it can be served without what is named",
+        f"{data}: damaged; it can be served without the parts named above",
     ]
     assert finished.stderr == "hull 'fleet': the snapshot at revision 20 is damaged, and was dropped\n"
     (data / DATABASE).write_bytes(content)
     flip(data / DATABASE, record(35).inserts.tobytes())
     finished = run("check", data)
     assert finished.returncode == 1
-    assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it is not served: restore a backup"
+    assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it cannot be served: restore a backup"
     assert "hull 'fleet': revisions 35 to 35 are damaged, and later ones exist" in finished.stderr
     (data / DATABASE).write_bytes(content)
     done("check", data, says=f"{data}: 2 hulls, all whole")
