@@ -27,8 +27,8 @@ class Settings(BaseSettings):
     durability: Durability = Field(
         Durability.SYNC,
         description="What an acknowledged batch survives. All: the end of the process, even a kill. sync: also a power "
-        "failure. interval: a power failure a tenth of a second later. none: one after the operating system has written "
-        "it, usually within half a minute.",
+        "failure. interval: a power failure a tenth of a second later. none: one after the operating system has "
+        "written it, usually within half a minute.",
     )
     create_on_write: bool = Field(False, description="Create a missing hull with its first batch.")
     snapshot_points: int = Field(
