@@ -18,7 +18,7 @@ from .engine.scrub import Scrub
 from .engine.supervisor import Supervisor
 from .engine.threads import Machine
 from .engine.verification import Verification
-from .rpc.access import ANYBODY, LOOK_SECONDS, Caller, TokenFile
+from .rpc.access import ANONYMOUS, LOOK_SECONDS, Caller, TokenFile
 from .rpc.calls import Calls, Context
 from .rpc.health import Health
 from .rpc.hull_service import HullService
@@ -238,7 +238,7 @@ def _end_process(reason: str) -> None:
 
 
 def _anonymous(_: Context) -> Caller:
-    return ANYBODY
+    return ANONYMOUS
 
 
 def _bearer(tokens: TokenFile) -> Callable[[Context], Caller]:

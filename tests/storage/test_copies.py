@@ -265,7 +265,7 @@ def test_a_server_waits_for_a_command_that_reads_a_stopped_folder(paths):
         refusals.append(str(refusal.value))
 
     copies.copy(data, copy, start)
-    assert "or a command" in refusals[0]
+    assert "another server or command uses" in refusals[0]
 
 
 def test_check_beside_a_server(paths):

@@ -51,7 +51,7 @@ class BatchStream:
             request.birth = self._birth()
         self._engine.dispatch(request)
 
-    def tell(self, request: Request) -> None:
+    def answer(self, request: Request) -> None:
         """Take the answer to a batch."""
         assert type(request) is WriteBatch  # the stream sends no other requests
         self.batches -= 1

@@ -241,7 +241,7 @@ class Engine:
         """The result of a request with a Waiter, or raise its error. Cancelling the caller ends only the wait."""
         waiter: Waiter = request.to
         self.dispatch(request)
-        if not waiter.told:
+        if not waiter.answered:
             waiter.future = self._loop.create_future()
             try:
                 await waiter.future
@@ -264,7 +264,7 @@ class Engine:
         """Commit steps of a snapshot or sweep, together with batches; the future raises the error of a failure."""
         done: asyncio.Future[None] = self._loop.create_future()
 
-        def tell(error: Exception | None) -> None:
+        def finish(error: Exception | None) -> None:
             if done.done():
                 return
             if error is None:
@@ -272,7 +272,7 @@ class Engine:
             else:
                 done.set_exception(error)
 
-        self._commits.submit(changes, lambda error, _: self._from_thread(partial(tell, error)))
+        self._commits.submit(changes, lambda error, _: self._from_thread(partial(finish, error)))
         return done
 
     def _carry_out(self, effect: Effect) -> None:
@@ -281,7 +281,7 @@ class Engine:
                 if effect.moved is not None:
                     self._move(effect.moved)
                 for request in effect.requests:
-                    request.to.tell(request)
+                    request.to.answer(request)
             case Commit():
                 self._commit(effect.ticket, effect.changes)
             case Compute():

@@ -83,8 +83,8 @@ class Caller:
     key: str = ""
 
 
-ANYBODY = Caller("", EVERYTHING)
-NOBODY = Caller("", Access((), ()))
+ANONYMOUS = Caller("", EVERYTHING)
+UNAUTHENTICATED_CALLER = Caller("", Access((), ()))
 
 
 class Rights:

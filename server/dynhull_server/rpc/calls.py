@@ -13,7 +13,7 @@ from google.protobuf.message import DecodeError, Message
 from grpc_status import rpc_status
 
 from ..state.errors import LimitExceededError
-from .access import NOBODY, Caller, PermissionDeniedError, Rights, UnauthenticatedError
+from .access import UNAUTHENTICATED_CALLER, Caller, PermissionDeniedError, Rights, UnauthenticatedError
 from .metrics import Metrics
 from .places import Places
 from .refusal_log import RefusalLog
@@ -217,7 +217,7 @@ class Calls:
 
     def admit_anybody(self, context: Context) -> Call:
         """Begin a call that needs no token, at any time."""
-        return Call(self, context, NOBODY)
+        return Call(self, context, UNAUTHENTICATED_CALLER)
 
     def refused_elsewhere(self) -> Callable[[str, str, str], None]:
         """A function for other threads, to report a refused request for metrics: its reason, code and peer."""

@@ -359,7 +359,7 @@ class Core:
         self._go_on(queue, effects)
 
     def _fail(self, queue: _Queue, trip: Trip, error: Exception, effects: list[Effect]) -> None:
-        """Handle a trip of which nothing was committed."""
+        """Handle a trip whose changes were not committed."""
         trip.failure = error
         self._refuse_changes(trip, _not_stored(error), effects)
         if trip.before is not None and (trip.applied or trip.torn):
@@ -386,7 +386,7 @@ class Core:
         effects.append(Reply(refused))
 
     def _again(self, queue: _Queue, trip: Trip) -> None:
-        """Repeat the reads of a trip of which nothing was committed."""
+        """Repeat the reads of a trip whose changes were not committed."""
         reads = [request for request in trip.requests if type(request) is ReadHull and not request.abandoned]
         for request in reads:
             request.result = request.error = None

@@ -6,7 +6,7 @@ of the header and its checksum, which continues from frame to frame, is right. T
 * frames of an earlier use of the file, both of whose salts differ;
 * one unfinished commit, because the process ended, the power failed or the disk was full: it was not acknowledged.
 
-Everything else is damage, also a frame of which only one salt differs: SQLite would take it for one of an earlier use.
+Everything else is damage, also a frame with only one different salt: SQLite would take it for one of an earlier use.
 """
 
 import struct
