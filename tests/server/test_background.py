@@ -42,7 +42,7 @@ def health(address: str) -> int:
 
 def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_path: Path) -> None:
     with (
-        faulty_server(tmp_path, "--metrics-port", "0", complaints="unhealthy: health is NOT_SERVING") as (server, faults),
+        faulty_server(tmp_path, "--metrics-port", "0", complaints="health is NOT_SERVING") as (server, faults),
         HullClient(server.address) as client,
     ):
         client.create_hull("a")
@@ -123,7 +123,7 @@ def test_an_outcome_is_unknown_until_the_disk_can_be_read(tmp_path: Path) -> Non
         client.apply("a", insert=[[0, 0]])
         (faults / "settle").touch()
         (faults / "commit").touch()
-        with pytest.raises(OutcomeUnknownError, match="unknown whether this was applied, until the disk can be read again"):
+        with pytest.raises(OutcomeUnknownError, match="whether this was applied, until the disk can be read again"):
             client.apply("a", insert=[[1, 1]])
         with pytest.raises(UnavailableError):
             client.get_hull("a", min_revision=1)
