@@ -204,9 +204,12 @@ def test_each_empty_state_says_what_to_do(browser: Browser, tmp_path: Path) -> N
     with (
         measured() as (server, _metrics),
         HullClient(server.address) as client,
-        dashboard_process(server.address) as url,
+        dashboard_process(server.address, "--metrics", "http://127.0.0.1:1/metrics") as url,
         opened(browser, url) as page,
     ):
+        alert = page.get_by_role("alert")
+        expect(alert).to_contain_text("No metrics from http://127.0.0.1:1/metrics: ")
+        expect(alert).to_contain_text("Check that the server runs with --metrics-port")
         load = "dynhull load NAME FILE.csv"
         expect(note(page)).to_contain_text(f"The server has no hulls yet. Make one: {load}")
         client.create_hull("fleet")

@@ -185,8 +185,10 @@ def test_a_damaged_end_is_cut_at_the_last_whole_batch(folder):
     flip(folder / DATABASE, record(9).inserts.tobytes())
     storage, contents = opened(folder)
     assert contents.notes == [
-        f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: "
-        "the hull was cut back to revision 8, the last intact one"
+        (
+            f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: "
+            "the hull was cut back to revision 8, the last intact one"
+        )
     ]
     same(storage.read(1).records, records(1, 8))
     append(storage, 9, 9)

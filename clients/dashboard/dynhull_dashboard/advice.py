@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dynhull_client import DynhullError, HullNotFoundError, PermissionDeniedError, UnauthenticatedError
 
 from .feed import HullFeed
+from .server_metrics import ServerMetrics
 from .server_state import ServerState
 
 
@@ -21,6 +22,16 @@ def about_server(address: str, error: DynhullError) -> str:
     return (
         f"No connection to {address}: {cause}. Check that the server runs (dynhull serve) and that the dashboard's "
         "--address names it. The page shows what it last received, and reconnects by itself."
+    )
+
+
+def about_metrics(metrics: ServerMetrics | None) -> str:
+    """For the banner: why the time lines of the whole server are empty, and what to do; empty where they are not."""
+    if metrics is None or metrics.error is None:
+        return ""
+    return (
+        f"No metrics from {metrics.url}: {metrics.error}. Check that the server runs with --metrics-port, and that the "
+        "dashboard's --metrics has that port."
     )
 
 

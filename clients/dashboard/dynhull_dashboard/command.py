@@ -31,7 +31,7 @@ def dashboard(
         ),
     ] = None,
     x_unit: Annotated[
-        str, typer.Option(help="Unit of x. Where it is not that of y, each axis has a scale of its own.")
+        str, typer.Option(help="Unit of x. If it differs from that of y, each axis has its own scale.")
     ] = "",
     y_unit: Annotated[str, typer.Option(help="Unit of y.")] = "",
 ) -> None:

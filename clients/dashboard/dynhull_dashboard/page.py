@@ -9,7 +9,7 @@ from bokeh.document import Document
 from bokeh.models.widgets import Button, Div
 from jinja2 import Template
 
-from .advice import about_picture, about_server
+from .advice import about_metrics, about_picture, about_server
 from .cards import key, table
 from .describe import describe
 from .feed import HullFeed
@@ -133,7 +133,7 @@ class Page:
         feeds = [shown.feed for shown in self._shown.values()]
         self._model.update(
             offered=sorted(server.hulls),
-            banner="" if server.error is None else about_server(self._hub.address, server.error),
+            banner=about_server(self._hub.address, server.error) if server.error else about_metrics(self._hub.metrics),
             note=about_picture(self._hub.address, server, feeds),
             description=describe(feeds),
         )

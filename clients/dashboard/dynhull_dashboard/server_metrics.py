@@ -89,11 +89,14 @@ class ServerMetrics:
     Attributes:
         history: updates per second, and the mean and the 99th percentile of the milliseconds from the arrival of a
             batch to its acknowledgement.
+        url: the page.
+        error: why the last request for the page failed; None where it did not.
     """
 
     def __init__(self, url: str) -> None:
         self.history = History("time", "updates", "mean", "percentile")
-        self._url = url
+        self.url = url
+        self.error: str | None = None
         self._http = AsyncHTTPClient()
         self._task = asyncio.create_task(self._run())
 
@@ -113,8 +116,10 @@ class ServerMetrics:
 
     async def _scrape(self) -> Scrape | None:
         try:
-            response = await self._http.fetch(self._url, request_timeout=TIMEOUT_SECONDS)
+            response = await self._http.fetch(self.url, request_timeout=TIMEOUT_SECONDS)
         except (HTTPClientError, OSError) as error:  # the time lines show a gap
-            log.info("%s: %s", self._url, error)
+            self.error = str(error)
+            log.info("%s: %s", self.url, error)
             return None
+        self.error = None
         return Scrape.read(response.body.decode(), time.monotonic())
