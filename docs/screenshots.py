@@ -1,6 +1,6 @@
-"""Makes the screenshots of the dashboard: `python docs/screenshots.py`. Two days of the demo's flights.
+"""Make the screenshots of the dashboard with two days of the demo's flights: `python docs/screenshots.py`.
 
-Needs a Chromium on the path.
+Chromium must be on the PATH.
 """
 
 import shutil
@@ -18,6 +18,7 @@ from dynhull_cli.demo.flights import Flights
 from dynhull_client import HullClient
 
 SERVE = ["serve", "--in-memory", "--port", "0", "--metrics-port", "0", "--log-level", "warning"]
+UNITS = ["--x-unit", "km", "--y-unit", "km"]
 DAYS = [date(2013, 3, 8), date(2013, 7, 11)]  # snow, and a summer's day
 MORNING, EVENING, PACE = 8 * 60, 17 * 60, 0.1
 IMAGES = Path(__file__).with_name("images")
@@ -32,7 +33,7 @@ PICTURES = {
 
 @contextmanager
 def running(*arguments, lines=1):
-    """A command of ours; yields the addresses that it prints."""
+    """Run a dynhull command; yields the addresses it prints."""
     command = [sys.executable, "-m", "dynhull_cli", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
@@ -54,7 +55,7 @@ def main():
     scenes = [Flights(day) for day in DAYS]
     with (
         running(*SERVE, lines=2) as (address, metrics),
-        running("dashboard", "--address", address, "--metrics", metrics, "--port", "0") as (url,),
+        running("dashboard", "--address", address, "--metrics", metrics, "--port", "0", *UNITS) as (url,),
         HullClient(address) as client,
         sync_playwright() as playwright,
     ):

@@ -1,4 +1,4 @@
-"""A real dashboard, in a process of its own, and what a real browser shows of it."""
+"""A real dashboard in a process of its own, and its page in a real browser."""
 
 import subprocess
 from collections.abc import Iterator
@@ -9,6 +9,7 @@ from playwright.sync_api import Browser, Page
 from server_process import COMMAND, PATIENCE
 
 PATIENCE_OF_BROWSER = 15_000  # milliseconds
+LOUD = "warning", "error"
 VERTICES = """name => {
     const {renderers} = Bokeh.documents[0]?.get_model_by_name("plane") ?? {renderers: []}
     const drawn = renderers.find(renderer => renderer.data_source.name == `vertices of ${name}`)
@@ -18,7 +19,7 @@ VERTICES = """name => {
 
 @contextmanager
 def dashboard_process(address: str, *options: str) -> Iterator[str]:
-    """`dynhull dashboard` on a free port, unless the options name one; yields its URL. It must stop in peace."""
+    """`dynhull dashboard` on a free port, unless the options name one; yields its URL. It must exit with code 0."""
     command = [COMMAND, "dashboard", "--port", "0", "--address", address, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
@@ -32,18 +33,19 @@ def dashboard_process(address: str, *options: str) -> Iterator[str]:
 
 @contextmanager
 def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[Page]:
-    """The page with these hulls; nothing on it may fail."""
-    failures = []
+    """The page with these hulls. It must not raise an error, nor log a warning to the browser's console."""
+    failures: list[object] = []
     context = browser.new_context(**{"viewport": {"width": 1440, "height": 900}, **look})
     context.set_default_timeout(PATIENCE_OF_BROWSER)
     page = context.new_page()
     page.on("pageerror", lambda error: failures.append(error))
+    page.on("console", lambda message: failures.append(message.text) if message.type in LOUD else None)
     page.goto(f"{url}?{urlencode([('hull', hull) for hull in hulls])}")
     try:
         yield page
     finally:
         context.close()
-    assert not failures
+    assert failures == []
 
 
 def wait_for_vertices(page: Page, name: str, vertices: list[list[float]]) -> None:

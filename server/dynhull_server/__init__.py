@@ -2,5 +2,5 @@
 
 import os
 
-# gRPC's core would tell standard error of every failed handshake, in lines of its own form. Read when grpc is imported.
+# gRPC's core would log each failed handshake to standard error in its own format. It reads this when imported.
 os.environ.setdefault("GRPC_VERBOSITY", "ERROR")

@@ -18,7 +18,7 @@ from .engine.scrub import Scrub
 from .engine.supervisor import Supervisor
 from .engine.threads import Machine
 from .engine.verification import Verification
-from .rpc.access import ANYBODY, LOOK_SECONDS, Caller, TokenFile
+from .rpc.access import ANONYMOUS, LOOK_SECONDS, Caller, TokenFile
 from .rpc.calls import Calls, Context
 from .rpc.health import Health
 from .rpc.hull_service import HullService
@@ -40,20 +40,20 @@ SCRUB = "dynhull.v1.scrub"
 SERVING = health_pb2.HealthCheckResponse.SERVING
 NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 
-# Seconds for statuses to reach clients. A client that has stopped reading does not hold up the end.
-LAST_WORDS = 1.0
-# Milliseconds between signs of life on a quiet connection, and until one without an answer is given up.
+# Seconds for statuses to reach clients at shutdown; a client that does not read must not delay it.
+LAST_STATUSES = 1.0
+# Milliseconds between pings on an idle connection, and until a connection that does not answer them is closed.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
-# Bytes of each call that a client may send before they are read.
+# Bytes of each call that a client may send before the server reads them.
 LOOKAHEAD = 2**20
-# Milliseconds until a connection must be one of HTTP/2.
+# Milliseconds that a new connection has for the HTTP/2 handshake.
 HANDSHAKE_TIMEOUT = 10_000
 
-# A message of so many bytes beyond the limit is read, to be refused with details.
+# Messages up to this many bytes beyond the limit are read, so that the refusal can have details.
 REFUSED_BYTES = 64 * 2**20
 
-# Seconds between syncs where commits are not durable by themselves: with the sync itself, less than the tenth of a
-# second after which an acknowledged batch survives a power failure.
+# Seconds between syncs with `--durability interval`. With the duration of a sync this stays below the tenth of a second
+# after which an acknowledged batch survives a power failure.
 SYNC_SECONDS = 0.05
 
 log = logging.getLogger(__name__)
@@ -63,14 +63,14 @@ class Server:
     """Serves from `start` until `drain` has returned.
 
     Attributes:
-        address: host:port it listens on, once started.
-        metrics_url: the page for Prometheus; empty for none.
+        address: the host:port it listens on, once started.
+        metrics_url: the URL of the metrics page; empty for none.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._machine = machine = Machine()
-        self._supervisor = Supervisor(machine.clock, self._well_or_not, _end_process)
+        self._supervisor = Supervisor(machine.clock, self._set_health, _end_process)
         limits = Limits(
             max_hulls=settings.max_hulls,
             max_points=settings.max_points,
@@ -89,10 +89,10 @@ class Server:
         )
         self._server = grpc.aio.server(
             options=[
-                # gRPC's own refusal of a message has no details. So ours comes first, but for the very largest.
+                # gRPC's own refusal of a large message has no details, so its limit is higher than ours.
                 ("grpc.max_receive_message_length", settings.max_message_bytes + REFUSED_BYTES),
                 ("grpc.max_send_message_length", -1),
-                # Otherwise a second server on the port would start, and take half of the calls.
+                # Otherwise a second server could start on the same port, and receive half of the calls.
                 ("grpc.so_reuseport", 0),
                 ("grpc.keepalive_time_ms", KEEPALIVE),
                 ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
@@ -109,13 +109,13 @@ class Server:
         self.metrics_url = ""
 
     async def start(self, progress: Callable[[int, int], None]) -> None:
-        """Listen, take up what is stored, then serve. Meanwhile calls are told so, and health is NOT_SERVING.
+        """Listen, load the stored hulls, then serve. Until then calls get UNAVAILABLE, and health is NOT_SERVING.
 
         Args:
-            progress: called with the hulls taken up and the hulls in all.
+            progress: called with the number of hulls loaded so far and the total.
 
         Raises:
-            RuntimeError: the address is taken or is none of this machine's.
+            RuntimeError: the address is in use, or does not belong to this machine.
             StorageError: the stored data cannot be used.
         """
         service = HullService(
@@ -142,7 +142,7 @@ class Server:
         self._calls.ready()
         self._health.set(SERVING, SCRUB)
         self._serving = True
-        self._well_or_not(self._supervisor.reason)
+        self._set_health(self._supervisor.reason)
         if self._tokens is not None:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
             self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
@@ -155,13 +155,13 @@ class Server:
         log.info("serving", extra={"address": self.address})
 
     async def drain(self) -> None:
-        """Refuse new calls, end those that wait, and give the others the settings' grace to finish."""
+        """Refuse new calls, end waiting ones, and give the others the configured grace period to finish."""
         log.info("draining")
         self._health.stop()
         self._serving = False
         await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
-        await self._server.stop(LAST_WORDS)
+        await self._server.stop(LAST_STATUSES)
         self._stop_metrics()
         await self._engine.close()
         log.info("stopped")
@@ -170,8 +170,8 @@ class Server:
         await scrub.round()
         self._metrics.scrub_round()
 
-    def _well_or_not(self, reason: str | None) -> None:
-        """Tell health checks."""
+    def _set_health(self, reason: str | None) -> None:
+        """Update the health status."""
         if self._serving:
             self._health.set(SERVING if reason is None else NOT_SERVING, "", SERVICE)
 
@@ -200,7 +200,7 @@ class Server:
         try:
             page = MetricsPage(host, port, registry, bearer, tls, self._calls.refused_elsewhere())
         except OSError as error:
-            raise OSError(f"no metrics on {host}:{port}: {error.strerror}") from None
+            raise OSError(f"cannot serve metrics on {host}:{port}: {error.strerror}") from None
         self.metrics_url = f"{'http' if tls is None else 'https'}://{host}:{page.port}/metrics"
         self._stop_metrics = page.close
 
@@ -232,13 +232,13 @@ def _storage(settings: Settings) -> Storage:
 
 
 def _end_process(reason: str) -> None:
-    """What is acknowledged is kept. The rest cannot be relied on: whoever runs the server starts it again."""
-    print(f"the server ends: {reason}", file=sys.stderr, flush=True)  # noqa: T201  # logging may be what is broken
+    """End the process at once, because its state is not reliable. All acknowledged batches are stored."""
+    print(f"the server stops: {reason}", file=sys.stderr, flush=True)  # noqa: T201  # logging itself may have failed
     os._exit(os.EX_SOFTWARE)
 
 
 def _anonymous(_: Context) -> Caller:
-    return ANYBODY
+    return ANONYMOUS
 
 
 def _bearer(tokens: TokenFile) -> Callable[[Context], Caller]:

@@ -1,4 +1,4 @@
-"""`dynhull backup`, `dynhull restore`, `dynhull check`, `dynhull export`: data folders as files."""
+"""`dynhull backup`, `dynhull restore`, `dynhull check` and `dynhull export`: commands for data folders."""
 
 import json
 import sys
@@ -22,51 +22,50 @@ ROWS_A_STEP = 100_000
 
 
 def backup(
-    target: Annotated[Path, typer.Argument(help="The folder to make.")],
-    data: Annotated[Path, typer.Option(help="The data folder; a server may be running on it.")] = DATA,
+    target: Annotated[Path, typer.Argument(help="The folder to create.")],
+    data: Annotated[Path, typer.Option(help="The data folder; a server may be using it.")] = DATA,
 ) -> None:
-    """Copy a data folder, consistently, while a server runs on it.
+    """Copy a data folder consistently, also while a server uses it.
 
-    The copy is a data folder itself, examined in full: `dynhull serve --data COPY` serves it. Until it is whole and on
-    the disk, it is not taken for one.
+    The copy is examined in full. It is a data folder itself, so `dynhull serve --data COPY` serves it. A copy that was
+    interrupted is refused by all commands.
     """
     _copy(data, target)
 
 
 def restore(
     backup: Annotated[Path, typer.Argument(help="A backup, or any data folder.", exists=True, file_okay=False)],
-    data: Annotated[Path, typer.Option(help="The data folder to make.")] = DATA,
+    data: Annotated[Path, typer.Option(help="The data folder to create.")] = DATA,
     accept_loss: Annotated[
-        bool, typer.Option(help="Where the log is missing or damaged, do without the commits in it.")
+        bool, typer.Option(help="If the log is missing or damaged, continue without the commits in it.")
     ] = False,
 ) -> None:
-    """Make a data folder from a backup, with all that the backup holds, and only where every hull in it is whole."""
+    """Create a data folder from a backup, after checking that every hull in it is intact."""
     _copy(backup, data, accept_loss=accept_loss)
 
 
 def check(
-    data: Annotated[Path, typer.Argument(help="A data folder or a backup; a server may be running on it.")] = DATA,
+    data: Annotated[Path, typer.Argument(help="A data folder or a backup; a server may be using it.")] = DATA,
 ) -> None:
-    """Examine a data folder or a backup, and say what was found, hull by hull. Nothing is changed.
+    """Examine a data folder or a backup, and report on each hull. Nothing is changed.
 
-    Everything is read and compared with its checksums: every batch, every snapshot, also those that the next start
-    would not need. Where a server runs on the folder, what it has committed is examined as of one moment; its log is
-    examined once the server has stopped.
+    All batches and snapshots are compared with their checksums, also those that the next start would not need. While a
+    server uses the folder, the data committed at one moment is examined, but not the log.
 
-    The exit code is 0 where all is whole, and 1 where something is damaged, or cannot be read:
+    The exit code is 0 if everything is intact, and 1 if anything is damaged or cannot be read:
 
         dynhull check backups/monday && echo "can be restored"
     """
-    with _told(), progress_bar("rows") as progress:
+    with _errors_reported(), progress_bar("rows") as progress:
         report = copies.check(data, progress)
     for hull in report.hulls:
         typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
     for problem in [*report.notes, *report.fatal]:
         typer.echo(problem, err=True)
     if report.fatal:
-        typer.echo(f"{data}: damaged; it is not served: restore a backup")
+        typer.echo(f"{data}: damaged; it cannot be served: restore a backup")
     elif report.notes:
-        typer.echo(f"{data}: damaged; it can be served without what is named")
+        typer.echo(f"{data}: damaged; it can be served without the parts named above")
     else:
         typer.echo(f"{data}: {len(report.hulls)} hulls, all whole")
     raise typer.Exit(1 if report.fatal or report.notes else 0)
@@ -74,12 +73,12 @@ def check(
 
 def export(
     name: Annotated[str, typer.Argument(help="The hull.")],
-    file: Annotated[Path, typer.Argument(help="What to write: .csv, .parquet or .geojson.", dir_okay=False)],
-    data: Annotated[Path, typer.Option(help="The data folder or a backup; a server may be running on it.")] = DATA,
+    file: Annotated[Path, typer.Argument(help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)],
+    data: Annotated[Path, typer.Option(help="The data folder or a backup; a server may be using it.")] = DATA,
 ) -> None:
-    """Write the points of one hull to a file, as of the last commit: columns x and y, a row a point."""
+    """Write the points of one hull, as of the last commit, to a file with columns x and y."""
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".geojson": _write_geojson}
-    with _told():
+    with _errors_reported():
         if file.suffix not in writers:
             raise StorageError(f"{file}: the name must end in {', '.join(writers)}")
         kept, notes = copies.read(data, name)
@@ -92,7 +91,7 @@ def export(
 
 
 def _copy(source: Path, target: Path, *, accept_loss: bool = False) -> None:
-    with _told(), progress_bar("pages") as progress:
+    with _errors_reported(), progress_bar("pages") as progress:
         report = copies.copy(source, target, progress, accept_loss=accept_loss)
     for note in report.notes:
         typer.echo(note, err=True)
@@ -119,7 +118,7 @@ def _write_geojson(file: Path, points: Points, progress: Progress) -> None:
 
 
 def _write_parquet(file: Path, points: Points, progress: Progress) -> None:
-    import pyarrow as pa  # takes a while to load, and only this format needs it
+    import pyarrow as pa  # slow to load, and only this format needs it
     import pyarrow.parquet as pq
 
     schema = pa.schema([("x", pa.float64()), ("y", pa.float64())])
@@ -135,8 +134,8 @@ def _steps(points: Points, progress: Progress) -> Iterator[Points]:
 
 
 @contextmanager
-def _told() -> Iterator[None]:
-    """What cannot be done ends the command with a line."""
+def _errors_reported() -> Iterator[None]:
+    """Exit with a message after an error of the storage or the operating system."""
     try:
         yield
     except (StorageError, OSError) as error:

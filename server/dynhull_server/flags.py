@@ -1,4 +1,4 @@
-"""Flags for a command, one for each setting."""
+"""Command-line flags, one per setting."""
 
 import inspect
 import json
@@ -12,7 +12,7 @@ from .settings import PREFIX, Settings, SettingsError, load, origins
 
 
 def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callable[..., None]:
-    """A typer command with a flag for each setting; `command` gets the settings and where each comes from."""
+    """A typer command with one flag per setting; `command` gets the settings and the origin of each."""
 
     def run(config: Path | None, **given: Any) -> None:
         flags = {name: value for name, value in given.items() if value is not None}
@@ -23,7 +23,7 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
             raise typer.Exit(1) from None
         command(settings, where)
 
-    file_help = "TOML file of settings, named as the flags are, with _ for -."
+    file_help = "TOML file of settings; the names are those of the flags, with _ for -."
     parameters = [_parameter("config", Path, typer.Option(help=file_help, envvar=f"{PREFIX}CONFIG", dir_okay=False))]
     for name, field in Settings.model_fields.items():
         default = False if field.default is None or field.annotation is bool else str(field.default)
@@ -37,11 +37,11 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
 
 
 def as_toml(value: Any) -> str:
-    """A setting as it would stand in the file."""
+    """A value as written in a settings file."""
     return json.dumps(str(value) if isinstance(value, Path) else value)
 
 
 def _parameter(name: str, kind: Any, option: Any) -> inspect.Parameter:
-    # None stands for a flag that is not given.
+    # None means that the flag is not given.
     annotation = Annotated[kind | None, option]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)

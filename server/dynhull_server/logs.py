@@ -1,4 +1,4 @@
-"""Log lines for people or for machines, on standard error."""
+"""Logging to standard error, as text or JSON."""
 
 import logging
 import sys
@@ -8,12 +8,12 @@ import structlog
 
 
 def configure(level: str, form: str) -> None:
-    """Log from `level` on, as "text" or "json". Whatever is passed as `extra` becomes a field of the line."""
+    """Log from `level` on, as "text" or "json". Each key of `extra` becomes a field of the line."""
     render: Any
     if form == "json":
         render = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
     else:
-        # The default shows local variables: other people's points.
+        # The default would show local variables, and so the points of users.
         plain = structlog.dev.plain_traceback
         render = [structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty(), exception_formatter=plain)]
     handler = logging.StreamHandler(sys.stderr)

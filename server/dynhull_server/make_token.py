@@ -1,4 +1,4 @@
-"""`dynhull token`: a new bearer token, and its entry for the server's file."""
+"""`dynhull token`: a new bearer token, and its entry for the token file."""
 
 import hashlib
 import secrets
@@ -10,13 +10,11 @@ from .flags import as_toml
 
 
 def token(
-    name: Annotated[str, typer.Option(help="Whose it is.")] = "",
-    read: Annotated[
-        list[str] | None, typer.Option(help="Prefix of the hulls it may read; several times for more.")
-    ] = None,
-    write: Annotated[list[str] | None, typer.Option(help="Prefix of the hulls it may write.")] = None,
+    name: Annotated[str, typer.Option(help="Name of the owner, for limits and for people.")] = "",
+    read: Annotated[list[str] | None, typer.Option(help="Prefix of the hulls it may read. May be repeated.")] = None,
+    write: Annotated[list[str] | None, typer.Option(help="Prefix of the hulls it may write. May be repeated.")] = None,
 ) -> None:
-    """Make a token. It goes to standard error, its entry for the file given to `serve --tokens` to standard output.
+    """Create a token. Prints the token to standard error, and its entry for `serve --tokens` to standard output.
 
     dynhull token --name trucks --read fleet/ --write fleet/truck- >> tokens.toml
     """

@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar on a terminal's standard error, nothing elsewhere. Call with what is done and what there is in all."""
+    """A progress bar on standard error, if it is a terminal. Call it with the amount done and the total."""
     console = Console(stderr=True)
     columns = [BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeRemainingColumn()]
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:

@@ -23,8 +23,8 @@ SIGNALS = signal.SIGTERM, signal.SIGINT
 def serve(settings: Settings, _: dict[str, str]) -> None:
     """Serve hulls over gRPC.
 
-    The first line printed is "dynhull serving on HOST:PORT". SIGTERM ends the server: what it has acknowledged is
-    applied, calls under way finish, everything else gets UNAVAILABLE.
+    The first line printed is "dynhull serving on HOST:PORT". SIGTERM stops the server: calls in progress finish, and
+    all others get UNAVAILABLE.
 
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
@@ -39,13 +39,13 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
 
 
 async def _serve(settings: Settings) -> None:
-    with _told_to_stop() as stop:
+    with _stop_signal() as stop:
         server = Server(settings)
         try:
             with progress_bar("hulls read") as progress:
                 await server.start(progress)
-            gc.freeze()  # modules and what was read: to look through that again and again would make calls wait 50 ms
-            print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # the command's output
+            gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
+            print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
             if server.metrics_url:
                 print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
             await stop.wait()
@@ -55,12 +55,12 @@ async def _serve(settings: Settings) -> None:
 
 
 @contextmanager
-def _told_to_stop() -> Iterator[asyncio.Event]:
-    """Set by SIGTERM and SIGINT, which are ignored from the end of the block to the end of the process.
+def _stop_signal() -> Iterator[asyncio.Event]:
+    """An event set by SIGTERM and SIGINT, which are ignored from the end of the block to the end of the process.
 
-    The signal comes as a byte through a socket. Its handler alone could come too late: where the loop has just gone to
-    sleep, or another thread was interrupted. The loop's own handlers do the same, but end with it, and then a second
-    signal on the way out would kill.
+    The signal arrives as a byte through a socket. A handler alone could run too late, if the event loop has just gone
+    to sleep or another thread was interrupted. The handlers of the event loop do the same, but only until it is closed;
+    after that a second signal would kill the process.
     """
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()

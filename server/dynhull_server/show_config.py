@@ -1,4 +1,4 @@
-"""`dynhull config`: what `dynhull serve` would run with."""
+"""`dynhull config`: the settings of `dynhull serve`."""
 
 import typer
 
@@ -8,7 +8,7 @@ from .settings import Settings
 
 @with_settings
 def config(settings: Settings, origins: dict[str, str]) -> None:
-    """Show the settings `dynhull serve` would run with, as a file for --config, and where each comes from."""
+    """Show the settings that `dynhull serve` would use, in the format of --config, and the origin of each."""
     lines = {}
     for name in Settings.model_fields:
         value = getattr(settings, name)

@@ -1,4 +1,4 @@
-"""What a page shows, without a page."""
+"""The figures and the frame of a page, without a browser."""
 
 import math
 
@@ -8,6 +8,7 @@ import pytest
 from dynhull_dashboard.history import ROWS, History
 from dynhull_dashboard.outline import MOST_DRAWN, frame_around, outline
 from dynhull_dashboard.server_metrics import Scrape
+from dynhull_dashboard.units import Units
 
 PAGE = """# TYPE dynhull_updates counter
 dynhull_updates_total{{operation="insert"}} {updates}
@@ -28,6 +29,19 @@ def test_the_picture_stands_still_while_hulls_move_in_it() -> None:
     assert frame_around([(1, 1, 11, 5)], frame) != frame, "a hull has left it"
     assert frame_around([(4, 4, 5, 5)], frame) != frame, "it has become too small to see"
     assert frame_around([], frame) is frame
+
+
+def test_axes_of_different_units_each_fill_the_picture() -> None:
+    wide = (0, 0, 1000, 1)
+    frame = frame_around([wide], None, same_scale=False)
+    assert frame == pytest.approx((-80, -0.08, 1080, 1.08))
+    assert frame_around([wide], frame, same_scale=False) is frame
+    assert frame_around([(0, 0, 1000, 0.1)], frame, same_scale=False) != frame, "one axis has become too short to see"
+    assert frame_around([(0, 0, 1000, 0)], None, same_scale=False)[1] < 0 < frame[3]
+
+
+def test_units_of_areas() -> None:
+    assert [Units().area, Units("km", "km").area, Units("ms", "USD").area] == ["square units", "km²", "ms by USD"]
 
 
 @pytest.mark.parametrize("at", [0.0, 7.0, -1e300])

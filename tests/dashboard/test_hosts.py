@@ -1,12 +1,13 @@
-"""What the dashboard answers to: its own names, and its own pages."""
+"""The dashboard answers only under its own names, and only to its own pages."""
 
 import http.client
+import subprocess
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 import pytest
 from dashboard_process import dashboard_process
-from server_process import PATIENCE
+from server_process import COMMAND, PATIENCE
 
 UPGRADE = {
     "Connection": "Upgrade",
@@ -15,26 +16,36 @@ UPGRADE = {
     "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
 }
 NAMED = "hulls.example.org:5006"
+PROXIED = "https://proxied.example.org"
+SESSION = "/ws"
+SOCKETS = "/hulls", SESSION
 
 
 @pytest.fixture(scope="module")
 def dashboard(address: str) -> Iterator[str]:
     """HOST:PORT of a dashboard."""
-    with dashboard_process(address, "--origin", NAMED) as url:
+    with dashboard_process(address, "--origin", NAMED, "--origin", PROXIED) as url:
         yield urlsplit(url).netloc
 
 
-def status(dashboard: str, path: str, **headers: str) -> int:
+def answer(dashboard: str, path: str, **headers: str) -> tuple[int, str]:
+    """The status, and the text of a refusal."""
     connection = http.client.HTTPConnection(dashboard, timeout=PATIENCE)
     try:
-        connection.request("GET", path, headers={**(UPGRADE if path == "/hulls" else {}), **headers})
-        return connection.getresponse().status
+        connection.request("GET", path, headers={**(UPGRADE if path in SOCKETS else {}), **headers})
+        response = connection.getresponse()
+        refused = response.status == http.HTTPStatus.FORBIDDEN
+        return response.status, response.read().decode() if refused else ""
     finally:
         connection.close()
 
 
-@pytest.mark.parametrize("path", ["/", "/hulls"])
-def test_a_name_that_was_made_to_lead_here_is_refused(dashboard: str, path: str) -> None:
+def status(dashboard: str, path: str, **headers: str) -> int:
+    return answer(dashboard, path, **headers)[0]
+
+
+@pytest.mark.parametrize("path", ["/", "/static/js/bokeh.min.js", *SOCKETS])
+def test_unknown_hosts_and_origins_are_refused(dashboard: str, path: str) -> None:
     rebound = f"evil.example:{dashboard.rpartition(':')[2]}"
     assert status(dashboard, path, Host=rebound, Origin=f"http://{rebound}") == http.HTTPStatus.FORBIDDEN
     assert status(dashboard, path, Host=rebound) == http.HTTPStatus.FORBIDDEN
@@ -42,9 +53,33 @@ def test_a_name_that_was_made_to_lead_here_is_refused(dashboard: str, path: str)
     assert status(dashboard, path, Origin="null") == http.HTTPStatus.FORBIDDEN
 
 
+def test_a_refusal_names_the_option_that_allows_the_name(address: str, dashboard: str) -> None:
+    by_host = {"Host": "one.example:5006"}
+    by_origin = {"Host": NAMED, "Origin": "http://two.example:5006"}
+    advised = []
+    for headers in (by_host, by_origin):
+        code, text = answer(dashboard, "/", **headers)
+        assert code == http.HTTPStatus.FORBIDDEN
+        advised += ["--origin", text.rpartition("--origin ")[2].strip()]
+    assert advised == ["--origin", "one.example:5006", "--origin", "http://two.example:5006"]
+    with dashboard_process(address, "--host", "::1", "--origin", NAMED, *advised) as url:
+        assert urlsplit(url).hostname == "::1"
+        for headers in ({}, by_host, by_origin):
+            assert status(urlsplit(url).netloc, "/", **headers) == http.HTTPStatus.OK
+
+
+def test_a_name_that_cannot_be_one_is_an_error(address: str) -> None:
+    command = [COMMAND, "dashboard", "--port", "0", "--address", address, "--origin", "*.example.org"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    assert ended.returncode == 2
+    assert "--origin is '*.example.org': expected HOST or HOST:PORT" in ended.stderr
+
+
 @pytest.mark.parametrize("path", ["/", "/hulls"])
 def test_its_own_names_are_answered(dashboard: str, path: str) -> None:
     expected = http.HTTPStatus.SWITCHING_PROTOCOLS if path == "/hulls" else http.HTTPStatus.OK
+    proxied = PROXIED.rpartition("/")[2]
+    assert status(dashboard, path, Host=proxied, Origin=PROXIED) == expected
     port = dashboard.rpartition(":")[2]
     for host in (dashboard, f"LocalHost:{port}", f"[::1]:{port}", NAMED):
         assert status(dashboard, path, Host=host, Origin=f"http://{host}") == expected

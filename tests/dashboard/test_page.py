@@ -1,6 +1,7 @@
 """The dashboard in a real browser, on a real server."""
 
 import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,8 +10,8 @@ import pytest
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import wait_until
-from playwright.sync_api import Browser, Page, expect, sync_playwright
-from server_process import Server, server_process
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from server_process import COMMAND, Server, server_process
 
 from dynhull_client import HullClient
 
@@ -55,8 +56,16 @@ def hull(client: HullClient, name: str) -> str:
     return name
 
 
-def banner(page: Page):
+def banner(page: Page) -> Locator:
     return page.get_by_role("alert").filter(has_text="No connection to")
+
+
+def note(page: Page) -> Locator:
+    return page.get_by_role("status")
+
+
+def description(page: Page) -> Locator:
+    return page.get_by_role("group", name="Picture of the hulls")
 
 
 def picture(page: Page) -> bytes:
@@ -64,14 +73,19 @@ def picture(page: Page) -> bytes:
 
 
 def let_go(page: Page, name: str) -> None:
-    page.locator(".choices__list--multiple .choices__item", has_text=name).locator("button").click()
+    page.get_by_role("button", name=f"Remove {name}").click()
+
+
+def pick(page: Page, name: str) -> None:
+    page.get_by_placeholder("Pick hulls").fill(name)
+    page.get_by_placeholder("Pick hulls").press("Enter")
 
 
 def wait_for_hulls(page: Page, *names: str) -> None:
     """Until the page knows of these hulls."""
     page.wait_for_function(
         """names => {
-            const known = Bokeh.documents[0]?.get_model_by_name("picker").tags ?? []
+            const known = Bokeh.documents[0]?.get_model_by_name("page").offered ?? []
             return names.every(name => known.includes(name))
         }""",
         arg=names,
@@ -100,7 +114,7 @@ def test_the_polygon_follows_the_hull(browser: Browser, url: str, client: HullCl
         expect(row).to_contain_text("✓ equal")
 
 
-def test_hovering_tells_coordinates_and_revision(browser: Browser, url: str, hull: str) -> None:
+def test_hovering_shows_coordinates_and_revision(browser: Browser, url: str, hull: str) -> None:
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
         at = page.evaluate("""() => {
@@ -120,8 +134,7 @@ def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullCli
     with opened(browser, url, "shown") as page:
         row = page.get_by_role("row").filter(has_text=hull)
         wait_for_hulls(page, "shown", hull)
-        page.get_by_placeholder("Pick hulls").fill(hull)
-        page.get_by_role("option", name=hull).click()
+        pick(page, hull)
         wait_for_vertices(page, hull, SQUARE)
         expect(row).to_be_visible()
         let_go(page, hull)
@@ -138,9 +151,7 @@ def test_what_is_typed_stays_when_hulls_come(browser: Browser, url: str, client:
         wait_for_hulls(page, hull, late)
         expect(field).to_have_value(late)
         expect(field).to_be_focused()
-        field.blur()
-        field.fill(late)
-        page.get_by_role("option", name=late).click()
+        field.press("Enter")
         expect(page.get_by_role("row").filter(has_text=late)).to_be_visible()
 
 
@@ -159,7 +170,9 @@ def test_several_hulls_and_one_watch_each_for_all_viewers(browser: Browser) -> N
             wait_for_vertices(page, "fleet", SQUARE)
             expect(page.get_by_role("row")).to_have_count(3)
         dashes = [path.get_attribute("stroke-dasharray") for path in one.locator("th path[stroke]").all()]
-        assert len({*dashes}) == 2, "told apart by colour alone"
+        assert len({*dashes}) == 2, "only colour distinguishes them"
+        legend = [path.get_attribute("stroke-dasharray") for path in one.locator(".picker path[stroke]").all()]
+        assert legend == dashes
         wait_for_watchers(metrics, 2)
         let_go(one, "port")
         let_go(two, "port")
@@ -183,6 +196,103 @@ def test_the_hull_is_verified_when_asked_to(browser: Browser, url: str, client: 
         client.apply(hull, insert=[[8, 8]])
         page.get_by_role("button", name="Verify now").click()
         expect(state).to_contain_text("✓ equal at revision 2,")
+
+
+def test_each_empty_state_says_what_to_do(browser: Browser, tmp_path: Path) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("x,y\n0,0\n4,0\n4,4\n")
+    with (
+        measured() as (server, _metrics),
+        HullClient(server.address) as client,
+        dashboard_process(server.address, "--metrics", "http://127.0.0.1:1/metrics") as url,
+        opened(browser, url) as page,
+    ):
+        alert = page.get_by_role("alert")
+        expect(alert).to_contain_text("No metrics from http://127.0.0.1:1/metrics: ")
+        expect(alert).to_contain_text("Check that the server runs with --metrics-port")
+        load = "dynhull load NAME FILE.csv"
+        expect(note(page)).to_contain_text(f"The server has no hulls yet. Make one: {load}")
+        client.create_hull("fleet")
+        expect(note(page)).to_contain_text("fleet has no points yet. Add some: dynhull load fleet FILE.csv")
+        advice = note(page).text_content().rpartition("dynhull ")[2].replace("FILE.csv", str(points))
+        subprocess.run([COMMAND, *advice.split()], check=True, capture_output=True)
+        wait_for_vertices(page, "fleet", [[0, 0], [4, 0], [4, 4]])
+        expect(note(page)).to_be_hidden()
+        let_go(page, "fleet")
+        expect(note(page)).to_have_text("Pick a hull above.")
+        pick(page, "boats")
+        expect(note(page)).to_contain_text("The server has no hull boats. Check the name")
+        row = page.get_by_role("row").filter(has_text="boats")
+        expect(row).to_contain_text("No such hull. Check the name, or create the hull: it appears here by itself")
+        client.create_hull("boats")
+        client.apply("boats", insert=SQUARE)
+        wait_for_vertices(page, "boats", SQUARE)
+        expect(note(page)).to_be_hidden()
+        client.delete_hull("boats")
+        expect(row).to_contain_text("No such hull.")
+        wait_for_vertices(page, "boats", [])
+
+
+def test_a_refused_token_is_named_as_the_cause(browser: Browser, tmp_path: Path) -> None:
+    tokens = tmp_path / "tokens.toml"
+    made = subprocess.run([COMMAND, "token", "--read", "fleet"], check=True, capture_output=True, text=True)
+    tokens.write_text(made.stdout)
+    with (
+        server_process("--in-memory", "--tokens", str(tokens), complaints="UNAUTHENTICATED") as server,
+        dashboard_process(server.address) as url,
+        opened(browser, url, "fleet") as page,
+    ):
+        expect(page.get_by_role("alert")).to_contain_text(f"{server.address} refuses the dashboard")
+        expect(page.get_by_role("alert")).to_contain_text("Start the dashboard with a --token that the server knows")
+
+
+def test_a_name_in_the_address_is_never_html(browser: Browser, url: str) -> None:
+    name = "<img src=x onerror=document.title='run'>"
+    with opened(browser, url, name) as page:
+        expect(page.get_by_role("row").filter(has_text=name)).to_be_visible()
+        expect(page.get_by_role("button", name=f"Remove {name}")).to_be_visible()
+        assert page.locator("img").count() == 0
+        assert page.title() == "dynhull"
+
+
+def test_the_picture_in_words(browser: Browser, url: str, client: HullClient, hull: str) -> None:
+    with opened(browser, url, hull) as page:
+        words = (
+            f"{hull}: a convex polygon with 4 vertices around 5 points, x from 0 to 4, y from 0 to 4, at revision 1."
+        )
+        expect(description(page)).to_have_accessible_description(words)
+        client.apply(hull, delete=[*SQUARE, [1, 2]])
+        expect(description(page)).to_have_accessible_description(f"{hull}: nothing drawn.")
+
+
+def test_axes_of_different_units_have_scales_of_their_own(
+    browser: Browser, server: tuple[Server, str], client: HullClient, name: str
+) -> None:
+    client.create_hull(name)
+    client.apply(name, insert=[[0, 0], [1000, 0], [0, 1]])
+    heights = """() => {
+        const {frame} = Bokeh.index.get_by_id(Bokeh.documents[0].get_model_by_name("plane").id)
+        return Math.abs(frame.y_scale.compute(1) - frame.y_scale.compute(0))
+    }"""
+    with (
+        dashboard_process(server[0].address, "--x-unit", "ms", "--y-unit", "USD") as url,
+        opened(browser, url, name) as page,
+    ):
+        expect(page.get_by_role("columnheader", name="Area (ms by USD)")).to_be_visible()
+        page.wait_for_function(f"({heights})() > 300")
+        page.get_by_label("Same scale for x and y").check()
+        page.wait_for_function(f"({heights})() < 10")
+
+
+def test_series_of_the_server_have_no_hulls_colour(browser: Browser, url: str, hull: str) -> None:
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        colours = page.evaluate("""() => {
+            const of = name => Bokeh.documents[0].get_model_by_name(name).renderers
+                .filter(renderer => renderer.name).map(renderer => renderer.glyph.line_color.value)
+            return [...of("updates"), ...of("delay")]
+        }""")
+        assert colours == ["#7d8590"] * 3
 
 
 def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def health(address: str) -> int:
 
 def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_path: Path) -> None:
     with (
-        faulty_server(tmp_path, "--metrics-port", "0", complaints="unwell: health is NOT_SERVING") as (server, faults),
+        faulty_server(tmp_path, "--metrics-port", "0", complaints="health is NOT_SERVING") as (server, faults),
         HullClient(server.address) as client,
     ):
         client.create_hull("a")
@@ -64,7 +64,7 @@ def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None
     log = tmp_path / "data" / "dynhull.db-wal"
     points = np.random.default_rng(8).normal(size=(50, 2000, 2))
     with (
-        faulty_server(tmp_path, complaints="unwell: health is NOT_SERVING") as (server, faults),
+        faulty_server(tmp_path, complaints="unhealthy: health is NOT_SERVING") as (server, faults),
         HullClient(server.address) as client,
     ):
         client.create_hull("a")
@@ -79,7 +79,7 @@ def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None
 
 def test_a_disk_that_hangs_makes_the_server_unwell(tmp_path: Path) -> None:
     with (
-        faulty_server(tmp_path, complaints="a commit is under way for") as (server, faults),
+        faulty_server(tmp_path, complaints="a commit has been running for") as (server, faults),
         HullClient(server.address) as client,
         ThreadPoolExecutor() as threads,
     ):
@@ -123,7 +123,7 @@ def test_an_outcome_is_unknown_until_the_disk_can_be_read(tmp_path: Path) -> Non
         client.apply("a", insert=[[0, 0]])
         (faults / "settle").touch()
         (faults / "commit").touch()
-        with pytest.raises(OutcomeUnknownError, match="unknown until the disk can be read again"):
+        with pytest.raises(OutcomeUnknownError, match="whether this was applied, until the disk can be read again"):
             client.apply("a", insert=[[1, 1]])
         with pytest.raises(UnavailableError):
             client.get_hull("a", min_revision=1)

@@ -176,7 +176,7 @@ def test_tokens_are_read_again_when_they_change(tmp_path: Path) -> None:
     replace(entry("old", [""], [""]))
     options = ("--tokens", str(tokens), "--log-level", "error")
     with (
-        server_process(*options, complaints="stay as they were") as server,
+        server_process(*options, complaints="the tokens do not change") as server,
         HullClient(server.address, token="old") as old,
         HullClient(server.address, token="new") as new,
     ):
@@ -264,7 +264,7 @@ def test_other_machines_only_with_tls_and_tokens_or_when_told(tmp_path: Path, ce
 @pytest.mark.parametrize(
     ("options", "text", "message"),
     [
-        (["--tls-cert", "x.pem"], None, "--tls-cert and --tls-key go together"),
+        (["--tls-cert", "x.pem"], None, "--tls-cert and --tls-key must be given together"),
         (["--tls-client-ca", "x.pem"], None, "--tls-client-ca needs --tls-cert"),
         (["--tls-cert", "no.pem", "--tls-key", "no.pem"], None, "no.pem"),
         (["--tokens", "no.toml"], None, "no.toml"),

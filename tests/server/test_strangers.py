@@ -196,7 +196,7 @@ def test_a_missing_file_of_tokens_is_told_once(tokens: Tokens, tmp_path: Path) -
             assert one.get_hull("a").info.name == "a"
         tokens.write(two=ALL)
         wait_until(lambda: refusal_of(lambda: one.get_hull("a")))
-    assert log.read_text().count("the tokens stay as they were") == 1
+    assert log.read_text().count("the tokens do not change") == 1
 
 
 def refusal_of(call: Callable[[], object]) -> Exception | None:

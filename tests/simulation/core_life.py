@@ -33,12 +33,12 @@ from dynhull_server.state.events import (
     Gone,
     NotExamined,
     ReadHull,
+    Reply,
     Request,
     Retried,
     Retry,
     Stopping,
     Tick,
-    Told,
     WriteBatch,
 )
 from dynhull_server.state.hull_state import HullState
@@ -69,16 +69,16 @@ class Wait:
 class Answer:
     """A caller of the core."""
 
-    __slots__ = ("told",)
+    __slots__ = ("answered",)
 
     def __init__(self) -> None:
-        self.told = False
+        self.answered = False
 
-    def tell(self, _: Request) -> None:
-        self.told = True
+    def answer(self, _: Request) -> None:
+        self.answered = True
 
-    def is_told(self) -> bool:
-        return self.told
+    def is_answered(self) -> bool:
+        return self.answered
 
 
 class NoThreads:
@@ -147,12 +147,12 @@ class CoreServer:
 
     def _carry_out(self, effect: Effect) -> None:
         match effect:
-            case Told():
+            case Reply():
                 if effect.moved is not None:
                     self.schedule.note((effect.moved.uid, effect.moved.counts.revision))
                 for request in effect.requests:
                     self.schedule.note((type(request).__name__, str(request.error)))
-                    request.to.tell(request)
+                    request.to.answer(request)
             case Commit():
                 self._commit(effect.ticket, effect.changes)
             case Compute():
@@ -205,9 +205,9 @@ class CoreServer:
 
     async def _ask(self, request: Request) -> Any:
         self.dispatch(request)
-        if not request.to.told:
+        if not request.to.answered:
             try:
-                await Wait(request.to.is_told)
+                await Wait(request.to.is_answered)
             except CancelledError:
                 self.dispatch(Gone(request))
                 raise
@@ -229,7 +229,7 @@ class CoreServer:
         requests = [DeleteHull(Answer(), name) for _ in range(times)]
         for request in requests:
             self.dispatch(request)
-        await Wait(lambda: all(request.to.told for request in requests))
+        await Wait(lambda: all(request.to.answered for request in requests))
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         write.to, write.name = Answer(), name

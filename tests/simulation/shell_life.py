@@ -9,7 +9,7 @@ from typing import Any
 from dynhull.arrays import Points
 from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.engine import Engine
-from dynhull_server.engine.supervisor import PASSING, Supervisor
+from dynhull_server.engine.supervisor import TRANSIENT, Supervisor
 from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.engine.watch import watch
 from dynhull_server.state.batch import Applied
@@ -43,7 +43,7 @@ class WatchedSupervisor(Supervisor):
         self._model, self._loop_of_life = model, loop
 
     def failed(self, name: str, error: BaseException) -> None:
-        if not isinstance(error, PASSING):
+        if not isinstance(error, TRANSIENT):
             raise self._model.finds(f"{name} fails: {error!r}") from error
         if not self._model.faulty and not isinstance(error, TimeoutError):  # a thread of this life may be slow
             raise self._model.finds(f"{name} fails without a fault: {error!r}") from error

@@ -30,7 +30,7 @@ from dynhull_server.state.records import Append, Create, Delete, HullRow, Record
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite import copies
 
-UNFINISHED = "is a copy that was not finished: remove it, and copy again"
+UNFINISHED = "is an unfinished copy: remove it, and copy again"
 
 
 def run(*command, **more):
@@ -143,7 +143,7 @@ def test_a_damaged_backup_is_not_restored(paths):
     stopped(data)
     done("backup", copy, "--data", data, says=f"{copy}: 1 hulls")
     flip(copy / DATABASE, record(4).inserts.tobytes())
-    refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones are there")
+    refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones exist")
     assert not new.exists()
 
 
@@ -159,7 +159,7 @@ def test_what_is_left_is_restored_where_loss_is_accepted(paths, tmp_path):
     (crash / LOG).unlink()
     refused("restore", crash, "--data", new, says="dynhull restore --accept-loss")
     finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hulls")
-    assert "done without what is lost" in finished.stderr
+    assert "copied without what is lost" in finished.stderr
     assert served(new, 5).notes == []
 
 
@@ -265,7 +265,7 @@ def test_a_server_waits_for_a_command_that_reads_a_stopped_folder(paths):
         refusals.append(str(refusal.value))
 
     copies.copy(data, copy, start)
-    assert "or a command" in refusals[0]
+    assert "another server or command uses" in refusals[0]
 
 
 def test_check_beside_a_server(paths):
@@ -297,15 +297,15 @@ def test_check_says_what_is_damaged(paths):
     assert finished.stdout.splitlines() == [
         "fleet: revision 40, 20 rows of batches, snapshots at 20, 30: DAMAGED",
         "whole: revision 2, 2 rows of batches: whole",
-        f"{data}: damaged; it can be served without what is named",
+        f"{data}: damaged; it can be served without the parts named above",
     ]
-    assert finished.stderr == "hull 'fleet': the snapshot at revision 20 is damaged, and is left out\n"
+    assert finished.stderr == "hull 'fleet': the snapshot at revision 20 is damaged, and was dropped\n"
     (data / DATABASE).write_bytes(content)
     flip(data / DATABASE, record(35).inserts.tobytes())
     finished = run("check", data)
     assert finished.returncode == 1
-    assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it is not served: restore a backup"
-    assert "hull 'fleet': revisions 35 to 35 are damaged, and later ones are there" in finished.stderr
+    assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it cannot be served: restore a backup"
+    assert "hull 'fleet': revisions 35 to 35 are damaged, and later ones exist" in finished.stderr
     (data / DATABASE).write_bytes(content)
     done("check", data, says=f"{data}: 2 hulls, all whole")
     assert (data / DATABASE).read_bytes() == content
@@ -335,9 +335,9 @@ def sorted_rows(points):
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (["backup", "copy", "--data", "nowhere"], "nowhere holds no hulls"),
-        (["check", "nowhere"], "nowhere holds no hulls"),
-        (["export", "h", "points.csv", "--data", "nowhere"], "nowhere holds no hulls"),
+        (["backup", "copy", "--data", "nowhere"], "nowhere is no data folder: it has no dynhull.db"),
+        (["check", "nowhere"], "nowhere is no data folder: it has no dynhull.db"),
+        (["export", "h", "points.csv", "--data", "nowhere"], "nowhere is no data folder: it has no dynhull.db"),
         (["export", "h", "points.xls"], "the name must end in .csv, .parquet, .geojson"),
     ],
 )

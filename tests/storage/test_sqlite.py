@@ -51,7 +51,7 @@ def test_nothing_is_touched_before_it_is_opened(folder):
 
 def test_one_server_at_a_time(folder):
     storage, _ = opened(folder)
-    with pytest.raises(LockedError, match=r"another server, .* works on .*: stop it first"):
+    with pytest.raises(LockedError, match=r"another server or command uses .*: stop it first"):
         opened(folder)
     storage.close()
     opened(folder)[0].close()
@@ -83,7 +83,7 @@ def test_another_programs_database_is_refused(folder):
     with pytest.raises(FormatError, match="another program"):
         opened(folder)
     (folder / DATABASE).write_bytes(b"not a database at all" * 100)
-    with pytest.raises(DamagedError, match=r"no readable database .*: restore a backup"):
+    with pytest.raises(DamagedError, match=r"cannot be read as a database .*: restore a backup"):
         opened(folder)
 
 
@@ -148,7 +148,7 @@ def test_what_a_snapshot_makes_superfluous_is_dropped(folder):
 def test_damage_in_the_middle_is_refused(folder, damaged):
     stopped(folder)
     flip(folder / DATABASE, record(damaged).inserts.tobytes())
-    words = f"hull 'fleet': revisions {damaged} to {damaged} are damaged, and later ones are there: restore a backup"
+    words = f"hull 'fleet': revisions {damaged} to {damaged} are damaged, and later ones exist: restore a backup"
     with pytest.raises(DamagedError, match=words):
         opened(folder)
 
@@ -168,7 +168,7 @@ def test_missing_batches_are_refused(folder, gone):
     stopped(folder)
     with sqlite3.connect(folder / DATABASE) as database:
         database.execute(f"DELETE FROM batches WHERE {gone}")
-    with pytest.raises(DamagedError, match="1 hulls with 9 rows of batches, and there are 1 with"):
+    with pytest.raises(DamagedError, match="1 hulls with 9 rows of batches, the tables have 1 with"):
         opened(folder)
 
 
@@ -176,7 +176,7 @@ def test_a_missing_hull_is_refused(folder):
     stopped(folder)
     with sqlite3.connect(folder / DATABASE) as database:
         database.execute("DELETE FROM hulls")
-    with pytest.raises(DamagedError, match="1 hulls with 9 rows of batches, and there are 0 with 0"):
+    with pytest.raises(DamagedError, match="1 hulls with 9 rows of batches, the tables have 0 with 0"):
         opened(folder)
 
 
@@ -185,7 +185,10 @@ def test_a_damaged_end_is_cut_at_the_last_whole_batch(folder):
     flip(folder / DATABASE, record(9).inserts.tobytes())
     storage, contents = opened(folder)
     assert contents.notes == [
-        f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: cut off at revision 8, the last whole one"
+        (
+            f"{folder / DATABASE}: hull 'fleet': revisions 9 to 9 are damaged: "
+            "the hull was cut back to revision 8, the last intact one"
+        )
     ]
     same(storage.read(1).records, records(1, 8))
     append(storage, 9, 9)
@@ -204,7 +207,7 @@ def test_a_damaged_end_that_a_snapshot_reaches_into_is_cut_at_the_snapshot(folde
     storage.close()
     flip(folder / DATABASE, record(8).inserts.tobytes())
     storage, contents = opened(folder)
-    assert "revisions 4 to 8 are damaged: cut off at revision 6" in contents.notes[0]
+    assert "revisions 4 to 8 are damaged: the hull was cut back to revision 6" in contents.notes[0]
     assert storage.read(1).last_revision == 6
     append(storage, 7, 9)
     same(storage.read(1).records, records(7, 9))
@@ -225,7 +228,7 @@ def test_a_damaged_snapshot_gives_way_to_the_one_before(folder):
     flip(folder / DATABASE, newest.tobytes())
     storage, contents = opened(folder)
     assert contents.notes == [
-        f"{folder / DATABASE}: hull 'fleet': the snapshot at revision 30 is damaged, and is left out"
+        f"{folder / DATABASE}: hull 'fleet': the snapshot at revision 30 is damaged, and was dropped"
     ]
     assert storage.read(1).revision == 20
     same(storage.read(1).records, records(21, 40))
@@ -281,7 +284,7 @@ def test_a_log_cut_short_loses_the_last_commit_only(crash):
 
 def test_damage_in_the_middle_of_the_log_is_refused(crash):
     flip(crash / LOG, record(4).inserts.tobytes())
-    with pytest.raises(DamagedError, match=r"frame .* is damaged, and whole commits follow it: restore a backup"):
+    with pytest.raises(DamagedError, match=r"frame .* is damaged, and intact commits follow it: restore a backup"):
         opened(crash)
 
 
@@ -299,7 +302,7 @@ def test_a_damaged_salt_is_refused(crash, byte):
     content = bytearray((crash / LOG).read_bytes())
     content[HEADER_BYTES + FRAME_BYTES + byte] ^= 1
     (crash / LOG).write_bytes(content)
-    with pytest.raises(DamagedError, match=r"frame 2 is damaged, and whole commits follow it"):
+    with pytest.raises(DamagedError, match=r"frame 2 is damaged, and intact commits follow it"):
         opened(crash)
 
 
@@ -316,7 +319,7 @@ def test_a_missing_log_is_refused(crash, left):
 
 def test_a_log_without_its_database_is_refused(crash):
     (crash / DATABASE).write_bytes(b"")
-    with pytest.raises(DamagedError, match="is missing or empty, and its log is there"):
+    with pytest.raises(DamagedError, match="is missing or empty, but its log exists"):
         opened(crash)
     assert (crash / LOG).exists()
 
@@ -386,5 +389,5 @@ def test_shared_memory_and_lock_hold_nothing(crash):
 def test_an_unfinished_copy_is_refused(folder):
     folder.mkdir()
     (folder / "unfinished.db").write_bytes(b"")
-    with pytest.raises(StorageError, match="is a copy that was not finished: remove it, and copy again"):
+    with pytest.raises(StorageError, match="is an unfinished copy: remove it, and copy again"):
         opened(folder)

@@ -1,1 +1,1 @@
-"""The live page: a client of the public API like any other."""
+"""The dashboard: a live page of hulls. It uses the public client only."""

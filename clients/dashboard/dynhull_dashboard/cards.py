@@ -1,4 +1,4 @@
-"""What is told of each hull in words and figures."""
+"""The table of hulls."""
 
 import math
 import time
@@ -7,6 +7,7 @@ from html import escape
 
 from dynhull_client import Difference
 
+from .advice import about_hull
 from .feed import HullFeed, Verified
 from .looks import Look
 
@@ -18,43 +19,52 @@ MARKERS = {
     "inverted_triangle": '<path d="M20 13.5l5.5-10h-11z"/>',
     "hex": '<path d="M20 2.5l5 2.8v5.4l-5 2.8-5-2.8V5.3z"/>',
 }
-HEADINGS = ("Hull", "Revision", "Points", "Vertices", "Area", "Batches/s", "Live hull against Chan's algorithm")
+HEADINGS = ("Revision", "Points", "Vertices", "Area ({area})", "Batches/s")
+LAST_HEADING = "Live hull against Chan's algorithm"
+UNKNOWN = "-"
 DIGITS, RATE_DIGITS = 6, 3
-SOON = 2.0
+NOW_SECONDS, SECONDS_UP_TO = 2.0, 120.0
 
 
-def table(shown: Iterable[tuple[HullFeed, Look]], connected: bool) -> str:
-    """A table of the hulls as HTML; on a narrow page its rows are cards. Why it is not connected, a banner says."""
-    headings = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
-    rows = "".join(_row(feed, look, connected) for feed, look in shown)
-    return f"<table><thead><tr>{headings}</tr></thead>{rows}</table>" if rows else "<p>Pick a hull to see it.</p>"
+def table(shown: Iterable[tuple[HullFeed, Look]], connected: bool, area_unit: str) -> str:
+    """A table of the hulls as HTML, empty without hulls. On a narrow page its rows are cards."""
+    figures = [heading.format(area=escape(area_unit)) for heading in HEADINGS]
+    headings = "".join(f'<th scope="col">{heading}</th>' for heading in ("Hull", *figures, LAST_HEADING))
+    rows = "".join(_row(feed, look, connected, figures) for feed, look in shown)
+    return f"<table><thead><tr>{headings}</tr></thead>{rows}</table>" if rows else ""
 
 
-def _row(feed: HullFeed, look: Look, connected: bool) -> str:
+def _row(feed: HullFeed, look: Look, connected: bool, headings: Iterable[str]) -> str:
+    cells = "".join(
+        f'<td data-heading="{heading}">{figure}</td>' for heading, figure in zip(headings, _figures(feed), strict=True)
+    )
+    problem = about_hull(feed) if connected else "Connection lost"
+    state = f'<span class="bad">✗ {escape(problem)}</span>' if problem else _verified(feed.verified)
+    return f'<tr><th scope="row">{key(look)}{escape(feed.name)}</th>{cells}<td class="state">{state}</td></tr>'
+
+
+def _figures(feed: HullFeed) -> tuple[str, ...]:
+    if not feed.followed:
+        return (UNKNOWN,) * len(HEADINGS)
     outline, _ = feed.drawings()
     drawn = len(outline.points)
     vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
-    figures = (f"{feed.revision:,}", f"{feed.points:,}", vertices, _number(feed.area), _number(feed.rate, RATE_DIGITS))
-    cells = "".join(
-        f'<td data-heading="{heading}">{figure}</td>' for heading, figure in zip(HEADINGS[1:], figures, strict=False)
-    )
-    trouble = feed.trouble if connected else "connection lost"
-    state = f'<span class="bad">✗ {escape(trouble)}</span>' if trouble else _verified(feed.verified)
-    return f'<tr><th scope="row">{_key(look)}{escape(feed.name)}</th>{cells}<td class="state">{state}</td></tr>'
+    return f"{feed.revision:,}", f"{feed.points:,}", vertices, _number(feed.area), _number(feed.rate, RATE_DIGITS)
 
 
-def _key(look: Look) -> str:
-    """The hull's line and marker."""
+def key(look: Look) -> str:
+    """The line and marker of a hull as SVG, for a legend."""
+    marker = MARKERS.get(look.marker, "")
     dash = " ".join(map(str, look.dash))
     return (
         f'<svg width="40" height="16" fill="{look.colour}" aria-hidden="true"><path d="M0 8h40" stroke="{look.colour}" '
-        f'stroke-width="2" stroke-dasharray="{dash}"/>{MARKERS[look.marker]}</svg>'
+        f'stroke-width="2" stroke-dasharray="{dash}"/>{marker}</svg>'
     )
 
 
 def _verified(verified: Verified | None) -> str:
     if verified is None:
-        return "… being verified"
+        return "… not verified yet"
     when = _ago(time.monotonic() - verified.at)
     outcome = verified.outcome
     if outcome.difference is None:
@@ -67,12 +77,12 @@ def _difference(difference: Difference) -> str:
 
 
 def _ago(seconds: float) -> str:
-    if seconds < SOON:
+    if seconds < NOW_SECONDS:
         return "just now"
-    return f"{seconds:.0f} s ago" if seconds < 120 else f"{seconds / 60:.0f} min ago"
+    return f"{seconds:.0f} s ago" if seconds < SECONDS_UP_TO else f"{seconds / 60:.0f} min ago"
 
 
 def _number(value: float, digits: int = DIGITS) -> str:
     if math.isnan(value):
-        return "-"
+        return UNKNOWN
     return f"{value:,.0f}" if 1000 <= abs(value) < 1e15 else f"{value:.{digits}g}"

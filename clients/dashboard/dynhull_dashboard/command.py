@@ -1,4 +1,4 @@
-"""The command: `dynhull dashboard`."""
+"""The command `dynhull dashboard`."""
 
 import asyncio
 from typing import Annotated
@@ -10,6 +10,7 @@ from dynhull_client import AsyncHullClient
 
 from .hub import Hub
 from .serve import serve
+from .units import Units
 
 
 @connecting
@@ -17,28 +18,33 @@ def dashboard(
     connect: Connect,
     metrics: Annotated[
         str | None,
-        typer.Option(help="The server's page for Prometheus, for updates a second and acknowledgement delay."),
+        typer.Option(help="URL of the server's metrics page, for updates per second and acknowledgement delay."),
     ] = None,
-    prefix: Annotated[str, typer.Option(help="Offer only hulls whose names begin so.")] = "",
+    prefix: Annotated[str, typer.Option(help="Offer only hulls whose names begin with this.")] = "",
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = 5006,
     origin: Annotated[
         list[str] | None,
         typer.Option(
-            help="HOST:PORT as browsers on other machines call the page; no other name is answered. May be repeated."
+            help="Name of the page in browsers on other machines, such as HOST:PORT or https://HOST. Requests under "
+            "other names are refused. May be repeated."
         ),
     ] = None,
+    x_unit: Annotated[
+        str, typer.Option(help="Unit of x. If it differs from that of y, each axis has its own scale.")
+    ] = "",
+    y_unit: Annotated[str, typer.Option(help="Unit of y.")] = "",
 ) -> None:
     """Show live hulls in the browser.
 
-    The first line printed is "dynhull dashboard on http://HOST:PORT". Add ?hull=NAME to that to begin with a hull.
-    Whoever reaches the page sees what the token may read.
+    The first line printed is "dynhull dashboard on http://HOST:PORT". Add ?hull=NAME to open the page with that hull.
+    Anyone who can reach the page can see what the token may read.
 
-    dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # of dynhull serve --metrics-port 9464
+    dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # with dynhull serve --metrics-port 9464
     """
 
     async def show() -> None:
         async with connect(AsyncHullClient, retries=0) as client:
-            await serve(Hub(client, prefix, metrics), host, port, origin or [])
+            await serve(Hub(client, prefix, metrics, Units(x_unit, y_unit)), host, port, origin or [])
 
     asyncio.run(show())

@@ -1,4 +1,4 @@
-"""What goes to the pages ten times a second, written once for all of them."""
+"""Points as sent to the pages, serialized once for all of them."""
 
 import json
 from dataclasses import dataclass, field
@@ -14,10 +14,10 @@ class Drawing:
     """Points on the page.
 
     Attributes:
-        source: the name of the page's data source that they are for.
-        revision: the hull's, when they were so.
-        points: (n, 2).
-        message: all of this as the page reads it.
+        source: the name of the data source on the page.
+        revision: the revision of the hull with these points.
+        points: float64 array of shape (n, 2).
+        message: all of these as JSON.
     """
 
     source: str
@@ -32,10 +32,10 @@ class Drawing:
 
 
 def vertices_of(name: str) -> str:
-    """The source of a hull's vertices."""
+    """The name of the data source of a hull's vertices."""
     return f"vertices of {name}"
 
 
 def points_of(name: str) -> str:
-    """The source of its other points."""
+    """The name of the data source of its other points."""
     return f"points of {name}"

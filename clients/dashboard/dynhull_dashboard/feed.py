@@ -1,4 +1,4 @@
-"""One hull, watched once for everybody who looks at it."""
+"""One hull, watched once for all viewers."""
 
 import asyncio
 import logging
@@ -7,7 +7,16 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from dynhull_client import AsyncHullClient, AsyncWatch, DynhullError, Event, HullCopy, Progress, Verification
+from dynhull_client import (
+    AsyncHullClient,
+    AsyncWatch,
+    DynhullError,
+    Event,
+    HullCopy,
+    HullNotFoundError,
+    Progress,
+    Verification,
+)
 
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
@@ -18,11 +27,12 @@ PROGRESS_SECONDS = 0.5
 RETRY_SECONDS = 1.0
 TICK_SECONDS = 1.0
 SAMPLE_SIZE = 2_000
-# Few points move with their hull; of many nobody misses one.
+# A few points are sampled as often as the hull is drawn; among many, no viewer misses one that is late.
 FEW_POINTS_SECONDS, MANY_POINTS_SECONDS = 0.1, 2.0
 VERIFY_SECONDS = 30.0
-# Samples and verifications cost the server work in proportion to the points: they get a twentieth of the time.
-REST = 19
+# Samples and verifications cost the server time in proportion to the points. A pause of this many times their duration
+# keeps them below a twentieth of it.
+PAUSE_FACTOR = 19
 
 NO_POINTS = HullCopy().vertices
 
@@ -31,55 +41,60 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """What came out of a verification, and when by `time.monotonic`."""
+    """The result of a verification, and its time by `time.monotonic`."""
 
     outcome: Verification
     at: float
 
 
 class HullFeed:
-    """The latest of a hull, kept up to date until closed.
+    """The latest state of a hull, kept up to date until closed.
 
     Attributes:
-        name: the hull's.
+        name: the name of the hull.
+        followed: whether an event has arrived since the hull was last missing.
         revision: its revision.
-        points: how many points it has, with multiplicity.
-        vertices: how many vertices.
+        points: its number of points, with multiplicity.
+        vertices: its number of vertices.
         area: its area; NaN before it is known.
-        bounds: the smallest box around it; None where it is empty.
+        bounds: the smallest box around it; None while it is empty or unknown.
         verified: the last verification; None before the first.
-        rate: batches a second, over the last second.
-        history: a row a second.
+        rate: batches per second, over the last second.
+        history: one row per second.
     """
 
     def __init__(self, client: AsyncHullClient, name: str) -> None:
         self.name = name
+        self._reset()
+        self.rate = math.nan
+        self.history = History("time", "points", "vertices", "area", "rate")
+        self._client = client
+        self._watch: AsyncWatch | None = None
+        self._failure: DynhullError | None = None
+        self._verify_now = asyncio.Event()
+        self._task = asyncio.create_task(self._run())
+
+    def _reset(self) -> None:
+        self.followed = False
         self.revision = 0
         self.points = 0
         self.vertices = 0
         self.area = math.nan
         self.bounds: Box | None = None
-        self._outline = Drawing(vertices_of(name), 0, NO_POINTS)
-        self._inner = Drawing(points_of(name), 0, NO_POINTS)
+        self._outline = Drawing(vertices_of(self.name), 0, NO_POINTS)
+        self._inner = Drawing(points_of(self.name), 0, NO_POINTS)
         self.verified: Verified | None = None
-        self.rate = math.nan
-        self.history = History("time", "points", "vertices", "area", "rate")
-        self._client = client
-        self._watch: AsyncWatch | None = None
-        self._failure: str | None = "waiting for the first event"
-        self._verify_now = asyncio.Event()
-        self._task = asyncio.create_task(self._run())
 
     def drawings(self) -> tuple[Drawing, Drawing]:
-        """What to draw: the vertices, and some of the other points."""
+        """The vertices, and a sample of the other points."""
         return self._outline, self._inner
 
     def verify_now(self) -> None:
-        """Do not wait until the next verification is due."""
+        """Start the next verification without waiting for its time."""
         self._verify_now.set()
 
     async def close(self) -> None:
-        """Look no longer."""
+        """Stop following the hull."""
         self._task.cancel()
         await asyncio.wait([self._task])
 
@@ -91,13 +106,17 @@ class HullFeed:
             tasks.create_task(self._repeat(self._verify, lambda: VERIFY_SECONDS, self._verify_now))
 
     @property
-    def trouble(self) -> str | None:
-        """Why it is not followed at the moment; None where it is."""
-        lost = self._watch and self._watch.lost
-        return self._failure or (str(lost) if lost else None)
+    def trouble(self) -> DynhullError | None:
+        """The error that interrupts the watch at the moment; None while there is none."""
+        return self._failure or (self._watch.lost if self._watch else None)
+
+    @property
+    def live(self) -> bool:
+        """Whether the attributes are up to date."""
+        return self.followed and self.trouble is None
 
     async def _follow(self) -> None:
-        """The watch outlives lost connections, but not its hull: one of the name may come again."""
+        """Watch the hull. A watch survives lost connections, but ends when the hull is deleted: then start another."""
         while True:
             copy = HullCopy()
             try:
@@ -107,31 +126,33 @@ class HullFeed:
                     async for event in self._watch:
                         self._take(event, copy)
             except DynhullError as error:
-                self._failure = str(error)
+                self._failure = error
+                if isinstance(error, HullNotFoundError):
+                    self._reset()
             await asyncio.sleep(RETRY_SECONDS)
 
     def _take(self, event: Event, copy: HullCopy) -> None:
-        self._failure = None
+        self._failure, self.followed = None, True
         self.revision, self.points = event.revision, event.points
         if isinstance(event, Progress):
             return
-        assert event.measures is not None  # asked for
+        assert event.measures is not None  # requested by measures=True
         self.vertices = len(copy.vertices)
         self.area = event.measures.area
         self.bounds = event.measures.bounds if self.vertices else None
         self._outline = Drawing(vertices_of(self.name), event.revision, outline(copy.vertices))
 
     async def _count(self) -> None:
-        """A row of the history every second."""
+        """Add a row to the history every second."""
         before, then = self.revision, time.monotonic()
         while True:
             await asyncio.sleep(TICK_SECONDS)
             revision, now = self.revision, time.monotonic()
-            # A hull that is followed again, or is another of its name, has not made all these batches just now.
-            steady = self.trouble is None and 0 < before <= revision
+            # After a gap, or when another hull took the name, the difference is not the work of the last second.
+            steady = self.live and 0 < before <= revision
             self.rate = (revision - before) / (now - then) if steady else math.nan
-            before, then = (0 if self.trouble else revision), now
-            if self.trouble is None:
+            before, then = (revision if self.live else 0), now
+            if self.live:
                 self.history.append(time.time() * 1000, self.points, self.vertices, self.area, self.rate)
             else:
                 self.history.append(time.time() * 1000, math.nan, math.nan, math.nan, math.nan)
@@ -152,16 +173,16 @@ class HullFeed:
     async def _repeat(
         self, work: Callable[[], Awaitable[None]], pause: Callable[[], float], at_once: asyncio.Event
     ) -> None:
-        """Work again and again, with a pause between, longer after work that took long; none when told."""
+        """Repeat `work` with a pause in between, longer after work that took long; setting `at_once` ends the pause."""
         while True:
             begun = time.monotonic()
             try:
                 await work()
-            except DynhullError as error:  # the watch ends for the same reason, and says so on the page
+            except DynhullError as error:  # the watch fails for the same reason, which the page shows
                 log.info("%s: %s", self.name, error)
             took = time.monotonic() - begun
             try:
-                await asyncio.wait_for(at_once.wait(), max(pause(), REST * took))
+                await asyncio.wait_for(at_once.wait(), max(pause(), PAUSE_FACTOR * took))
             except TimeoutError:
                 continue
             at_once.clear()

@@ -1,4 +1,4 @@
-"""Time lines: the latest rows of a table that grows."""
+"""The latest rows of a growing table, for the time lines."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -7,11 +7,11 @@ ROWS = 600
 
 
 class History:
-    """The last `ROWS` rows. Each viewer asks for those that are new to it.
+    """The last `ROWS` rows. Each viewer asks for the rows it has not seen.
 
     Attributes:
-        columns: the columns' names.
-        length: how many rows there have ever been.
+        columns: the names of the columns.
+        length: the number of rows ever appended.
     """
 
     def __init__(self, *columns: str) -> None:
@@ -20,12 +20,12 @@ class History:
         self._rows: deque[tuple[float, ...]] = deque(maxlen=ROWS)
 
     def append(self, *row: float) -> None:
-        """Add a row: a number for each column, NaN where there is none."""
+        """Add a row: one number per column, NaN for an unknown one."""
         self._rows.append(row)
         self.length += 1
 
     def since(self, length: int) -> Mapping[str, list[float]]:
-        """The rows after the first `length`, as far as they are kept, by column."""
+        """The rows after the first `length`, as far as they are kept, as lists by column."""
         new = min(self.length - length, len(self._rows))
         rows = list(self._rows)[len(self._rows) - new :]
         return {name: [row[i] for row in rows] for i, name in enumerate(self.columns)}

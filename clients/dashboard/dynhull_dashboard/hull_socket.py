@@ -1,7 +1,7 @@
-"""The hulls on their way to a page.
+"""A websocket that sends drawings of hulls to a page.
 
-Bokeh's own protocol would write every outline anew for each viewer, in several frames: a millisecond each, and half a
-processor for many viewers. Here all are sent the same text.
+Bokeh's own protocol would serialize every outline for each viewer, in several frames: a millisecond each, and half a
+processor for many viewers. Here all viewers are sent the same text.
 """
 
 import asyncio
@@ -15,29 +15,29 @@ INTERVAL_SECONDS = 0.1
 
 
 class HullSocket(WebSocketHandler):
-    """One page that shows the hulls named in its query. Each drawing is sent when it is new, and only the newest."""
+    """Sends the drawings of the hulls named in the query: each when it is new, and only the newest."""
 
     def initialize(self, hub: Hub) -> None:
-        """As the application says."""
+        """Tornado passes the application's arguments."""
         self._hub = hub
         self._sending: asyncio.Task[None] | None = None
 
     def check_origin(self, _: str) -> bool:
-        """Any, for `KnownHosts` has looked at it: behind a proxy the host may be another of its names."""
+        """True: `KnownHosts` has checked the origin, which behind a proxy may differ from the host."""
         return True
 
     def open(self) -> None:
-        """The page is there."""
+        """The page has connected."""
         names = list(dict.fromkeys(self.get_query_arguments("hull")))
         self._sending = asyncio.create_task(self._send(names[: len(LOOKS)]))
 
     def on_close(self) -> None:
-        """The page has gone, or shows other hulls."""
+        """The page has closed, or shows other hulls."""
         if self._sending is not None:
             self._sending.cancel()
 
     async def _send(self, names: list[str]) -> None:
-        feeds = [self._hub.look(name) for name in names]
+        feeds = [self._hub.open_feed(name) for name in names]
         sent: dict[str, str] = {}
         try:
             while True:
@@ -50,4 +50,4 @@ class HullSocket(WebSocketHandler):
             return
         finally:
             for name in names:
-                self._hub.look_away(name)
+                self._hub.release_feed(name)

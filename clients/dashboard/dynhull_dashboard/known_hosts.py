@@ -1,9 +1,10 @@
-"""A dashboard that answers only to its own names.
+"""An application that answers only to the names it is configured with.
 
-A page of another site whose name is made to lead here (DNS rebinding) has the same origin as the dashboard, for the
-browser and for Tornado: only the name tells it apart.
+A page of another site can have its own name lead to the dashboard's address (DNS rebinding). Its requests then have the
+same origin as the dashboard, for the browser and for Tornado: only the name in them differs.
 """
 
+import re
 from collections.abc import Iterable
 from http import HTTPStatus
 from typing import Any
@@ -11,32 +12,69 @@ from urllib.parse import urlsplit
 
 from bokeh.server.tornado import BokehTornado
 from tornado.httputil import HTTPServerRequest
-from tornado.web import ErrorHandler
+from tornado.web import RequestHandler
 
-HTTP_PORT = 80
+HOST = re.compile(r"([a-z0-9._-]+|\[[0-9a-f:.]+\])(:[0-9]{1,5})?")
+PORTS = {"http": 80, "https": 443}
 
 
 class KnownHosts(BokehTornado):
-    """Bokeh's application, for requests that name it as it is called and come from its own pages.
+    """Bokeh's application, restricted to requests whose Host and Origin are among the given names.
 
     Args:
-        hosts: HOST:PORT as browsers call the page.
-        applications, options: as Bokeh takes them.
+        applications: as for `BokehTornado`.
+        hosts: HOST, HOST:PORT or an origin such as https://HOST, as browsers name the page. Without a port, the ports
+            of HTTP and HTTPS.
+        options: as for `BokehTornado`.
+
+    Raises:
+        ValueError: if one of the names is none of these.
     """
 
     def __init__(self, applications: Any, hosts: Iterable[str], **options: Any) -> None:
-        self._hosts = {_with_port(host) for host in hosts}
+        self._hosts = {name for host in hosts for name in _configured(host)}
         super().__init__(applications, extra_websocket_origins=sorted(self._hosts), **options)
 
     def find_handler(self, request: HTTPServerRequest, **_: Any) -> Any:
-        """Tornado's choice, or a refusal."""
+        """Tornado's handler, or a refusal that names the host or the origin at fault."""
         origin = request.headers.get("Origin")
-        known = _with_port(request.host) in self._hosts
-        if known and (origin is None or _with_port(urlsplit(origin).netloc) in self._hosts):
+        if self._hosts.isdisjoint(_with_port(request.host)):
+            unknown = request.host
+        elif origin is not None and self._hosts.isdisjoint(_with_port(urlsplit(origin).netloc)):
+            unknown = origin
+        else:
             return super().find_handler(request)
-        return self.get_handler_delegate(request, ErrorHandler, {"status_code": HTTPStatus.FORBIDDEN})
+        return self.get_handler_delegate(request, Refusal, {"unknown": unknown})
 
 
-def _with_port(host: str) -> str:
+class Refusal(RequestHandler):
+    """Answers 403 to any request."""
+
+    def initialize(self, unknown: str) -> None:
+        """Tornado passes the name at fault."""
+        self._unknown = unknown
+
+    def prepare(self) -> None:
+        """Answer before any method is called."""
+        self.set_status(HTTPStatus.FORBIDDEN)
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(
+            f"This dashboard does not answer to {self._unknown}. If that is its name, start it with "
+            f"dynhull dashboard --origin {self._unknown}\n"
+        )
+
+
+def _configured(host: str) -> set[str]:
+    scheme, separator, name = host.lower().rstrip("/").rpartition("://")
+    if not HOST.fullmatch(name) or (separator and scheme not in PORTS):
+        raise ValueError(f"--origin is {host!r}: expected HOST or HOST:PORT, alone or after http:// or https://")
+    return {f"{name}:{PORTS[scheme]}"} if separator and _portless(name) else _with_port(name)
+
+
+def _with_port(host: str) -> set[str]:
     host = host.lower()
-    return host if host.rpartition(":")[2].isdigit() else f"{host}:{HTTP_PORT}"
+    return {f"{host}:{port}" for port in PORTS.values()} if _portless(host) else {host}
+
+
+def _portless(host: str) -> bool:
+    return not host.rpartition(":")[2].isdigit()

@@ -1,22 +1,18 @@
-"""How hulls that are shown together are told apart: by colour, and without it by line and marker."""
+"""Colours, line styles and markers that distinguish the hulls on a page, with or without colour vision."""
 
 from dataclasses import dataclass
-
-# Ink and paper are the page's: Bokeh takes --bk- properties from the style sheet.
-FAINT, DRAWN = 0.5, 1.0
-FILL_ALPHA = 0.12
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A hull's colour, the dashes of its lines in pixels (none for a solid line), and the marker of its vertices."""
+    """A colour, the dashes of its lines in pixels (none for a solid line), and the marker of its vertices, if any."""
 
     colour: str
     dash: tuple[int, ...]
-    marker: str
+    marker: str = ""
 
 
-# Okabe and Ito, "Color Universal Design" (2002). Those first that stand out on white and on black.
+# Okabe and Ito, "Color Universal Design" (2002), ordered by contrast with both white and black.
 LOOKS = (
     Look("#0072B2", (), "circle"),
     Look("#D55E00", (8, 3), "square"),
@@ -25,3 +21,7 @@ LOOKS = (
     Look("#E69F00", (14, 4), "inverted_triangle"),
     Look("#56B4E9", (5, 2, 5, 6), "hex"),
 )
+
+# Series of the whole server belong to no hull. This grey has a contrast above 3:1 with the light and the dark page.
+NEUTRAL = "#7d8590"
+MEAN, PERCENTILE = Look(NEUTRAL, ()), Look(NEUTRAL, (6, 3))

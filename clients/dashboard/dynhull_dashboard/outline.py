@@ -1,4 +1,4 @@
-"""What of a hull is drawn, and where."""
+"""The part of a hull that is drawn, and the frame around it."""
 
 from collections.abc import Iterable
 
@@ -8,28 +8,29 @@ from .drawing import Points
 
 Box = tuple[float, float, float, float]  # least x, least y, greatest x, greatest y
 
-# More vertices than this no eye tells apart, and twenty viewers would be sent megabytes.
+# No eye distinguishes more vertices, and twenty viewers would be sent megabytes.
 MOST_DRAWN = 2_000
-# The frame is this much larger than what it shows, on each side.
+# The frame is larger than its content by this share on each side.
 MARGIN = 0.08
-# It is drawn anew around what has become so much smaller.
+# A new frame is made when the content fills less than this share of the old one.
 LEAST_FILLED = 0.5
 
 
 def outline(vertices: Points) -> Points:
-    """The vertices to draw: every one, or where they are too many, every k-th."""
+    """The vertices to draw: all of them, or every k-th where there are more than `MOST_DRAWN`."""
     return vertices[:: max(1, -(-len(vertices) // MOST_DRAWN))]
 
 
 def without(points: Points, vertices: Points) -> Points:
-    """The points that are no vertices: those have a mark of their own."""
+    """The points that are not vertices, which have a marker of their own."""
     return points[~np.isin(points @ (1, 1j), vertices @ (1, 1j))]
 
 
-def frame_around(boxes: Iterable[Box], frame: Box | None) -> Box | None:
-    """What a picture shows: the frame there was, as long as it holds the boxes and they fill it; else a new one.
+def frame_around(boxes: Iterable[Box], frame: Box | None, same_scale: bool = True) -> Box | None:
+    """The region that a picture shows: the old frame while the boxes fit and fill it, else a new one.
 
-    So the picture stands still while the hulls in it move.
+    The picture therefore stands still while the hulls in it move. With one scale for both axes the boxes fill the
+    frame along either of them, otherwise along both.
     """
     corners = np.array(list(boxes))
     if not len(corners):
@@ -38,9 +39,14 @@ def frame_around(boxes: Iterable[Box], frame: Box | None) -> Box | None:
     if frame is not None:
         inside = bool((low >= frame[:2]).all() and (high <= frame[2:]).all())
         sizes = np.subtract(frame[2:], frame[:2])
-        if inside and ((high - low) >= LEAST_FILLED * sizes).any():
+        filled = (high - low) >= LEAST_FILLED * sizes
+        if inside and (filled.any() if same_scale else filled.all()):
             return frame
-    # A single point has no size to go by.
-    size = float((high - low).max()) or float(np.abs(high).max()) or 1.0
+    size = high - low
+    if same_scale or not size.any():
+        size = np.full(2, size.max())
+    # Points in a row, or a single point, have no size along an axis: their distance from zero serves instead.
+    size = np.where(size > 0, size, np.maximum(np.abs(high), np.abs(low)))
+    size = np.where(size > 0, size, 1.0)
     low, high = low - MARGIN * size, high + MARGIN * size
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])

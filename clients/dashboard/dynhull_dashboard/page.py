@@ -1,35 +1,32 @@
-"""What one viewer sees."""
+"""The page of one viewer."""
 
-import time
+from collections.abc import Iterable
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
+from bokeh.application.application import SessionContext
 from bokeh.document import Document
-from bokeh.models.widgets import Button, Div, MultiChoice
+from bokeh.models.widgets import Button, Div
 from jinja2 import Template
 
-from . import cards
+from .advice import about_metrics, about_picture, about_server
+from .cards import key, table
+from .describe import describe
 from .feed import HullFeed
 from .hub import Hub
-from .looks import LOOKS, Look
+from .looks import LOOKS, MEAN, PERCENTILE, Look
+from .page_model import PageModel
 from .plane import Plane
 from .timelines import Lines, time_plots
 
 TICK_MILLISECONDS = 100
-# Words and figures change slower than the hulls: nobody reads ten a second.
+# Text changes slower than the picture: nobody reads ten times a second.
 TICKS_OF_TEXT = 5
 TEMPLATE = Template(Path(__file__).with_name("page.html").read_text("utf-8"))
 STYLE = Path(__file__).with_name("widgets.css").read_text("utf-8")
-ALARM: dict[str, str | None] = {
-    "color": "var(--alarm-ink)",
-    "background": "var(--alarm)",
-    "border-radius": "6px",
-    "padding": ".6rem .9rem",
-}
 
 HULL_COLUMNS = ("points", "vertices", "area", "rate")
-SERVER_LOOKS = {"updates": LOOKS[0], "mean": LOOKS[0], "percentile": LOOKS[1]}
+SERVER_LOOKS = {"updates": MEAN, "mean": MEAN, "percentile": PERCENTILE}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +39,12 @@ class Shown:
 
 
 class Page:
-    """The models of one document, and what keeps them up to date.
+    """The models of one document, and their updates.
 
     Args:
-        document: where they go.
-        hub: where the hulls come from.
-        picked: the hulls to begin with; the largest where there are none.
+        document: the document to fill.
+        hub: the source of the hulls.
+        picked: the hulls to begin with; if empty, the largest one.
     """
 
     def __init__(self, document: Document, hub: Hub, picked: list[str]) -> None:
@@ -55,65 +52,68 @@ class Page:
         self._shown: dict[str, Shown] = {}
         self._ticks = 0
         self._models = document.models
-        picked = (picked or hub.server.largest())[: len(LOOKS)]
-        self._untouched = not picked
-        self._banner = Div(name="banner", visible=False, stylesheets=[STYLE], styles=ALARM, sizing_mode="stretch_width")
-        self._picker = MultiChoice(
-            name="picker",
-            placeholder="Pick hulls",
-            max_items=len(LOOKS),
-            value=picked,
-            stylesheets=[STYLE],
-            sizing_mode="stretch_width",
-        )
+        same_scale = hub.units.same
+        self._model = PageModel(name="page", same_scale=same_scale)
         self._verify = Button(name="verify", label="Verify now", stylesheets=[STYLE])
         self._table = Div(name="table", stylesheets=[STYLE], sizing_mode="stretch_width")
-        self._plane = Plane()
+        self._plane = Plane(hub.units, same_scale)
         self._plots = time_plots(*HULL_COLUMNS, *(["updates", "delay"] if hub.metrics else []))
         self._server_lines: Lines | None = None
         if hub.metrics:
             plots = {**self._plots, "mean": self._plots["delay"], "percentile": self._plots["delay"]}
             self._server_lines = Lines(hub.metrics.history, "whole server", plots, SERVER_LOOKS)
-        self._picker.on_change("value", self._picked)
+        self._untouched = not picked
+        self._show(picked or hub.server.largest())
+        self._model.on_change("picked", self._picked)
+        self._model.on_change("same_scale", lambda _attribute, _old, new: self._plane.set_same_scale(new))
         self._verify.on_click(self._verify_now)
-        self._pick(picked)
         self._tick()
-        self._picker.options = [*self._picker.tags]
         document.title = "dynhull"
         document.template = TEMPLATE
-        document.template_variables.update(address=hub.address, with_metrics=hub.metrics is not None)
-        document.config.notify_connection_status = False  # the page's own banner does
-        with self._models.freeze():  # it looks through all of them whenever one comes or goes
-            for root in (
-                self._banner,
-                self._picker,
-                self._verify,
-                self._table,
-                self._plane.plot,
-                *self._plots.values(),
-            ):
+        document.template_variables.update(
+            address=hub.address,
+            with_metrics=hub.metrics is not None,
+            area_unit=hub.units.area,
+            most_hulls=len(LOOKS),
+            mean=key(MEAN),
+            percentile=key(PERCENTILE),
+        )
+        document.config.notify_connection_status = False  # the page has a banner of its own
+        with self._models.freeze():  # otherwise Bokeh walks all models at each change
+            for root in (self._model, self._verify, self._table, self._plane.plot, *self._plots.values()):
                 document.add_root(root)
         document.add_periodic_callback(self._tick, TICK_MILLISECONDS)
-        document.on_session_destroyed(lambda _context: self._pick([]))
+        document.on_session_destroyed(self._end)
+
+    def _end(self, _context: SessionContext) -> None:
+        for name in self._shown:
+            self._hub.release_feed(name)
 
     def _picked(self, _attribute: str, _old: list[str], new: list[str]) -> None:
-        self._untouched = False
-        with self._models.freeze():
-            self._pick(new)
+        if new != list(self._shown):
+            self._untouched = False
+            self._show(new)
 
-    def _pick(self, names: list[str]) -> None:
-        for name in self._shown.keys() - set(names):
-            self._shown.pop(name).lines.remove()
-            self._plane.hide(name)
-            self._hub.look_away(name)
-        for name in names:
-            if name not in self._shown:
-                taken = [shown.look for shown in self._shown.values()]
-                look = next(look for look in LOOKS if look not in taken)
-                feed = self._hub.look(name)
-                lines = Lines(feed.history, name, self._plots, dict.fromkeys(HULL_COLUMNS, look))
-                self._shown[name] = Shown(feed, look, lines)
-                self._plane.show(feed, look)
+    def _show(self, picked: Iterable[str]) -> None:
+        names = list(dict.fromkeys(picked))[: len(LOOKS)]
+        with self._models.freeze():
+            for name in self._shown.keys() - set(names):
+                self._shown.pop(name).lines.remove()
+                self._plane.hide(name)
+                self._hub.release_feed(name)
+            for name in names:
+                if name not in self._shown:
+                    self._add(name)
+        legend = [[name, key(shown.look)] for name, shown in self._shown.items()]
+        self._model.update(legend=legend, picked=list(self._shown))
+
+    def _add(self, name: str) -> None:
+        taken = [shown.look for shown in self._shown.values()]
+        look = next(look for look in LOOKS if look not in taken)
+        feed = self._hub.open_feed(name)
+        lines = Lines(feed.history, name, self._plots, dict.fromkeys(HULL_COLUMNS, look))
+        self._shown[name] = Shown(feed, look, lines)
+        self._plane.show(feed, look)
 
     def _verify_now(self) -> None:
         for shown in self._shown.values():
@@ -122,28 +122,27 @@ class Page:
     def _tick(self) -> None:
         self._plane.update()
         if self._ticks % TICKS_OF_TEXT == 0:
-            self._tell()
+            self._update_text()
         self._ticks += 1
 
-    def _tell(self) -> None:
-        """Words, figures and time lines."""
+    def _update_text(self) -> None:
+        """Update the text, the figures and the time lines."""
         server = self._hub.server
-        hulls = sorted({*server.hulls, *self._picker.value})
-        if hulls != self._picker.tags:
-            self._picker.tags = hulls  # the page makes options of them when nobody is picking
-        if self._untouched and server.hulls:
-            self._picker.update(options=[*hulls], value=server.largest())
-        self._table.text = cards.table(
-            ((shown.feed, shown.look) for shown in self._shown.values()), connected=server.trouble is None
+        if self._untouched and not self._shown:
+            self._show(server.largest())
+        feeds = [shown.feed for shown in self._shown.values()]
+        self._model.update(
+            offered=sorted(server.hulls),
+            banner=about_server(self._hub.address, server.error) if server.error else about_metrics(self._hub.metrics),
+            note=about_picture(self._hub.address, server, feeds),
+            description=describe(feeds),
+        )
+        self._table.text = table(
+            ((shown.feed, shown.look) for shown in self._shown.values()),
+            connected=server.error is None,
+            area_unit=self._hub.units.area,
         )
         for shown in self._shown.values():
             shown.lines.update()
         if self._server_lines:
             self._server_lines.update()
-        self._banner.visible = server.trouble is not None
-        if server.trouble is not None:
-            silent = time.monotonic() - server.since
-            self._banner.text = (
-                f"<b>No connection to {escape(self._hub.address)}</b> for {silent:.0f} s: {escape(server.trouble)}. "
-                "What you see is the last that was told. Trying again."
-            )

@@ -1,4 +1,4 @@
-"""The picture of the hulls, to one scale in x and y."""
+"""The picture of the hulls."""
 
 from bokeh.models import (
     BoxZoomTool,
@@ -16,15 +16,18 @@ from .drawing import points_of, vertices_of
 from .feed import HullFeed
 from .looks import Look
 from .outline import Box, frame_around
-from .styles import bare, compact_ticks
+from .styles import LABEL_WIDTH, bare, compact_ticks
+from .units import Units, axis_label
 
 FILL_ALPHA, POINT_ALPHA = 0.12, 0.65
+AXIS_LABEL_HEIGHT = 24
 VERTEX_SIZE, POINT_SIZE = 8, 4
+EMPTY_FRAME: Box = (0.0, 0.0, 1.0, 1.0)
 TOOLTIPS = [("", "$name"), ("x", "@x{%.12g}"), ("y", "@y{%.12g}"), ("revision", "@revision")]
 
 
 class DrawnHull:
-    """One hull in the picture. What is in its sources comes from a `HullSocket`."""
+    """One hull in the picture. A `HullSocket` fills its data sources."""
 
     def __init__(self, plot: figure, feed: HullFeed, look: Look) -> None:
         self.feed = feed
@@ -48,58 +51,78 @@ class DrawnHull:
 
 
 class Plane:
-    """The plot, and the hulls in it."""
+    """The plot, and the hulls in it.
 
-    def __init__(self) -> None:
+    Args:
+        units: the units of the axes.
+        same_scale: whether x and y are drawn to one scale.
+    """
+
+    def __init__(self, units: Units, same_scale: bool) -> None:
         self._frame: Box | None = None
+        self._same_scale = same_scale
         self._drawn: dict[str, DrawnHull] = {}
         self._hover = HoverTool(renderers=[], tooltips=TOOLTIPS, formatters={"@x": "printf", "@y": "printf"})
+        self._box_zoom = BoxZoomTool(match_aspect=same_scale)
         zoom = WheelZoomTool()
         x, y = DataRange1d(range_padding=0), DataRange1d(range_padding=0)
         self.plot = figure(
             name="plane",
-            match_aspect=True,
+            match_aspect=same_scale,
             sizing_mode="stretch_both",
             x_range=x,
             y_range=y,
-            tools=[PanTool(), zoom, BoxZoomTool(match_aspect=True), ResetTool(), SaveTool(), self._hover],
+            tools=[PanTool(), zoom, self._box_zoom, ResetTool(), SaveTool(), self._hover],
             active_scroll=zoom,
             toolbar_location="above",
         )
         bare(self.plot)
+        self.plot.min_border_left = LABEL_WIDTH + AXIS_LABEL_HEIGHT
+        self.plot.xaxis.axis_label = axis_label("x", units.x)
+        self.plot.yaxis.axis_label = axis_label("y", units.y)
         self.plot.xaxis.formatter = compact_ticks()
         self.plot.yaxis.formatter = compact_ticks()
-        # The ranges follow these two corners alone: they move seldom, the hulls often.
-        self._corners = ColumnDataSource({"x": [], "y": []})
+        # The ranges follow only these two corners, which move seldom; the hulls move often.
+        self._corners = ColumnDataSource(_corners(EMPTY_FRAME))
         corners = self.plot.scatter(source=self._corners, alpha=0)
         x.renderers = [corners]
         y.renderers = [corners]
 
     def show(self, feed: HullFeed, look: Look) -> None:
-        """One hull more."""
+        """Add a hull."""
         self._drawn[feed.name] = DrawnHull(self.plot, feed, look)
-        self._tell_page()
+        self._name_hulls()
 
     def hide(self, name: str) -> None:
-        """One hull fewer."""
+        """Remove a hull."""
         gone = self._drawn.pop(name)
-        self._tell_page()
+        self._name_hulls()
         self.plot.renderers = [each for each in self.plot.renderers if each not in gone.renderers]
         self._frame = None
 
+    def set_same_scale(self, same_scale: bool) -> None:
+        """Draw both axes to one scale, or let each fill its side of the picture."""
+        self._same_scale = self.plot.match_aspect = self._box_zoom.match_aspect = same_scale
+        self._frame = None
+        self.update()
+
     def update(self) -> None:
-        """Frame what there is now."""
+        """Adjust the frame to the hulls."""
         boxes = [drawn.feed.bounds for drawn in self._drawn.values()]
-        frame = frame_around([box for box in boxes if box is not None], self._frame)
+        frame = frame_around([box for box in boxes if box is not None], self._frame, self._same_scale)
         if frame is not None and frame is not self._frame:
             self._frame = frame
-            self._corners.data = {"x": [frame[0], frame[2]], "y": [frame[1], frame[3]]}
+            self._corners.data = _corners(frame)
 
-    def _tell_page(self) -> None:
+    def _name_hulls(self) -> None:
         self._hover.renderers = [marker for drawn in self._drawn.values() for marker in drawn.markers]
         self.plot.tags = list(self._drawn)  # the page asks for the hulls named here
 
 
+def _corners(frame: Box) -> dict[str, list[float]]:
+    return {"x": [frame[0], frame[2]], "y": [frame[1], frame[3]]}
+
+
 def _source(name: str) -> ColumnDataSource:
-    """Not synced: what the socket brings must not travel back."""
+    """An empty data source. It is not synced: the page must not send back what the socket sent it."""
     return ColumnDataSource({"x": [], "y": [], "revision": []}, name=name, syncable=False)

@@ -1,4 +1,4 @@
-"""The dashboard's own server: Bokeh's."""
+"""The dashboard's HTTP server, which is Bokeh's."""
 
 import asyncio
 import signal
@@ -23,21 +23,24 @@ LOOPBACK = "127.0.0.1", "localhost", "[::1]"
 
 
 async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
-    """Show the hub's hulls until SIGTERM or SIGINT.
+    """Serve the page until SIGTERM or SIGINT.
 
     Args:
-        hub: where the hulls come from.
+        hub: the source of the hulls.
         host: the address to listen on.
         port: the port to listen on; 0 for a free one.
-        origins: HOST:PORT as browsers on other machines call the page.
+        origins: further names of the page, as for `KnownHosts`.
+
+    Raises:
+        ValueError: if one of `origins` is not a name.
     """
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     sockets = bind_sockets(port, host)
     port = sockets[0].getsockname()[1]
-    # A page of another site must not get at the hulls through a browser that can.
-    hosts = [f"{name}:{port}" for name in (host, *LOOPBACK)]
+    name = f"[{host}]" if ":" in host else host
+    hosts = [f"{each}:{port}" for each in (name, *LOOPBACK)]
     page = Application(FunctionHandler(partial(_show, hub)))
     hulls = ("/hulls", HullSocket, {"hub": hub})
     application = KnownHosts({"/": page}, [*hosts, *origins], extra_patterns=[hulls])
@@ -45,7 +48,7 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     http.add_sockets(sockets)
     server = BaseServer(IOLoop.current(), application, http)
     server.start()
-    print(f"dynhull dashboard on http://{host}:{port}", flush=True)  # noqa: T201  # the address is the command's output
+    print(f"dynhull dashboard on http://{name}:{port}", flush=True)  # noqa: T201  # the address is the command's output
     await stop.wait()
     server.stop()
     await hub.close()

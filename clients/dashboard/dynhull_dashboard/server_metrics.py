@@ -1,4 +1,4 @@
-"""The server's own figures, from its page for Prometheus."""
+"""Rates and delays of the whole server, from its metrics page for Prometheus."""
 
 import asyncio
 import logging
@@ -13,7 +13,7 @@ from tornado.httpclient import AsyncHTTPClient, HTTPClientError
 from .history import History
 
 POLL_SECONDS = 1.0
-PATIENCE = 2.0
+TIMEOUT_SECONDS = 2.0
 PERCENTILE = 0.99
 COUNTED = ("insert", "delete")
 
@@ -22,14 +22,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Scrape:
-    """What the counters stood at.
+    """The server's counters at one moment.
 
     Attributes:
-        at: when, by `time.monotonic`.
-        updates: points inserted and deleted.
-        batches: batches acknowledged.
-        seconds: the time their acknowledgements took, all together.
-        buckets: how many batches took at most so many seconds, by the bucket's bound.
+        at: the moment, by `time.monotonic`.
+        updates: the number of points inserted and deleted.
+        batches: the number of batches acknowledged.
+        seconds: the sum of their acknowledgement delays.
+        buckets: the number of batches with at most that delay, by the upper bound of the bucket in seconds.
     """
 
     at: float
@@ -40,7 +40,7 @@ class Scrape:
 
     @classmethod
     def read(cls, text: str, at: float) -> Self:
-        """The page as the server prints it."""
+        """Parse the page as the server writes it."""
         updates = batches = seconds = 0.0
         buckets: dict[float, float] = {}
         for family in text_string_to_metric_families(text):
@@ -57,9 +57,9 @@ class Scrape:
         return cls(at, updates, batches, seconds, buckets)
 
     def rates_since(self, before: Self) -> tuple[float, float, float]:
-        """Updates a second, and the mean and 99th percentile of the milliseconds to an acknowledgement.
+        """Updates per second, and the mean and the 99th percentile of the acknowledgement delay in milliseconds.
 
-        NaN for the latter without batches, and for all where the server has begun anew.
+        The delays are NaN where there were no batches; all three are NaN where the server has restarted.
         """
         batches = self.batches - before.batches
         if batches < 0:
@@ -73,7 +73,7 @@ class Scrape:
 
 
 def _quantile(buckets: dict[float, float], share: float) -> float:
-    """Of a histogram, as Prometheus's `histogram_quantile`: linear within a bucket, the last bound beyond it."""
+    """As Prometheus's `histogram_quantile`: linear within a bucket, the largest finite bound in the last one."""
     wanted = share * buckets[math.inf]
     low = below = 0.0
     for bound, count in sorted(buckets.items()):
@@ -84,21 +84,24 @@ def _quantile(buckets: dict[float, float], share: float) -> float:
 
 
 class ServerMetrics:
-    """A row a second of what all writers to the server do.
+    """Polls the metrics page once per second.
 
     Attributes:
-        history: updates a second, and the mean and the 99th percentile of the milliseconds from the arrival of a batch
-            to its acknowledgement.
+        history: updates per second, and the mean and the 99th percentile of the milliseconds from the arrival of a
+            batch to its acknowledgement.
+        url: the page.
+        error: why the last request for the page failed; None where it did not.
     """
 
     def __init__(self, url: str) -> None:
         self.history = History("time", "updates", "mean", "percentile")
-        self._url = url
+        self.url = url
+        self.error: str | None = None
         self._http = AsyncHTTPClient()
         self._task = asyncio.create_task(self._run())
 
     async def close(self) -> None:
-        """Ask no longer."""
+        """Stop polling."""
         self._task.cancel()
         await asyncio.wait([self._task])
 
@@ -113,8 +116,10 @@ class ServerMetrics:
 
     async def _scrape(self) -> Scrape | None:
         try:
-            response = await self._http.fetch(self._url, request_timeout=PATIENCE)
-        except (HTTPClientError, OSError) as error:  # the lines have a gap there
-            log.info("%s: %s", self._url, error)
+            response = await self._http.fetch(self.url, request_timeout=TIMEOUT_SECONDS)
+        except (HTTPClientError, OSError) as error:  # the time lines show a gap
+            self.error = str(error)
+            log.info("%s: %s", self.url, error)
             return None
+        self.error = None
         return Scrape.read(response.body.decode(), time.monotonic())

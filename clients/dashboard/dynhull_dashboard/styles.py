@@ -1,4 +1,4 @@
-"""What all plots have in common. Ink and paper come from the page's style sheet, light or dark."""
+"""The style of all plots. Text and background colours come from the page's style sheet, light or dark."""
 
 from bokeh.models import CustomJSTickFormatter
 from bokeh.plotting import figure
@@ -7,12 +7,12 @@ LABEL_WIDTH = 48
 
 
 def bare(plot: figure) -> None:
-    """Nothing but the data, faint lines to measure them by, and figures at the edge."""
+    """Remove all decoration but the grid and the tick labels."""
     plot.toolbar.logo = None
     plot.toolbar.autohide = True
     plot.outline_line_color = None
     plot.min_border = 4
-    # Room for the longest figure: labels that grow would be drawn beyond the edge, and stay there.
+    # Room for the longest label: Bokeh draws longer ones beyond the edge and leaves them there.
     plot.min_border_left = LABEL_WIDTH
     plot.axis.axis_line_color = None
     plot.axis.major_tick_line_color = None
@@ -20,7 +20,7 @@ def bare(plot: figure) -> None:
 
 
 def compact_ticks() -> CustomJSTickFormatter:
-    """1.2K, 3.4M; very small and very large ones with an exponent."""
+    """Labels such as 1.2K and 3.4M; very small and very large numbers with an exponent."""
     return CustomJSTickFormatter(
         code="""
         const size = Math.abs(tick)

@@ -26,26 +26,27 @@ if _version_not_supported:
 
 
 class HullServiceStub(object):
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted and deleted.
 
-    Every error carries a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason, and in its metadata what is at fault:
-    "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
-    too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
-    QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+    Every error has a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason. Its metadata name the cause: "field", "row"
+    and "value" of the request, or "limit" and "value". INVALID_ARGUMENT also has a google.rpc.BadRequest, NOT_FOUND and
+    ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, and RESOURCE_EXHAUSTED a QuotaFailure. A
+    server that is starting or draining answers UNAVAILABLE.
 
-    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
-    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
-    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
-    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
-    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+    A batch is applied, refused or unknown. It is refused by any error with a reason other than OUTCOME_UNKNOWN: then
+    nothing of it was applied, nor will be. With UNKNOWN and the reason OUTCOME_UNKNOWN, the disk failed in the middle of
+    the batch. Whether it was applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE.
+    After an error without a reason (a lost connection, a deadline) the outcome is unknown, too. A caller that numbers its
+    batches sends the batch again, or calls GetProducer; any other caller reads the hull. The same holds for CreateHull and
+    DeleteHull.
 
-    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
-    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
-    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
-    batch that was refused has not used up its number.
+    Numbered batches are applied exactly once: a writer chooses a name ("producer"), and numbers its batches to a hull
+    1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
+    refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
+    use its number.
 
-    A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
-    response is from one revision.
+    A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
+    is of one revision.
     """
 
     def __init__(self, channel):
@@ -162,44 +163,45 @@ class HullServiceStub(object):
 
 
 class HullServiceServicer(object):
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted and deleted.
 
-    Every error carries a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason, and in its metadata what is at fault:
-    "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
-    too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
-    QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+    Every error has a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason. Its metadata name the cause: "field", "row"
+    and "value" of the request, or "limit" and "value". INVALID_ARGUMENT also has a google.rpc.BadRequest, NOT_FOUND and
+    ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, and RESOURCE_EXHAUSTED a QuotaFailure. A
+    server that is starting or draining answers UNAVAILABLE.
 
-    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
-    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
-    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
-    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
-    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+    A batch is applied, refused or unknown. It is refused by any error with a reason other than OUTCOME_UNKNOWN: then
+    nothing of it was applied, nor will be. With UNKNOWN and the reason OUTCOME_UNKNOWN, the disk failed in the middle of
+    the batch. Whether it was applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE.
+    After an error without a reason (a lost connection, a deadline) the outcome is unknown, too. A caller that numbers its
+    batches sends the batch again, or calls GetProducer; any other caller reads the hull. The same holds for CreateHull and
+    DeleteHull.
 
-    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
-    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
-    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
-    batch that was refused has not used up its number.
+    Numbered batches are applied exactly once: a writer chooses a name ("producer"), and numbers its batches to a hull
+    1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
+    refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
+    use its number.
 
-    A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
-    response is from one revision.
+    A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
+    is of one revision.
     """
 
     def CreateHull(self, request, context):
-        """Makes an empty hull. ALREADY_EXISTS where there is one of that name.
+        """Creates an empty hull. ALREADY_EXISTS if a hull has that name.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def DeleteHull(self, request, context):
-        """Removes a hull with its points. Its watchers end with NOT_FOUND.
+        """Deletes a hull and its points. Its watches end with NOT_FOUND.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListHulls(self, request, context):
-        """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read.
+        """Lists hulls by name, in pages. A caller with a token gets those it may read.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -213,79 +215,79 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def Ingest(self, request_iterator, context):
-        """Applies many batches to one hull, in order, and answers once at the end. A batch that is refused ends the call; the
-        ones before it stay applied, and the error's metadata say how many they are ("batch").
+        """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
+        before it remain applied, and the metadata of the error have their number ("batch").
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Stream(self, request_iterator, context):
-        """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
-        ends the call, as in Ingest, after the acknowledgements of the ones before it.
+        """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
+        as in Ingest, after the acknowledgements of the batches before it.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetProducer(self, request, context):
-        """The last sequence number of a producer that was applied.
+        """Returns the last sequence number applied of a producer.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Locate(self, request, context):
-        """Says of points whether they are inside, on the boundary or outside. Exact.
+        """Locates points: inside, on the boundary or outside. Exact.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Count(self, request, context):
-        """How many times each of some points is there.
+        """Counts the multiplicity of points.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Support(self, request, context):
-        """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points.
+        """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Tangents(self, request, context):
-        """The tangent points seen from outside. Exact.
+        """Finds the tangent points from outside points. Exact.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Distance(self, request, context):
-        """The distance of points to the hull.
+        """Computes the distances of points to the hull.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def IntersectLines(self, request, context):
-        """Where lines enter and leave the hull.
+        """Finds where lines enter and leave the hull.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetHull(self, request, context):
-        """The hull's counts, vertices and measures.
+        """Returns the counts, vertices and measures of a hull.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def SamplePoints(self, request, context):
-        """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+        """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
         coordinates have the smallest hashes.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -293,23 +295,23 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def GetMeasures(self, request, context):
-        """Every measure of the hull.
+        """Returns all measures of a hull.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Separate(self, request, context):
-        """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
-        out. FAILED_PRECONDITION where one of them has no points.
+        """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
+        parts them. FAILED_PRECONDITION if one of them has no points.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def PhaseDiagram(self, request, context):
-        """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
-        element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+        """Interprets the hull as a binary phase diagram. Its points are entries: x is the composition, the share of the second
+        element from 0 to 1, and y the energy. Entries on the lower hull are stable. FAILED_PRECONDITION if a point has no
         such composition (reason HULL_UNSUITABLE).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -317,23 +319,23 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def Frontier(self, request, context):
-        """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
-        has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
+        """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
+        a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Watch(self, request, context):
-        """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
-        what it has received always makes the exact hull at the revision of the last event.
+        """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
+        rate: the events received so far always give the exact hull at the revision of the last one.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Verify(self, request, context):
-        """Computes the hull of the stored points anew, by Chan's algorithm, and compares it with the live one.
+        """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -456,26 +458,27 @@ def add_HullServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class HullService(object):
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted and deleted.
 
-    Every error carries a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason, and in its metadata what is at fault:
-    "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
-    too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
-    QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+    Every error has a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason. Its metadata name the cause: "field", "row"
+    and "value" of the request, or "limit" and "value". INVALID_ARGUMENT also has a google.rpc.BadRequest, NOT_FOUND and
+    ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, and RESOURCE_EXHAUSTED a QuotaFailure. A
+    server that is starting or draining answers UNAVAILABLE.
 
-    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
-    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
-    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
-    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
-    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+    A batch is applied, refused or unknown. It is refused by any error with a reason other than OUTCOME_UNKNOWN: then
+    nothing of it was applied, nor will be. With UNKNOWN and the reason OUTCOME_UNKNOWN, the disk failed in the middle of
+    the batch. Whether it was applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE.
+    After an error without a reason (a lost connection, a deadline) the outcome is unknown, too. A caller that numbers its
+    batches sends the batch again, or calls GetProducer; any other caller reads the hull. The same holds for CreateHull and
+    DeleteHull.
 
-    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
-    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
-    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
-    batch that was refused has not used up its number.
+    Numbered batches are applied exactly once: a writer chooses a name ("producer"), and numbers its batches to a hull
+    1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
+    refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
+    use its number.
 
-    A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
-    response is from one revision.
+    A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
+    is of one revision.
     """
 
     @staticmethod

@@ -27,26 +27,27 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class HullServiceStub:
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted and deleted.
 
-    Every error carries a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason, and in its metadata what is at fault:
-    "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
-    too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
-    QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+    Every error has a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason. Its metadata name the cause: "field", "row"
+    and "value" of the request, or "limit" and "value". INVALID_ARGUMENT also has a google.rpc.BadRequest, NOT_FOUND and
+    ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, and RESOURCE_EXHAUSTED a QuotaFailure. A
+    server that is starting or draining answers UNAVAILABLE.
 
-    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
-    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
-    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
-    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
-    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+    A batch is applied, refused or unknown. It is refused by any error with a reason other than OUTCOME_UNKNOWN: then
+    nothing of it was applied, nor will be. With UNKNOWN and the reason OUTCOME_UNKNOWN, the disk failed in the middle of
+    the batch. Whether it was applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE.
+    After an error without a reason (a lost connection, a deadline) the outcome is unknown, too. A caller that numbers its
+    batches sends the batch again, or calls GetProducer; any other caller reads the hull. The same holds for CreateHull and
+    DeleteHull.
 
-    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
-    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
-    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
-    batch that was refused has not used up its number.
+    Numbered batches are applied exactly once: a writer chooses a name ("producer"), and numbers its batches to a hull
+    1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
+    refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
+    use its number.
 
-    A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
-    response is from one revision.
+    A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
+    is of one revision.
     """
 
     @_typing.overload
@@ -54,167 +55,169 @@ class HullServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> HullServiceAsyncStub: ...
     CreateHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.CreateHullRequest, _hull_service_pb2.CreateHullResponse]
-    """Makes an empty hull. ALREADY_EXISTS where there is one of that name."""
+    """Creates an empty hull. ALREADY_EXISTS if a hull has that name."""
     DeleteHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.DeleteHullRequest, _hull_service_pb2.DeleteHullResponse]
-    """Removes a hull with its points. Its watchers end with NOT_FOUND."""
+    """Deletes a hull and its points. Its watches end with NOT_FOUND."""
     ListHulls: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHullsRequest, _hull_service_pb2.ListHullsResponse]
-    """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read."""
+    """Lists hulls by name, in pages. A caller with a token gets those it may read."""
     Apply: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]
     """Applies one batch."""
     Ingest: _grpc.StreamUnaryMultiCallable[_hull_service_pb2.IngestRequest, _hull_service_pb2.IngestResponse]
-    """Applies many batches to one hull, in order, and answers once at the end. A batch that is refused ends the call; the
-    ones before it stay applied, and the error's metadata say how many they are ("batch").
+    """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
+    before it remain applied, and the metadata of the error have their number ("batch").
     """
     Stream: _grpc.StreamStreamMultiCallable[_hull_service_pb2.StreamRequest, _hull_service_pb2.StreamResponse]
-    """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
-    ends the call, as in Ingest, after the acknowledgements of the ones before it.
+    """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
+    as in Ingest, after the acknowledgements of the batches before it.
     """
     GetProducer: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetProducerRequest, _hull_service_pb2.GetProducerResponse]
-    """The last sequence number of a producer that was applied."""
+    """Returns the last sequence number applied of a producer."""
     Locate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.LocateRequest, _hull_service_pb2.LocateResponse]
-    """Says of points whether they are inside, on the boundary or outside. Exact."""
+    """Locates points: inside, on the boundary or outside. Exact."""
     Count: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]
-    """How many times each of some points is there."""
+    """Counts the multiplicity of points."""
     Support: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]
-    """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
+    """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
     Tangents: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]
-    """The tangent points seen from outside. Exact."""
+    """Finds the tangent points from outside points. Exact."""
     Distance: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]
-    """The distance of points to the hull."""
+    """Computes the distances of points to the hull."""
     IntersectLines: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]
-    """Where lines enter and leave the hull."""
+    """Finds where lines enter and leave the hull."""
     GetHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]
-    """The hull's counts, vertices and measures."""
+    """Returns the counts, vertices and measures of a hull."""
     SamplePoints: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]
-    """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+    """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
     coordinates have the smallest hashes.
     """
     GetMeasures: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]
-    """Every measure of the hull."""
+    """Returns all measures of a hull."""
     Separate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]
-    """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
-    out. FAILED_PRECONDITION where one of them has no points.
+    """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
+    parts them. FAILED_PRECONDITION if one of them has no points.
     """
     PhaseDiagram: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.PhaseDiagramRequest, _hull_service_pb2.PhaseDiagramResponse]
-    """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
-    element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+    """Interprets the hull as a binary phase diagram. Its points are entries: x is the composition, the share of the second
+    element from 0 to 1, and y the energy. Entries on the lower hull are stable. FAILED_PRECONDITION if a point has no
     such composition (reason HULL_UNSUITABLE).
     """
     Frontier: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.FrontierRequest, _hull_service_pb2.FrontierResponse]
-    """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
-    has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
+    """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
+    a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
     """
     Watch: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]
-    """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
-    what it has received always makes the exact hull at the revision of the last event.
+    """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
+    rate: the events received so far always give the exact hull at the revision of the last one.
     """
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
-    """Computes the hull of the stored points anew, by Chan's algorithm, and compares it with the live one."""
+    """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull."""
 
 @_typing.type_check_only
 class HullServiceAsyncStub(HullServiceStub):
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted and deleted.
 
-    Every error carries a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason, and in its metadata what is at fault:
-    "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
-    too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
-    QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+    Every error has a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason. Its metadata name the cause: "field", "row"
+    and "value" of the request, or "limit" and "value". INVALID_ARGUMENT also has a google.rpc.BadRequest, NOT_FOUND and
+    ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, and RESOURCE_EXHAUSTED a QuotaFailure. A
+    server that is starting or draining answers UNAVAILABLE.
 
-    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
-    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
-    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
-    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
-    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+    A batch is applied, refused or unknown. It is refused by any error with a reason other than OUTCOME_UNKNOWN: then
+    nothing of it was applied, nor will be. With UNKNOWN and the reason OUTCOME_UNKNOWN, the disk failed in the middle of
+    the batch. Whether it was applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE.
+    After an error without a reason (a lost connection, a deadline) the outcome is unknown, too. A caller that numbers its
+    batches sends the batch again, or calls GetProducer; any other caller reads the hull. The same holds for CreateHull and
+    DeleteHull.
 
-    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
-    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
-    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
-    batch that was refused has not used up its number.
+    Numbered batches are applied exactly once: a writer chooses a name ("producer"), and numbers its batches to a hull
+    1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
+    refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
+    use its number.
 
-    A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
-    response is from one revision.
+    A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
+    is of one revision.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     CreateHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.CreateHullRequest, _hull_service_pb2.CreateHullResponse]  # type: ignore[assignment]
-    """Makes an empty hull. ALREADY_EXISTS where there is one of that name."""
+    """Creates an empty hull. ALREADY_EXISTS if a hull has that name."""
     DeleteHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.DeleteHullRequest, _hull_service_pb2.DeleteHullResponse]  # type: ignore[assignment]
-    """Removes a hull with its points. Its watchers end with NOT_FOUND."""
+    """Deletes a hull and its points. Its watches end with NOT_FOUND."""
     ListHulls: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHullsRequest, _hull_service_pb2.ListHullsResponse]  # type: ignore[assignment]
-    """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read."""
+    """Lists hulls by name, in pages. A caller with a token gets those it may read."""
     Apply: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]  # type: ignore[assignment]
     """Applies one batch."""
     Ingest: _aio.StreamUnaryMultiCallable[_hull_service_pb2.IngestRequest, _hull_service_pb2.IngestResponse]  # type: ignore[assignment]
-    """Applies many batches to one hull, in order, and answers once at the end. A batch that is refused ends the call; the
-    ones before it stay applied, and the error's metadata say how many they are ("batch").
+    """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
+    before it remain applied, and the metadata of the error have their number ("batch").
     """
     Stream: _aio.StreamStreamMultiCallable[_hull_service_pb2.StreamRequest, _hull_service_pb2.StreamResponse]  # type: ignore[assignment]
-    """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
-    ends the call, as in Ingest, after the acknowledgements of the ones before it.
+    """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
+    as in Ingest, after the acknowledgements of the batches before it.
     """
     GetProducer: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetProducerRequest, _hull_service_pb2.GetProducerResponse]  # type: ignore[assignment]
-    """The last sequence number of a producer that was applied."""
+    """Returns the last sequence number applied of a producer."""
     Locate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.LocateRequest, _hull_service_pb2.LocateResponse]  # type: ignore[assignment]
-    """Says of points whether they are inside, on the boundary or outside. Exact."""
+    """Locates points: inside, on the boundary or outside. Exact."""
     Count: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]  # type: ignore[assignment]
-    """How many times each of some points is there."""
+    """Counts the multiplicity of points."""
     Support: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]  # type: ignore[assignment]
-    """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
+    """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
     Tangents: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]  # type: ignore[assignment]
-    """The tangent points seen from outside. Exact."""
+    """Finds the tangent points from outside points. Exact."""
     Distance: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]  # type: ignore[assignment]
-    """The distance of points to the hull."""
+    """Computes the distances of points to the hull."""
     IntersectLines: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]  # type: ignore[assignment]
-    """Where lines enter and leave the hull."""
+    """Finds where lines enter and leave the hull."""
     GetHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]  # type: ignore[assignment]
-    """The hull's counts, vertices and measures."""
+    """Returns the counts, vertices and measures of a hull."""
     SamplePoints: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]  # type: ignore[assignment]
-    """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+    """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
     coordinates have the smallest hashes.
     """
     GetMeasures: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]  # type: ignore[assignment]
-    """Every measure of the hull."""
+    """Returns all measures of a hull."""
     Separate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]  # type: ignore[assignment]
-    """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
-    out. FAILED_PRECONDITION where one of them has no points.
+    """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
+    parts them. FAILED_PRECONDITION if one of them has no points.
     """
     PhaseDiagram: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.PhaseDiagramRequest, _hull_service_pb2.PhaseDiagramResponse]  # type: ignore[assignment]
-    """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
-    element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+    """Interprets the hull as a binary phase diagram. Its points are entries: x is the composition, the share of the second
+    element from 0 to 1, and y the energy. Entries on the lower hull are stable. FAILED_PRECONDITION if a point has no
     such composition (reason HULL_UNSUITABLE).
     """
     Frontier: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.FrontierRequest, _hull_service_pb2.FrontierResponse]  # type: ignore[assignment]
-    """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
-    has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
+    """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
+    a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
     """
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
-    """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
-    what it has received always makes the exact hull at the revision of the last event.
+    """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
+    rate: the events received so far always give the exact hull at the revision of the last one.
     """
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
-    """Computes the hull of the stored points anew, by Chan's algorithm, and compares it with the live one."""
+    """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull."""
 
 class HullServiceServicer(metaclass=_abc_1.ABCMeta):
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted and deleted.
 
-    Every error carries a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason, and in its metadata what is at fault:
-    "field", "row" and "value" of the request, or "limit" and "value". INVALID_ARGUMENT carries a google.rpc.BadRequest
-    too, NOT_FOUND and ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, RESOURCE_EXHAUSTED a
-    QuotaFailure. A server that is starting or draining answers UNAVAILABLE.
+    Every error has a google.rpc.ErrorInfo of domain "dynhull.v1" with a reason. Its metadata name the cause: "field", "row"
+    and "value" of the request, or "limit" and "value". INVALID_ARGUMENT also has a google.rpc.BadRequest, NOT_FOUND and
+    ALREADY_EXISTS a ResourceInfo, FAILED_PRECONDITION a PreconditionFailure, and RESOURCE_EXHAUSTED a QuotaFailure. A
+    server that is starting or draining answers UNAVAILABLE.
 
-    A batch is applied, refused or unknown. Refused, with any error that has a reason but the following: nothing of it was
-    applied, nor will be. UNKNOWN with the reason OUTCOME_UNKNOWN: the disk failed in the middle of it, and whether it was
-    applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE. An error without a reason
-    (a connection lost, a deadline) leaves it unknown, too. Whoever numbers batches sends the batch again, or asks
-    GetProducer; everybody else reads the hull. The same holds for CreateHull and DeleteHull.
+    A batch is applied, refused or unknown. It is refused by any error with a reason other than OUTCOME_UNKNOWN: then
+    nothing of it was applied, nor will be. With UNKNOWN and the reason OUTCOME_UNKNOWN, the disk failed in the middle of
+    the batch. Whether it was applied is decided when the disk can be read again; until then the hull answers UNAVAILABLE.
+    After an error without a reason (a lost connection, a deadline) the outcome is unknown, too. A caller that numbers its
+    batches sends the batch again, or calls GetProducer; any other caller reads the hull. The same holds for CreateHull and
+    DeleteHull.
 
-    Writes may be numbered, to be applied exactly once: a writer names itself ("producer") and numbers its batches to a
-    hull 1, 2, 3, ... in whatever calls it sends them. A batch that comes again is acknowledged as a duplicate. A number
-    beyond the next one is refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A
-    batch that was refused has not used up its number.
+    Numbered batches are applied exactly once: a writer chooses a name ("producer"), and numbers its batches to a hull
+    1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
+    refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
+    use its number.
 
-    A read with a min_revision waits until the hull has reached it, as long as the call's deadline allows. All of one
-    response is from one revision.
+    A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
+    is of one revision.
     """
 
     @_abc_1.abstractmethod
@@ -223,7 +226,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.CreateHullRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.CreateHullResponse, _abc.Awaitable[_hull_service_pb2.CreateHullResponse]]:
-        """Makes an empty hull. ALREADY_EXISTS where there is one of that name."""
+        """Creates an empty hull. ALREADY_EXISTS if a hull has that name."""
 
     @_abc_1.abstractmethod
     def DeleteHull(
@@ -231,7 +234,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.DeleteHullRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.DeleteHullResponse, _abc.Awaitable[_hull_service_pb2.DeleteHullResponse]]:
-        """Removes a hull with its points. Its watchers end with NOT_FOUND."""
+        """Deletes a hull and its points. Its watches end with NOT_FOUND."""
 
     @_abc_1.abstractmethod
     def ListHulls(
@@ -239,7 +242,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.ListHullsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.ListHullsResponse, _abc.Awaitable[_hull_service_pb2.ListHullsResponse]]:
-        """Hulls in the order of their names, a page at a time. Of a caller with a token, those it may read."""
+        """Lists hulls by name, in pages. A caller with a token gets those it may read."""
 
     @_abc_1.abstractmethod
     def Apply(
@@ -255,8 +258,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request_iterator: _MaybeAsyncIterator[_hull_service_pb2.IngestRequest],
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.IngestResponse, _abc.Awaitable[_hull_service_pb2.IngestResponse]]:
-        """Applies many batches to one hull, in order, and answers once at the end. A batch that is refused ends the call; the
-        ones before it stay applied, and the error's metadata say how many they are ("batch").
+        """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
+        before it remain applied, and the metadata of the error have their number ("batch").
         """
 
     @_abc_1.abstractmethod
@@ -265,8 +268,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request_iterator: _MaybeAsyncIterator[_hull_service_pb2.StreamRequest],
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.StreamResponse], _abc.AsyncIterator[_hull_service_pb2.StreamResponse]]:
-        """Applies many batches to one hull, in order, and acknowledges each when it has been applied. A batch that is refused
-        ends the call, as in Ingest, after the acknowledgements of the ones before it.
+        """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
+        as in Ingest, after the acknowledgements of the batches before it.
         """
 
     @_abc_1.abstractmethod
@@ -275,7 +278,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.GetProducerRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetProducerResponse, _abc.Awaitable[_hull_service_pb2.GetProducerResponse]]:
-        """The last sequence number of a producer that was applied."""
+        """Returns the last sequence number applied of a producer."""
 
     @_abc_1.abstractmethod
     def Locate(
@@ -283,7 +286,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.LocateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.LocateResponse, _abc.Awaitable[_hull_service_pb2.LocateResponse]]:
-        """Says of points whether they are inside, on the boundary or outside. Exact."""
+        """Locates points: inside, on the boundary or outside. Exact."""
 
     @_abc_1.abstractmethod
     def Count(
@@ -291,7 +294,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.CountRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.CountResponse, _abc.Awaitable[_hull_service_pb2.CountResponse]]:
-        """How many times each of some points is there."""
+        """Counts the multiplicity of points."""
 
     @_abc_1.abstractmethod
     def Support(
@@ -299,7 +302,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.SupportRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.SupportResponse, _abc.Awaitable[_hull_service_pb2.SupportResponse]]:
-        """The extreme vertex in each of some directions. Exact. FAILED_PRECONDITION where there are no points."""
+        """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
 
     @_abc_1.abstractmethod
     def Tangents(
@@ -307,7 +310,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.TangentsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.TangentsResponse, _abc.Awaitable[_hull_service_pb2.TangentsResponse]]:
-        """The tangent points seen from outside. Exact."""
+        """Finds the tangent points from outside points. Exact."""
 
     @_abc_1.abstractmethod
     def Distance(
@@ -315,7 +318,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.DistanceRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.DistanceResponse, _abc.Awaitable[_hull_service_pb2.DistanceResponse]]:
-        """The distance of points to the hull."""
+        """Computes the distances of points to the hull."""
 
     @_abc_1.abstractmethod
     def IntersectLines(
@@ -323,7 +326,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.IntersectLinesRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.IntersectLinesResponse, _abc.Awaitable[_hull_service_pb2.IntersectLinesResponse]]:
-        """Where lines enter and leave the hull."""
+        """Finds where lines enter and leave the hull."""
 
     @_abc_1.abstractmethod
     def GetHull(
@@ -331,7 +334,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.GetHullRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetHullResponse, _abc.Awaitable[_hull_service_pb2.GetHullResponse]]:
-        """The hull's counts, vertices and measures."""
+        """Returns the counts, vertices and measures of a hull."""
 
     @_abc_1.abstractmethod
     def SamplePoints(
@@ -339,7 +342,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.SamplePointsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.SamplePointsResponse, _abc.Awaitable[_hull_service_pb2.SamplePointsResponse]]:
-        """Some of the points, for a picture of them. Two samples of like points are alike: the points chosen are those whose
+        """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
         coordinates have the smallest hashes.
         """
 
@@ -349,7 +352,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.GetMeasuresRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetMeasuresResponse, _abc.Awaitable[_hull_service_pb2.GetMeasuresResponse]]:
-        """Every measure of the hull."""
+        """Returns all measures of a hull."""
 
     @_abc_1.abstractmethod
     def Separate(
@@ -357,8 +360,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.SeparateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.SeparateResponse, _abc.Awaitable[_hull_service_pb2.SeparateResponse]]:
-        """How two hulls lie to each other: how far apart, and the line between them; or how deep they overlap, and the way
-        out. FAILED_PRECONDITION where one of them has no points.
+        """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
+        parts them. FAILED_PRECONDITION if one of them has no points.
         """
 
     @_abc_1.abstractmethod
@@ -367,8 +370,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.PhaseDiagramRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.PhaseDiagramResponse, _abc.Awaitable[_hull_service_pb2.PhaseDiagramResponse]]:
-        """The hull as a binary phase diagram, its points being entries: the composition, which is the share of the second
-        element from 0 to 1, and the energy. Stable are those on the lower hull. FAILED_PRECONDITION where a point has no
+        """Interprets the hull as a binary phase diagram. Its points are entries: x is the composition, the share of the second
+        element from 0 to 1, and y the energy. Entries on the lower hull are stable. FAILED_PRECONDITION if a point has no
         such composition (reason HULL_UNSUITABLE).
         """
 
@@ -378,8 +381,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.FrontierRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.FrontierResponse, _abc.Awaitable[_hull_service_pb2.FrontierResponse]]:
-        """The hull as an efficient frontier, its points being risk, positive, and return. FAILED_PRECONDITION where a point
-        has no positive risk (reason HULL_UNSUITABLE), or where there are rates and no points (HULL_EMPTY).
+        """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
+        a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
         """
 
     @_abc_1.abstractmethod
@@ -388,8 +391,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.WatchRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.WatchResponse], _abc.AsyncIterator[_hull_service_pb2.WatchResponse]]:
-        """A snapshot of the vertices, then what changes. Changes are conflated for a watcher that reads slowly or asks for few:
-        what it has received always makes the exact hull at the revision of the last event.
+        """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
+        rate: the events received so far always give the exact hull at the revision of the last one.
         """
 
     @_abc_1.abstractmethod
@@ -398,6 +401,6 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.VerifyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.VerifyResponse, _abc.Awaitable[_hull_service_pb2.VerifyResponse]]:
-        """Computes the hull of the stored points anew, by Chan's algorithm, and compares it with the live one."""
+        """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull."""
 
 def add_HullServiceServicer_to_server(servicer: HullServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -1,4 +1,4 @@
-"""Many batches of one caller to one hull, with more than one under way."""
+"""Many batches of one caller to one hull, several of them in flight."""
 
 from collections import deque
 from collections.abc import Callable
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 
 class BatchStream:
-    """Batches are applied in the order they are written; a refused one stops the stream, and none after it is applied.
+    """Applies batches in the order they are written. A refused batch stops the stream: none after it is applied.
 
-    `notify` is called when a batch has been applied or refused.
+    `notify` is called after each batch that was applied or refused.
 
     Attributes:
-        applied: the numbers of the batches applied and what they did, in their order; to be taken from the left.
-        refusal: what refused a batch; None as long as nothing has.
-        batches: batches under way.
-        rows: points in them.
+        applied: the number and the result of each batch applied, in order; the caller removes them from the left.
+        refusal: the error that refused a batch; None while there is none.
+        batches: the number of batches in flight.
+        rows: the number of points in them.
     """
 
     def __init__(
@@ -38,11 +38,11 @@ class BatchStream:
 
     @property
     def hull(self) -> Hull | None:
-        """The hull, once it is there."""
+        """The hull; None until it exists."""
         return self._stream.hull
 
     def write(self, request: WriteBatch) -> None:
-        """Send a batch on its way."""
+        """Send a batch."""
         self.batches += 1
         self.rows += request.rows
         stream = request.stream = self._stream
@@ -51,9 +51,9 @@ class BatchStream:
             request.birth = self._birth()
         self._engine.dispatch(request)
 
-    def tell(self, request: Request) -> None:
-        """A batch has been applied or refused."""
-        assert type(request) is WriteBatch  # nothing else is asked for
+    def answer(self, request: Request) -> None:
+        """Take the answer to a batch."""
+        assert type(request) is WriteBatch  # the stream sends no other requests
         self.batches -= 1
         self.rows -= request.rows
         if request.error is None:
@@ -63,5 +63,5 @@ class BatchStream:
         self._notify()
 
     def close(self) -> None:
-        """The caller has gone, or wants no more: batches that have not begun are not applied."""
+        """Stop the stream: batches that have not begun are not applied."""
         self._engine.dispatch(Gone(self._stream))

@@ -1,6 +1,6 @@
 """Chan's algorithm in a process of its own, at low priority: points on standard input, the hull on standard output.
 
-A large hull would take the interpreter away from everybody else for seconds.
+A large hull would block the interpreter of the server for seconds.
 """
 
 import json
@@ -18,7 +18,7 @@ LOW_PRIORITY = 10
 
 
 def main() -> None:
-    """Read packed points to the end, write one JSON object."""
+    """Read packed points until the end of input, and write one JSON object."""
     os.nice(LOW_PRIORITY)
     points = np.frombuffer(sys.stdin.buffer.read(), np.float64).reshape(-1, 2)
     trace = Rounds()

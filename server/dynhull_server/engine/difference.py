@@ -1,4 +1,4 @@
-"""How one list of vertices becomes another."""
+"""The difference between two lists of vertices."""
 
 import asyncio
 from collections import OrderedDict
@@ -12,18 +12,18 @@ from dynhull.arrays import Points
 
 from .steps import Run
 
-# Lists of so many vertices together are compared at once, on the event loop.
+# Lists with at most this many vertices together are compared on the event loop.
 FEW = 256
-# Differences of one hull that are kept for the next watcher, and bytes of the vertices they are between.
+# The number of differences of one hull kept for further watchers, and the bytes of the vertices between which they are.
 KEPT, KEPT_BYTES = 8, 32 * 2**20
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """How to make one list of vertices from another.
+    """The edit that makes the new list of vertices from the old one.
 
-    Strike the rows at `removed`, move the first `rotation` of the rest to the end, put in the rows that stand at
-    `added` in the new list.
+    Remove the rows at `removed`, move the first `rotation` of the remaining ones to the end, and insert the new rows so
+    that they are at the positions `added`.
     """
 
     removed: npt.NDArray[np.intp]
@@ -32,7 +32,7 @@ class Difference:
 
 
 class Differences:
-    """Differences that many watchers want: each is computed once.
+    """Computes each difference once for all watchers that request it.
 
     Args:
         run: calls a function in a thread.
@@ -44,17 +44,17 @@ class Differences:
         self._recent: OrderedDict[tuple[int, int], tuple[Points, Points, asyncio.Future[Difference]]] = OrderedDict()
 
     async def between(self, old: Points, new: Points) -> Difference:
-        """How to make `new` of `old`."""
+        """The difference from `old` to `new`."""
         if len(old) + len(new) <= FEW:
             return difference(old, new)
-        # The arrays are kept beside the result, so that their ids stay theirs.
+        # The entry holds the arrays too, so that their ids are not reused.
         key = id(old), id(new)
         if key not in self._recent:
             computing = asyncio.ensure_future(self._compute(old, new))
             computing.add_done_callback(partial(self._computed, key))
             self._recent[key] = old, new, computing
             self._forget()
-        # A watcher that leaves does not take the result away from the others.
+        # A watcher that disconnects does not cancel the computation for the others.
         return await asyncio.shield(self._recent[key][2])
 
     async def _compute(self, old: Points, new: Points) -> Difference:
@@ -72,13 +72,13 @@ class Differences:
 
     def _computed(self, key: tuple[int, int], computing: "asyncio.Future[Difference]") -> None:
         if computing.cancelled() or computing.exception() is not None:
-            self._recent.pop(key, None)  # the next watcher may have more luck
+            self._recent.pop(key, None)  # let the next watcher try again
 
 
 def difference(old: Points, new: Points) -> Difference:
-    """How to make the vertices `new` from the vertices `old`, both counter-clockwise. O(h log h), without the GIL.
+    """The difference from the vertices `old` to the vertices `new`, both counter-clockwise. O(h log h).
 
-    Vertices common to two convex polygons stand in the same cyclic order on both, so a rotation is all they need.
+    Vertices common to two convex polygons have the same cyclic order in both, so they differ by a rotation only.
     """
     before, after = _as_numbers(old), _as_numbers(new)
     kept, there = np.isin(before, after, assume_unique=True), np.isin(after, before, assume_unique=True)
@@ -88,5 +88,5 @@ def difference(old: Points, new: Points) -> Difference:
 
 
 def _as_numbers(vertices: Points) -> npt.NDArray[np.complex128]:
-    """A number for each vertex, as numpy sorts and compares numbers alone at once."""
+    """One complex number per vertex, because numpy sorts and compares only scalars."""
     return np.ascontiguousarray(vertices).view(np.complex128).ravel()

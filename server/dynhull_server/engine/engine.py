@@ -1,4 +1,4 @@
-"""Drives the core: hands in requests and what became of effects, one at a time, and carries the effects out."""
+"""Drives the core: passes in requests and the outcomes of effects, one at a time, and carries out the effects."""
 
 import asyncio
 from collections import deque
@@ -23,12 +23,12 @@ from ..state.events import (
     Failed,
     Gone,
     NotExamined,
+    Reply,
     Request,
     Retried,
     Retry,
     Stopping,
     Tick,
-    Told,
     WriteBatch,
 )
 from ..state.hull import Hull
@@ -48,21 +48,21 @@ from .waiter import Waiter
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
-# Threads for batches and reads in a hull's turn, for large reads beside the turns, and for the disk.
+# The number of threads for trips, for large reads outside of trips, and for the disk.
 TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
-# Seconds between two looks at the clock: producers are forgotten after a day.
+# Seconds between updates of the core's clock, which serves only to drop producers idle for a day.
 TICK = 1.0
-# Seconds that a commit may take before it is reported as failing: a disk that hangs raises nothing.
+# Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
 
 
 class Engine:
-    """Named hulls, in memory and in a storage. To be used on one event loop.
+    """Named hulls, in memory and in a storage. Use it from one event loop.
 
     Args:
-        limits: on the state.
-        storage: where hulls are kept.
-        supervisor: hears of everything that fails in the background.
+        limits: the limits on the state.
+        storage: keeps the hulls.
+        supervisor: receives all failures in the background.
         machine: time, threads and random names.
     """
 
@@ -78,13 +78,13 @@ class Engine:
         self._idle: asyncio.Event | None = None
         self._started = False
 
-    # Beginning and end
+    # Start and shutdown
 
     async def start(self, progress: Progress) -> list[str]:
-        """Take up the hulls of the storage. Returns what was lost or repaired there, in words.
+        """Load the hulls of the storage. Returns messages about what was lost or repaired there.
 
         Args:
-            progress: called with what has been read and what there is to read.
+            progress: called with the amount read so far and the total.
 
         Raises:
             StorageError: the storage cannot be used.
@@ -125,8 +125,8 @@ class Engine:
         """Begin the background work on the storage.
 
         Args:
-            snapshot_points: how many points in batches make a snapshot due, at least.
-            sync_seconds: how often what was committed is made durable; None where commits themselves are.
+            snapshot_points: the least number of points in batches that makes a snapshot due.
+            sync_seconds: the interval at which commits are made durable; None where each commit is.
         """
         house = Housekeeping(self, self._storage, self._machine.clock)
         self._supervisor.every(house.CHECKPOINT_SECONDS, "checkpoint", house.checkpoint)
@@ -136,14 +136,14 @@ class Engine:
             self._supervisor.every(sync_seconds, "sync", house.sync)
 
     async def close(self) -> None:
-        """Finish and commit what is under way, refuse what waits, and let go of the storage."""
+        """Complete the trips in progress, refuse the waiting requests, and close the storage."""
         if not self._started:
             return
         self.dispatch(Stopping())
         self._idle = asyncio.Event()
         self._notice_idle()
         await self._idle.wait()
-        # Threads of the pools are joined in a thread of their own: the loop is still needed to end their work.
+        # Join the pools' threads in another thread, because their work needs the event loop to complete.
         await asyncio.to_thread(self._join)
 
     def _join(self) -> None:
@@ -165,13 +165,13 @@ class Engine:
         return self._live_hull(self._core.get(name))
 
     def has(self, name: str) -> bool:
-        """Whether there is a hull of that name."""
+        """Whether a hull of that name exists."""
         return name in self._core.hulls
 
     def page(self, prefixes: Sequence[str], after: str, size: int) -> tuple[list[LiveHull], bool]:
         """At most `size` hulls whose names follow `after`, and whether there are more.
 
-        The names begin with one of the prefixes, which are sorted and none of which begins with another.
+        Only names that begin with one of the prefixes. These are sorted, and none of them begins with another.
         """
         hulls: list[LiveHull] = []
         for prefix in prefixes:
@@ -186,18 +186,18 @@ class Engine:
         return hulls, False
 
     async def create(self, name: str, max_points: int = 0) -> LiveHull:
-        """Make an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
+        """Create an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
         hull: Hull = await self.ask(CreateHull(Waiter(), name, self._birth(), max_points))
         return self._live_hull(hull)
 
     async def delete(self, name: str) -> None:
-        """Remove the hull of that name, or raise HullNotFoundError or NotStoredError."""
+        """Delete the hull of that name, or raise HullNotFoundError or NotStoredError."""
         await self.ask(DeleteHull(Waiter(), name))
 
     async def apply(self, name: str, request: WriteBatch, *, create: bool) -> Applied:
-        """Apply a batch as the next revision of a hull, or raise what refuses it.
+        """Apply a batch as the next revision of a hull, or raise the error that refuses it.
 
-        With `create`, a hull that is not there is made for it.
+        With `create`, a missing hull is created.
         """
         request.to, request.name = Waiter(), name
         if create:
@@ -206,10 +206,10 @@ class Engine:
         return applied
 
     def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:
-        """For many batches to one hull; `notify` is called when there is news of one.
+        """A stream of batches to one hull; `notify` is called after each that was applied or refused.
 
         Raises:
-            HullNotFoundError: there is no hull of that name, and none is to be created.
+            HullNotFoundError: no hull has that name, and `create` is False.
         """
         hull = self._core.get(name) if self.has(name) or not create else None
         return BatchStream(self, name, hull, notify, self._birth)
@@ -217,7 +217,7 @@ class Engine:
     # The core
 
     def dispatch(self, event: Event) -> None:
-        """Hand an event to the core, and carry out what it asks for."""
+        """Pass an event to the core, and carry out its effects."""
         if self._stepping:
             self._events.append(event)
             return
@@ -231,17 +231,17 @@ class Engine:
                 if not self._events:
                     return
                 event = self._events.popleft()
-        except Exception as error:  # the core's own fault: nothing that it holds can be relied on any more
+        except Exception as error:  # a bug in the core: its state is no longer reliable
             self._supervisor.died("core", error)
             raise
         finally:
             self._stepping = False
 
     async def ask(self, request: Request) -> Any:
-        """The result of a request to a Waiter, or its error. A caller that is cancelled stops waiting, and no more."""
+        """The result of a request with a Waiter, or raise its error. Cancelling the caller ends only the wait."""
         waiter: Waiter = request.to
         self.dispatch(request)
-        if not waiter.told:
+        if not waiter.answered:
             waiter.future = self._loop.create_future()
             try:
                 await waiter.future
@@ -253,18 +253,18 @@ class Engine:
         return request.result
 
     async def run(self, pool: Pool, function: Callable[[], Any]) -> Any:
-        """What a function returns, called in a pool. A caller that is cancelled stops waiting; the function runs on."""
+        """Call a function in a pool. Cancelling the caller ends only the wait; the function continues."""
         return await asyncio.wrap_future(pool.submit(function))
 
     async def aside(self, function: Callable[[], Any]) -> Any:
-        """What a step of a large read returns, called beside the turns of the hulls."""
+        """Call a step of a large read, outside of the trips."""
         return await self.run(self._reads, function)
 
     def commit(self, changes: list[Any]) -> "asyncio.Future[None]":
-        """Commit steps of a snapshot or sweep among the batches of everybody; the future has what failed."""
+        """Commit steps of a snapshot or sweep, together with batches; the future raises the error of a failure."""
         done: asyncio.Future[None] = self._loop.create_future()
 
-        def tell(error: Exception | None) -> None:
+        def finish(error: Exception | None) -> None:
             if done.done():
                 return
             if error is None:
@@ -272,16 +272,16 @@ class Engine:
             else:
                 done.set_exception(error)
 
-        self._commits.submit(changes, lambda error, _: self._from_thread(partial(tell, error)))
+        self._commits.submit(changes, lambda error, _: self._from_thread(partial(finish, error)))
         return done
 
     def _carry_out(self, effect: Effect) -> None:
         match effect:
-            case Told():
+            case Reply():
                 if effect.moved is not None:
                     self._move(effect.moved)
                 for request in effect.requests:
-                    request.to.tell(request)
+                    request.to.answer(request)
             case Commit():
                 self._commit(effect.ticket, effect.changes)
             case Compute():
@@ -319,7 +319,7 @@ class Engine:
         self._turns.submit(trip.run).add_done_callback(ran)
 
     def _examine(self, effect: Examine) -> None:
-        """Decide what the storage has of the hull, in the committing thread, then read it in another."""
+        """Decide earlier commits in the committing thread if necessary, then read the hull in another."""
         if not effect.settle:
             self._read_for(effect)
             return
@@ -333,7 +333,7 @@ class Engine:
         self._commits.settle(settled)
 
     def _read_for(self, effect: Examine) -> None:
-        if self._idle is not None and self._idle.is_set():  # the server has not waited for it
+        if self._idle is not None and self._idle.is_set():  # the server has stopped without waiting for it
             return
 
         def examined() -> Event:
@@ -341,7 +341,7 @@ class Engine:
                 if self._storage.row(effect.number) is None:
                     return Examined(effect.ticket, None)
                 return Examined(effect.ticket, effect.load(self._storage.read(effect.number)))
-            except Exception as error:  # whatever it is, the hull's turn must not end with it
+            except Exception as error:  # no error may end the trip
                 return NotExamined(effect.ticket, error)
 
         def done(future: "Future[Event]") -> None:
@@ -355,7 +355,7 @@ class Engine:
     def _commit_reported(self, error: BaseException | None) -> None:
         if error is None:
             self._supervisor.succeeded("commits")
-            if self._supervisor.fails("examination") and not self._core.ill:  # which looks at every hull
+            if self._supervisor.fails("examination") and not self._core.ill:  # `ill` is O(hulls)
                 self._supervisor.succeeded("examination")
         else:
             self._supervisor.failed("commits", error)
@@ -369,7 +369,7 @@ class Engine:
         self.dispatch(Tick(now))
         since = self._commits.since
         if since is not None and now - since > STUCK:
-            self._supervisor.failed("commits", TimeoutError(f"a commit is under way for {now - since:.0f} s"))
+            self._supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))
 
     def _birth(self) -> Birth:
         return Birth(self._machine.token(), self._machine.clock.wall())

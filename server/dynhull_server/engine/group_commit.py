@@ -1,4 +1,4 @@
-"""Group commit: one thread commits, and whatever arrives while a commit is under way shares the next."""
+"""Group commit: one thread commits, and changes that arrive during a commit share the next one."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,32 +7,32 @@ from ..state.records import Change
 from ..storage.port import NotCommittedError, Step, Storage
 from .threads import Clock, Inbox, Threads
 
-# What became of a commit: None, or why it failed, and whether it is unknown if it did.
+# Called with the outcome of a commit: its error or None, and whether the outcome is unknown.
 Done = Callable[[Exception | None, bool], None]
 
 
 @dataclass(slots=True)
 class _Waiting:
-    """Changes to commit; without any, somebody who wants earlier commits to be decided."""
+    """Changes to commit; without any, a request to decide earlier commits."""
 
     changes: Sequence[Change | Step]
     done: Done
 
 
 class GroupCommit:
-    """Commits changes in the order they come; those of one `submit` together.
+    """Commits changes in order of arrival; those of one `submit` together.
 
-    After a commit with an unknown outcome nothing is committed until it has been decided.
+    After a commit with an unknown outcome nothing is committed until the outcome is decided.
 
     Args:
-        storage: where to.
-        threads: makes the thread.
-        clock: time.
-        report: called in the thread with what failed in a commit; with None when one has succeeded.
-        died: called in the thread when it ends though it should not.
+        storage: keeps the changes.
+        threads: creates the thread.
+        clock: the time.
+        report: called in the thread with the error of a failed commit, and with None after a successful one.
+        died: called in the thread with the error that ends it unexpectedly.
 
     Attributes:
-        since: when what is under way began, on the clock; None while nothing is.
+        since: the time by the clock when the commit in progress began; None while there is none.
     """
 
     def __init__(
@@ -56,11 +56,11 @@ class GroupCommit:
         self._inbox.put(_Waiting(changes, done))
 
     def settle(self, done: Done) -> None:
-        """Decide what became of earlier commits, then call `done`, in the committing thread."""
+        """Decide the outcome of earlier commits, then call `done`, in the committing thread."""
         self._inbox.put(_Waiting((), done))
 
     def close(self) -> None:
-        """Commit what waits, and stop. Blocks."""
+        """Commit the waiting changes, and stop. Blocks."""
         self._inbox.close()
         self._thread.join()
 
@@ -75,7 +75,7 @@ class GroupCommit:
             self.since = None
 
     def _decided(self, group: list[_Waiting]) -> bool:
-        """Whether nothing of earlier commits is unknown; otherwise the group has been refused."""
+        """Whether the outcomes of all earlier commits are known; if not, the group has been refused."""
         if not self._undecided:
             return True
         try:
@@ -98,9 +98,9 @@ class GroupCommit:
             if len(group) == 1:
                 group[0].done(error, False)
                 self._report(error)
-            else:  # one too large for the disk must not take the small ones with it
+            else:  # changes too large for the disk must not fail the others
                 self._commit_apart(group)
-        except Exception as error:  # a MemoryError, too: whatever it is, the changes may be there
+        except Exception as error:  # after any error, such as a MemoryError, the changes may be stored
             self._undecided = True
             for each in group:
                 each.done(error, True)

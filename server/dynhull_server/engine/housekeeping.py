@@ -1,4 +1,4 @@
-"""Background work on the storage: snapshots, so that a restart replays few batches; checkpoints, syncs and sweeps."""
+"""Background work on the storage: snapshots, which shorten a restart; checkpoints, syncs and sweeps."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -12,12 +12,13 @@ if TYPE_CHECKING:
     from .engine import Engine
     from .live_hull import LiveHull
 
-# The disk is the traffic's: after a step of a snapshot or a sweep there is a rest this many times as long as it took.
-BREATH = 4.0
+# Batches have priority on the disk: each step of a snapshot or sweep is followed by a pause of this many times its
+# duration.
+PAUSE_FACTOR = 4.0
 
 
 class Housekeeping:
-    """The work; the supervisor calls each part again and again."""
+    """The parts of the work, each called periodically by the supervisor."""
 
     CHECKPOINT_SECONDS = 0.25
     SNAPSHOT_SECONDS = 1.0
@@ -29,21 +30,22 @@ class Housekeeping:
         self._clock = clock
 
     async def checkpoint(self) -> None:
-        """Let the storage tidy up."""
+        """Checkpoint the storage."""
         await self._engine.run(self._engine.disk, self._storage.checkpoint)
 
     async def sync(self) -> None:
-        """Make durable what was committed."""
+        """Make the commits so far durable."""
         await self._engine.run(self._engine.disk, self._storage.sync)
 
     async def sweep(self) -> None:
-        """Drop what deleted hulls have left."""
+        """Remove the data of deleted hulls."""
         await self._carry_out(self._storage.sweep())
 
     async def snapshots(self, least_points: int) -> None:
-        """Write a snapshot of every hull that is due, one after the other.
+        """Write a snapshot of every hull that is due, one after another.
 
-        A hull is due once its batches since the last one hold as many points as it does itself, and at least so many.
+        A hull is due when the batches since its last snapshot have at least as many points as the hull itself, and at
+        least `least_points`.
         """
         failure: Exception | None = None
         for hull in self._engine:
@@ -53,7 +55,7 @@ class Housekeeping:
                 await self._snapshot(hull)
             except HullNotFoundError:
                 continue
-            except Exception as error:  # the others get theirs all the same
+            except Exception as error:  # go on with the other hulls
                 failure = failure or error
         if failure is not None:
             raise failure
@@ -73,4 +75,4 @@ class Housekeeping:
             if step is None:
                 return
             await self._engine.commit([step])
-            await self._clock.sleep(BREATH * (self._clock.monotonic() - begun))
+            await self._clock.sleep(PAUSE_FACTOR * (self._clock.monotonic() - begun))

@@ -1,4 +1,4 @@
-"""What callers see of one hull: reads of one revision, waiting for the next, and earlier revisions."""
+"""One hull as its callers use it: reads at one revision, waits for the next, and earlier revisions."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -31,12 +31,12 @@ T = TypeVar("T")
 
 
 class LiveHull:
-    """A hull that many callers read and wait for.
+    """A hull that many callers read and watch.
 
-    Batches and reads run one at a time in the order they came, so every read sees one revision, one that is committed.
+    Batches and reads run one at a time in order of arrival, so every read sees exactly one, committed revision.
 
     Attributes:
-        differences: between the vertices it has told.
+        differences: the differences between its vertices at successive reads.
     """
 
     def __init__(self, engine: "Engine", hull: Hull, recalls: Recalls) -> None:
@@ -59,42 +59,42 @@ class LiveHull:
 
     @property
     def uid(self) -> str:
-        """What tells it from other hulls of its name."""
+        """Distinguishes it from other hulls of its name."""
         return self._hull.uid
 
     @property
     def created(self) -> datetime:
-        """When it was created."""
+        """The time of its creation."""
         return datetime.fromtimestamp(self._hull.row.created, UTC)
 
     @property
     def max_points(self) -> int:
-        """The limit on its points that it was created with, 0 for the server's."""
+        """The limit on its points set at creation, 0 for the server's."""
         return self._hull.row.max_points
 
     @property
     def counts(self) -> Counts:
-        """As of the latest revision that anybody may be told of."""
+        """The counts at the latest committed revision."""
         return self._hull.counts
 
     @property
     def vertex_count(self) -> int:
-        """The number of vertices when somebody last looked."""
+        """The number of vertices when they were last read."""
         return self._hull.vertex_count
 
     @property
     def unsaved(self) -> int:
-        """Points in batches since the last snapshot."""
+        """The number of points in batches since the last snapshot."""
         return self._hull.unsaved
 
     def saved(self, points: int) -> None:
-        """A snapshot has made batches of so many points superfluous."""
+        """Record a snapshot, which includes batches with this number of points."""
         self._hull.unsaved -= points
 
     # Reads
 
     async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
-        """What `function`, which looks at about `rows` points, says of the hull in its turn."""
+        """Call `function`, which reads about `rows` points, with the state at one revision, `min_revision` or later."""
         while True:
             if self._hull.counts.revision < min_revision:
                 await self.reached(min_revision)
@@ -103,30 +103,30 @@ class LiveHull:
                 return counts, result
 
     async def vertices(self, min_revision: int = 0) -> tuple[Counts, Points]:
-        """The vertices; the very same array for as long as the hull has not changed."""
+        """The vertices; the same array object while the hull has not changed."""
         return await self.read(HullState.vertices, self.vertex_count // 2, min_revision)
 
     async def ask_rows(
         self, question: Callable[[DynamicHull, slice], T], rows: int, min_revision: int = 0
     ) -> tuple[Counts, T]:
-        """The answers to a question about so many rows that depends on the vertices alone.
+        """Answer a query about many rows that depends only on the vertices.
 
         Args:
-            question: called with a hull of these vertices and a slice of the rows, perhaps several times.
-            rows: how many rows there are.
-            min_revision: of the hull, at least.
+            question: called with a hull of these vertices and a slice of the rows, once or several times.
+            rows: the number of rows.
+            min_revision: the least revision of the hull.
 
         Returns:
-            The counts of the one revision that was asked, and an array of the answers.
+            The counts at the revision that answered, and an array of the answers.
         """
-        if rows <= BLOCK:  # these hold up the writes behind them for some milliseconds
+        if rows <= BLOCK:  # delays later writes by some milliseconds only
             return await self.read(lambda state: question(state.hull, slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision)
         outline = await self._hull_of(vertices)
         return counts, await in_blocks(self._engine.aside, partial(question, outline), rows)
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
-        """How many times each of some points is there."""
+        """The multiplicity of each of some points."""
         if len(xy) <= BLOCK:
             return await self.read(lambda state: state.hull.count_many(xy), len(xy), min_revision)
         counts, stored = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
@@ -144,21 +144,21 @@ class LiveHull:
         return await self.ask_rows(extreme, len(directions), min_revision)
 
     async def verify(self, min_revision: int = 0) -> tuple[Counts, Verification]:
-        """Compare the live hull with Chan's algorithm on the stored points. Writes go on meanwhile."""
+        """Compare the live hull with Chan's algorithm on the stored points. Writes continue meanwhile."""
         counts, (points, vertices) = await self.read(
             lambda state: (state.hull.points(), state.vertices()), self.counts.points, min_revision
         )
         return counts, await verify(points, vertices, self._engine.aside)
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
-        """At most `size` of the points. Writes go on while they are chosen."""
+        """A sample of at most `size` of the points. Writes continue meanwhile."""
         counts, points = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
         if len(points) <= size:
             return counts, points
         return counts, await self._engine.aside(partial(sample, points, size))
 
     async def last_sequence(self, producer: str) -> int:
-        """The last number of a producer that was applied, 0 where there is none."""
+        """The last sequence number applied of a producer, 0 where there is none."""
         _, last = await self.read(lambda state: state.last_sequence(producer))
         return last
 
@@ -166,11 +166,11 @@ class LiveHull:
 
     @asynccontextmanager
     async def recalled(self, uid: str, revision: int) -> AsyncIterator[Points | None]:
-        """The vertices at an earlier revision, None where nobody was told them; to be held for a moment.
+        """The vertices at an earlier revision; None where they were never sent. Callers leave the context soon.
 
         Raises:
-            HullReplacedError: this is not the hull of that uid.
-            RevisionForgottenError: the revision is too old, or has not been yet.
+            HullReplacedError: the uid is not that of this hull.
+            RevisionForgottenError: the revision is too old, or later than the newest.
         """
         if uid != self.uid:
             raise HullReplacedError(self.name, self.uid)
@@ -191,7 +191,7 @@ class LiveHull:
             raise RevisionForgottenError(revision, oldest, error.newest) from None
 
     async def reached(self, revision: int) -> None:
-        """Wait until the hull has this revision or a later one."""
+        """Wait until the hull has this revision or a later one; raise HullNotFoundError if it is deleted."""
         while not self._hull.ended and self.counts.revision < revision:
             if self._moved is None:
                 self._moved = asyncio.Event()
@@ -200,13 +200,13 @@ class LiveHull:
             raise HullNotFoundError(self.name)
 
     def moved(self) -> None:
-        """The hull has a new revision, or is no more."""
+        """Wake the waiting callers: the hull has a new revision, or was deleted."""
         if self._moved is not None:
             self._moved.set()
             self._moved = None
 
     async def _hull_of(self, vertices: Points) -> DynamicHull:
-        """A hull of its own with these vertices: several large reads of one revision share it."""
+        """A separate hull with these vertices, shared by large reads of one revision."""
         if self._outline is None or self._outline[0] is not vertices:
             made: DynamicHull = await self._engine.aside(partial(DynamicHull, vertices))
             self._outline = vertices, made

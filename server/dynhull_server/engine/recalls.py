@@ -1,4 +1,4 @@
-"""Hulls of earlier revisions, from the storage: whoever asks meanwhile shares one reading of the disk."""
+"""Vertices at earlier revisions, from the storage; concurrent requests share one read of the disk."""
 
 import asyncio
 from collections import defaultdict
@@ -17,7 +17,7 @@ from ..state.records import Kept
 from ..storage.port import DamagedError, Storage, StorageError
 
 Answer = Points | Exception
-# How reading fails where the machine has run out of something.
+# The errors of a read when the machine has run out of a resource.
 UNREADABLE = (StorageError, OSError, MemoryError)
 # Bytes of vertices that callers hold at a time, about: further revisions are read after these.
 MOST_BYTES = 64 * 2**20
@@ -33,13 +33,13 @@ class _Recall:
 
 
 class Recalls:
-    """Answers what a hull was at earlier revisions.
+    """Reads the vertices of hulls at earlier revisions.
 
-    The disk is read for one hull at a time, and at once for all revisions of it that are asked for, as many as may be
-    held together: so a hundred watchers that resume after a restart cost about what one does.
+    The disk is read for one hull at a time, once for all revisions requested of it, as far as their vertices fit in
+    MOST_BYTES: a hundred watchers that resume after a restart cost about as much as one.
 
     Args:
-        storage: where hulls are kept.
+        storage: keeps the hulls.
         run: calls a function in a thread.
     """
 
@@ -53,21 +53,21 @@ class Recalls:
 
     @asynccontextmanager
     async def vertices(self, hull: Hull, revision: int) -> AsyncIterator[Points]:
-        """The vertices at a revision that has been; to be held no longer than the context.
+        """The vertices at a past revision. Callers hold them no longer than the context.
 
         Raises:
-            RevisionForgottenError: it is older than what the storage has kept.
+            RevisionForgottenError: the storage no longer has that revision.
             NotStoredError: the storage cannot be read.
         """
         recall = self._wanted[hull].get(revision)
         if recall is None:
             recall = self._wanted[hull][revision] = _Recall(asyncio.get_running_loop().create_future())
-            recall.future.add_done_callback(_looked_at)
+            recall.future.add_done_callback(_retrieve)
         if self._reading is None or self._reading.done():
             self._reading = asyncio.get_running_loop().create_task(self._read())
         recall.callers += 1
         try:
-            # A watcher that leaves does not take the answer away from the others.
+            # A watcher that disconnects does not cancel the read for the others.
             yield await asyncio.shield(recall.future)
         finally:
             recall.callers -= 1
@@ -86,7 +86,7 @@ class Recalls:
                     recall.future.cancel()
                 raise
             for revision, answer in answers.items():
-                self._tell(wanted.pop(revision), answer)
+                self._deliver(wanted.pop(revision), answer)
             del self._wanted[hull]
             if wanted:  # after the other hulls
                 self._wanted[hull] = wanted
@@ -102,7 +102,7 @@ class Recalls:
             return dict.fromkeys(revisions, refusal)
         return answers
 
-    def _tell(self, recall: _Recall, answer: Answer) -> None:
+    def _deliver(self, recall: _Recall, answer: Answer) -> None:
         if isinstance(answer, Exception):
             recall.future.set_exception(answer)
             return
@@ -112,7 +112,7 @@ class Recalls:
             self._held += answer.nbytes
 
     def _recall(self, hull: Hull, revisions: list[int]) -> dict[int, Answer]:
-        """The vertices at some revisions, in ascending order, or why there are none; as many as there is room for."""
+        """The vertices at some revisions, given in ascending order, or the error for each; as many as fit."""
         try:
             return self._recalled(hull, revisions)
         except KeyError:  # deleted meanwhile
@@ -134,7 +134,7 @@ class Recalls:
                 newest = hull.counts.revision
                 return answers | {revision: RevisionForgottenError(revision, oldest, newest) for revision in left}
             if kept.last_revision != left[-1]:
-                raise DamagedError(f"revision {left[-1]} of {hull.name} was kept, and is not there")
+                raise DamagedError(f"revision {left[-1]} of {hull.name} is missing from the storage")
             found = _vertices_at(kept, covered)
             answers |= found
             if len(found) < len(covered):
@@ -159,7 +159,7 @@ def _vertices_at(kept: Kept, revisions: list[int]) -> dict[int, Points]:
     return found
 
 
-def _looked_at(future: "asyncio.Future[Points]") -> None:
-    """All who wanted it may have gone: asyncio need not complain that nobody has looked."""
+def _retrieve(future: "asyncio.Future[Points]") -> None:
+    """Retrieve the exception: if all watchers have disconnected, asyncio shall not log it as never retrieved."""
     if not future.cancelled():
         future.exception()

@@ -1,4 +1,4 @@
-"""The background scrub: every hull compared with Chan's algorithm, again and again."""
+"""The background scrub: compares every hull with Chan's algorithm, repeatedly."""
 
 from collections.abc import Callable
 
@@ -10,12 +10,12 @@ from .verification import Verification
 
 
 class Scrub:
-    """Compares one hull after the other; a hull that is as it was in the round before is left out.
+    """Compares one hull after another, except those unchanged since the previous round.
 
     Args:
         engine: the hulls.
-        clock: time.
-        cpu: how much of one processor it may take in the long run, between 0 and 1.
+        clock: the time.
+        cpu: the share of one processor it may use on average, between 0 and 1.
         compared: called with each outcome.
     """
 

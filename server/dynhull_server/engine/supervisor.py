@@ -1,8 +1,8 @@
-"""The supervisor: owns all background work, and makes known what fails.
+"""The supervisor: owns all background work, and reports its failures.
 
-A fault that passes (no descriptors, no room, an I/O error) is counted, and the work is tried again after a pause that
-grows. One that lasts, or that should not be possible, makes the server unwell, with the reason in the log, until the
-work succeeds again. What cannot go on at all ends the process: whoever runs it will start it again.
+A transient failure (no file descriptors, a full disk, an I/O error) is counted, and the work is retried after a growing
+pause. A failure that lasts, or that indicates a bug, makes the server unhealthy until the work succeeds again; the log
+has the reason. A failure that cannot be retried ends the process, so that the service manager restarts it.
 """
 
 import asyncio
@@ -14,9 +14,9 @@ from ..state.errors import RefusedError, StoppingError, words
 from ..storage.port import StorageError
 from .threads import Clock
 
-# Seconds that a passing fault may last.
+# Seconds that a transient failure may last.
 PATIENCE = 30.0
-# Seconds before work that failed is tried again, the first time and at most.
+# Seconds before failed work is retried: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 10.0
 
 log = logging.getLogger(__name__)
@@ -24,12 +24,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Health:
-    """How one piece of background work fares.
+    """The health of one kind of background work.
 
     Attributes:
-        failures: how often it has failed.
-        failing_since: when it began to fail; None while it succeeds.
-        unwell: why it makes the server unwell; None where it does not.
+        failures: the number of failures.
+        failing_since: the time of the first failure since the last success; None while it succeeds.
+        unwell: the reason why it makes the server unhealthy; None where it does not.
     """
 
     failures: int = 0
@@ -38,16 +38,16 @@ class Health:
 
 
 class Supervisor:
-    """Runs periodic work, and hears of all other.
+    """Runs periodic work, and receives the failures of other background work.
 
     Args:
-        clock: time.
-        changed: called when the server becomes unwell or well, with the reason or None.
-        fatal: called with the reason when the process has to end.
+        clock: the time.
+        changed: called with the reason when the server becomes unhealthy, and with None when it is healthy again.
+        fatal: called with the reason when the process must end.
 
     Attributes:
-        works: how each piece of work fares.
-        reason: why the server is unwell; None where it is well.
+        works: the health of each kind of work.
+        reason: why the server is unhealthy; None where it is healthy.
     """
 
     def __init__(self, clock: Clock, changed: Callable[[str | None], None], fatal: Callable[[str], None]) -> None:
@@ -59,51 +59,51 @@ class Supervisor:
         self.works: dict[str, Health] = {}
 
     def every(self, seconds: float, name: str, work: Callable[[], Awaitable[object]]) -> None:
-        """Do some work again and again, with a rest in between."""
+        """Repeat some work, with a pause in between."""
         self.works.setdefault(name, Health())
         task = asyncio.get_running_loop().create_task(self._repeat(seconds, name, work), name=name)
         task.add_done_callback(lambda task: self._ended(name, task))
         self._tasks.append(task)
 
     def failed(self, name: str, error: BaseException) -> None:
-        """Some work has failed, and will be tried again."""
+        """Record a failure of work that will be retried."""
         health = self.works.setdefault(name, Health())
         now = self._clock.monotonic()
         health.failures += 1
         if health.failing_since is None:
             health.failing_since = now
             log.warning("background work failed", extra={"work": name, "reason": words(error)})
-        if not isinstance(error, PASSING):
+        if not isinstance(error, TRANSIENT):
             log.error("background work failed; this is a bug", extra={"work": name}, exc_info=error)
-        if health.unwell is None and (now - health.failing_since >= PATIENCE or not isinstance(error, PASSING)):
+        if health.unwell is None and (now - health.failing_since >= PATIENCE or not isinstance(error, TRANSIENT)):
             health.unwell = f"{name}: {words(error)}"
-            self._tell()
+            self._update_reason()
 
     def succeeded(self, name: str) -> None:
-        """Some work has been done."""
+        """Record a success."""
         if not self.fails(name):
             return
         health = self.works[name]
         health.failing_since = health.unwell = None
-        log.info("background work goes on", extra={"work": name})
-        self._tell()
+        log.info("background work succeeds again", extra={"work": name})
+        self._update_reason()
 
     def fails(self, name: str) -> bool:
-        """Whether some work has failed and not yet succeeded again."""
+        """Whether some work has failed and not succeeded since."""
         health = self.works.get(name)
         return health is not None and health.failing_since is not None
 
     def died(self, name: str, error: BaseException) -> None:
-        """Some work has ended, and cannot be begun again: the process ends."""
-        log.critical("background work has died: the server ends", extra={"work": name}, exc_info=error)
+        """End the process, because work has failed that cannot be retried."""
+        log.critical("background work has died: the server stops", extra={"work": name}, exc_info=error)
         self._fatal(f"{name}: {words(error)}")
 
     def failing_seconds(self, health: Health) -> float:
-        """For how long some work has been failing; 0 while it succeeds."""
+        """The seconds since work began to fail; 0 while it succeeds."""
         return 0.0 if health.failing_since is None else self._clock.monotonic() - health.failing_since
 
     async def stop(self) -> None:
-        """End the periodic work."""
+        """Stop the periodic work."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -128,16 +128,16 @@ class Supervisor:
         if not task.cancelled() and (error := task.exception()) is not None:
             self.died(name, error)
 
-    def _tell(self) -> None:
+    def _update_reason(self) -> None:
         reason = next((health.unwell for health in self.works.values() if health.unwell is not None), None)
         if reason == self.reason:
             return
         self.reason = reason
         if reason is None:
-            log.warning("well again")
+            log.warning("healthy again: health is SERVING")
         else:
-            log.error("unwell: health is NOT_SERVING", extra={"reason": reason})
+            log.error("unhealthy: health is NOT_SERVING", extra={"reason": reason})
         self._changed(reason)
 
 
-PASSING = (OSError, StorageError, RefusedError, MemoryError)
+TRANSIENT = (OSError, StorageError, RefusedError, MemoryError)

@@ -1,7 +1,6 @@
-"""The seams to the machine: time, threads, and the queue between the event loop and a thread.
+"""The interfaces to the machine: time, threads, and the queue from the event loop to a thread.
 
-Everything in the engine that waits or runs beside the event loop goes through these, so that a test can put simulated
-time and threads in their place.
+All waiting and all threads of the engine go through these, so that a test can substitute simulated time and threads.
 """
 
 import asyncio
@@ -17,10 +16,10 @@ T = TypeVar("T")
 
 
 class Clock:
-    """Time."""
+    """The time."""
 
     def monotonic(self) -> float:
-        """Seconds on a clock that never goes back."""
+        """Seconds on a monotonic clock."""
         return time.monotonic()
 
     def wall(self) -> float:
@@ -28,12 +27,12 @@ class Clock:
         return time.time()
 
     async def sleep(self, seconds: float) -> None:
-        """Let time pass."""
+        """Sleep."""
         await asyncio.sleep(seconds)
 
 
 class Inbox(Generic[T]):
-    """A queue into a thread, which takes all there is at once."""
+    """A queue to a thread, which takes all items at once."""
 
     def __init__(self) -> None:
         self._turn = threading.Condition()
@@ -56,27 +55,27 @@ class Inbox(Generic[T]):
             return items
 
     def close(self) -> None:
-        """Take no more items."""
+        """Accept no more items."""
         with self._turn:
             self._closed = True
             self._turn.notify()
 
 
 class Pool(Protocol):
-    """Threads that functions run in."""
+    """Threads that run functions."""
 
     def submit(self, function: Callable[[], T], /) -> "Future[T]":
         """Call the function in one of the threads."""
 
     def shutdown(self) -> None:
-        """Wait for the functions under way."""
+        """Wait for the running functions."""
 
 
 class Threads:
-    """Makes threads."""
+    """Creates threads."""
 
     def pool(self, name: str, size: int) -> Pool:
-        """A pool of threads, all of them started: later there may be no room for one."""
+        """A pool of threads, all of them started at once: later the system might refuse one."""
         pool = ThreadPoolExecutor(size, thread_name_prefix=name)
         together = threading.Barrier(size + 1)
         for _ in range(size):
@@ -85,11 +84,11 @@ class Threads:
         return pool
 
     def inbox(self) -> Inbox[T]:
-        """A queue into a thread."""
+        """A queue to a thread."""
         return Inbox()
 
     def spawn(self, name: str, run: Callable[[], None], died: Callable[[BaseException], None]) -> "threading.Thread":
-        """Start a thread. What it raises goes to `died`, in that thread."""
+        """Start a thread. Its error, if any, is passed to `died` in that thread."""
 
         def guarded() -> None:
             try:
@@ -108,7 +107,7 @@ def _token() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """All seams together."""
+    """All interfaces to the machine."""
 
     clock: Clock = field(default_factory=Clock)
     threads: Threads = field(default_factory=Threads)

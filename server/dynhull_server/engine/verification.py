@@ -1,4 +1,4 @@
-"""The live hull against Chan's algorithm."""
+"""Comparison of a live hull with Chan's algorithm."""
 
 import asyncio
 import json
@@ -17,13 +17,13 @@ from dynhull.static.trace import Round, Rounds
 from . import chan_process
 from .steps import Run
 
-# So many points take a thread a third of a second, about as long as a process takes to start.
+# A thread computes the hull of this many points in a third of a second, about the time to start a process.
 LARGE = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first place where two lists of vertices differ; (0, 2) where a list has ended."""
+    """The first row where two lists of vertices differ; a shape of (0, 2) where a list is shorter."""
 
     index: int
     live: Points
@@ -32,9 +32,9 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """What Chan's algorithm made of the points; no `difference` where the live hull has the same vertices.
+    """The result of Chan's algorithm; `difference` is None where the live hull has the same vertices.
 
-    `seconds` are of processor time.
+    `seconds` is processor time.
     """
 
     points: int
@@ -45,8 +45,8 @@ class Verification:
 
 
 async def verify(points: Points, vertices: Points, run: Run) -> Verification:
-    """Compare `vertices`, a live hull's, with the hull of `points` computed anew, in a thread: `run` calls it there."""
-    if KERNEL == "cpp" or len(points) < LARGE:  # the kernel leaves the interpreter to others
+    """Compare the vertices of a live hull with the hull of `points`, computed in a thread by `run`."""
+    if KERNEL == "cpp" or len(points) < LARGE:  # the kernel releases the interpreter
         recomputed, rounds, seconds = await run(partial(_recompute, points))
     else:
         recomputed, rounds, seconds = await _recompute_apart(points)
@@ -54,7 +54,7 @@ async def verify(points: Points, vertices: Points, run: Run) -> Verification:
 
 
 def first_difference(live: Points, recomputed: Points) -> Difference | None:
-    """The first row in which two lists of vertices differ, None where they are the same."""
+    """The first row where two lists of vertices differ, None where they are equal."""
     if np.array_equal(live, recomputed):
         return None
     shorter = min(len(live), len(recomputed))
@@ -81,7 +81,7 @@ async def _recompute_apart(points: Points) -> tuple[Points, list[Round], float]:
         await process.wait()
         raise
     if process.returncode:
-        raise RuntimeError(f"the verifying process ended with {process.returncode}")
+        raise RuntimeError(f"the verification process exited with code {process.returncode}")
     answer = json.loads(output)
     vertices = np.array(answer["vertices"], np.float64).reshape(-1, 2)
     return vertices, [Round(**each) for each in answer["rounds"]], answer["seconds"]

@@ -1,4 +1,4 @@
-"""What a watcher holds of a hull: its vertices, or the extreme ones in some directions."""
+"""The part of a hull that a watcher follows: its vertices, or the extreme ones in some directions."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -23,7 +23,7 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The hull is another than at the event before; `removed` are vertices that it had then."""
+    """The change of the hull since the previous event; `removed` are the vertices that it lost."""
 
     counts: Counts
     removed: Points
@@ -33,7 +33,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """The extreme vertices, one for each direction; and the vertices, for their measures, where those are wanted."""
+    """The extreme vertices, one per direction, and all vertices if the watcher requested measures."""
 
     counts: Counts
     extremes: Points
@@ -42,7 +42,7 @@ class Sketch:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What is held is right for this revision too."""
+    """The watcher's copy is up to date at this revision."""
 
     counts: Counts
 
@@ -51,13 +51,13 @@ Event = Snapshot | Change | Sketch | Progress
 
 
 class View(Protocol):
-    """What a watcher is told of a hull. It remembers what it has told."""
+    """The events of one watcher. It remembers what the watcher holds."""
 
     async def first(self, min_revision: int) -> Event:
-        """What there is to be told to begin with."""
+        """The first event."""
 
     async def next(self) -> Event:
-        """What is new since then; Progress where nothing is."""
+        """The change since the previous event; Progress where there is none."""
 
 
 class VerticesView:
@@ -73,7 +73,7 @@ class VerticesView:
         return Snapshot(counts, self._held, self._hull.uid)
 
     async def next(self) -> Event:
-        """The change."""
+        """The change since the previous event."""
         counts, vertices = await self._hull.vertices()
         held, self._held = self._held, vertices
         if vertices is held:
@@ -113,12 +113,12 @@ class ResumedView(VerticesView):
 
 
 class SketchView:
-    """The extreme vertices in some directions, each time all of them.
+    """The extreme vertices in some directions; each event has all of them.
 
     Args:
         hull: the hull.
-        directions: (k, 2) vectors other than 0.
-        vertices: whether the vertices are wanted too.
+        directions: (k, 2) non-zero vectors.
+        vertices: whether to include the vertices.
     """
 
     def __init__(self, hull: LiveHull, directions: Points, vertices: bool) -> None:
@@ -138,7 +138,7 @@ class SketchView:
         return Sketch(counts, *self._held)
 
     async def next(self) -> Event:
-        """A sketch, where it is another."""
+        """A sketch, if it has changed."""
         before = self._held
         counts, self._held = await self._hull.read(self._look, self._rows)
         if all(map(_same, before, self._held)):

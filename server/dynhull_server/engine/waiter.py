@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 class Waiter:
     """A caller that waits for one request."""
 
-    __slots__ = ("future", "told")
+    __slots__ = ("answered", "future")
 
     def __init__(self) -> None:
-        self.told = False
+        self.answered = False
         self.future: asyncio.Future[None] | None = None
 
-    def tell(self, _: Request) -> None:
-        """The request has been answered."""
-        self.told = True
+    def answer(self, _: Request) -> None:
+        """Resume the caller: the request has been answered."""
+        self.answered = True
         if self.future is not None and not self.future.done():
             self.future.set_result(None)

@@ -1,7 +1,7 @@
-"""Watching a hull: what to tell somebody who holds an earlier one.
+"""Watching a hull.
 
-A watcher has no queue. It remembers what it has told, waits for the revision to move, and tells the difference to the
-hull as it is then. So whoever is slow gets fewer and larger changes, and memory does not grow.
+A watcher has no queue. It remembers what it has sent, waits for a new revision, and sends the difference to the hull at
+that time. A slow client therefore gets fewer and larger changes, and memory does not grow.
 """
 
 import asyncio
@@ -20,15 +20,15 @@ async def watch(
     min_interval: float = 0.0,
     progress_interval: float | None = None,
 ) -> AsyncGenerator[Event, None]:
-    """What there is, then an event whenever the revision has moved.
+    """The present state, then an event for each new revision, or for several at once.
 
     Args:
         hull: the hull to watch.
-        view: what of it.
-        since: the revision of what the watcher holds already; None where it holds nothing.
-        min_revision: the first event waits for this revision.
-        min_interval: seconds from one event to the next, at least.
-        progress_interval: seconds without an event after which there is a Progress; None for never.
+        view: the part of it to follow.
+        since: the revision of the state that the watcher already holds; None where it holds none.
+        min_revision: the least revision of the first event.
+        min_interval: the least number of seconds between events.
+        progress_interval: seconds without an event after which a Progress is sent; None for never.
 
     Raises:
         HullNotFoundError: the hull has been deleted.
@@ -36,19 +36,19 @@ async def watch(
     loop = asyncio.get_running_loop()
     event = await view.first(min_revision)
     counts = event.counts
-    told = loop.time()
+    sent = loop.time()
     if since is None or counts.revision > since or not isinstance(event, Progress):
         yield event
     while True:
-        await asyncio.sleep(told + min_interval - loop.time())
+        await asyncio.sleep(sent + min_interval - loop.time())
         try:
-            async with asyncio.timeout_at(None if progress_interval is None else told + progress_interval):
+            async with asyncio.timeout_at(None if progress_interval is None else sent + progress_interval):
                 await hull.reached(counts.revision + 1)
         except TimeoutError:
-            told = loop.time()
+            sent = loop.time()
             yield Progress(counts)
             continue
         event = await view.next()
         counts = event.counts
-        told = loop.time()
+        sent = loop.time()
         yield event

@@ -1,1 +1,1 @@
-"""The wire: decodes requests, asks the engine, answers with messages or statuses."""
+"""The wire: decodes requests, calls the engine, and answers with messages or statuses."""

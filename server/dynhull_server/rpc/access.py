@@ -1,4 +1,4 @@
-"""Who may do what: bearer tokens, each with the names it may read and write."""
+"""Access control: bearer tokens, each with the names it may read and write."""
 
 import hashlib
 import logging
@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..state.errors import RefusedError
 
-# Seconds between two looks at the file of tokens.
+# Seconds between checks of the token file for changes.
 LOOK_SECONDS = 0.25
 # Hexadecimal digits that stand for a token without a name.
 SHORT_HASH = 12
@@ -22,18 +22,18 @@ log = logging.getLogger(__name__)
 
 
 class UnauthenticatedError(RefusedError):
-    """The caller has no token, or one that is not known."""
+    """The caller has no token, or an unknown one."""
 
     def __init__(self) -> None:
         super().__init__('a valid token is required: metadata "authorization" with "Bearer " and the token')
 
 
 class PermissionDeniedError(RefusedError):
-    """The caller's token does not allow it. It says nothing about whether there is such a hull.
+    """The caller's token does not allow the request. This does not reveal whether the hull exists.
 
     Attributes:
         scope: "read" or "write".
-        name: the name asked for.
+        name: the name requested.
     """
 
     def __init__(self, scope: str, name: str) -> None:
@@ -50,17 +50,17 @@ class Access:
     write: tuple[str, ...]
 
     def require_read(self, name: str) -> None:
-        """Raise PermissionDeniedError where the hull may not be read."""
+        """Raise PermissionDeniedError if the hull may not be read."""
         if not name.startswith(self.read):
             raise PermissionDeniedError("read", name)
 
     def require_write(self, name: str) -> None:
-        """Raise PermissionDeniedError where the hull may not be written."""
+        """Raise PermissionDeniedError if the hull may not be written."""
         if not name.startswith(self.write):
             raise PermissionDeniedError("write", name)
 
     def readable(self, prefix: str) -> list[str]:
-        """The prefixes of the readable names among those that begin with `prefix`: sorted, none part of another."""
+        """The prefixes of the readable names that begin with `prefix`: sorted, none a prefix of another."""
         within = sorted({max(prefix, each, key=len) for each in self.read if _overlap(prefix, each)})
         return [each for i, each in enumerate(within) if not each.startswith(tuple(within[:i]))]
 
@@ -70,12 +70,12 @@ EVERYTHING = Access(("",), ("",))
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who calls.
+    """The identity of a caller.
 
     Attributes:
-        owner: the name that its bounds are counted under; empty for the address it calls from.
-        access: what it may do.
-        key: the hash of its token; empty without tokens.
+        owner: the name whose limits apply; if empty, the limits apply to the address of the call.
+        access: its permissions.
+        key: the hash of its token; empty if the server uses no tokens.
     """
 
     owner: str
@@ -83,12 +83,12 @@ class Caller:
     key: str = ""
 
 
-ANYBODY = Caller("", EVERYTHING)
-NOBODY = Caller("", Access((), ()))
+ANONYMOUS = Caller("", EVERYTHING)
+UNAUTHENTICATED_CALLER = Caller("", Access((), ()))
 
 
 class Rights:
-    """What one call may do. It remembers what it was granted, which a narrowed token may no longer allow."""
+    """The permissions of one call. It records what was granted, so that a changed token can end the call."""
 
     __slots__ = ("_access", "_granted")
 
@@ -97,21 +97,21 @@ class Rights:
         self._granted: list[tuple[Callable[[Access, str], None], str]] = []
 
     def require_read(self, name: str) -> None:
-        """Raise PermissionDeniedError where the hull may not be read."""
+        """Raise PermissionDeniedError if the hull may not be read."""
         self._access.require_read(name)
         self._granted.append((Access.require_read, name))
 
     def require_write(self, name: str) -> None:
-        """Raise PermissionDeniedError where the hull may not be written."""
+        """Raise PermissionDeniedError if the hull may not be written."""
         self._access.require_write(name)
         self._granted.append((Access.require_write, name))
 
     def readable(self, prefix: str) -> list[str]:
-        """The prefixes of the readable names among those that begin with `prefix`."""
+        """The prefixes of the readable names that begin with `prefix`."""
         return self._access.readable(prefix)
 
     def change(self, access: Access) -> None:
-        """Go on with these rights, or raise PermissionDeniedError where they do not allow what was granted."""
+        """Replace the permissions, or raise PermissionDeniedError if they do not allow what was granted."""
         self._access = access
         for require, name in self._granted:
             require(access, name)
@@ -122,7 +122,7 @@ def _overlap(a: str, b: str) -> bool:
 
 
 class TokenEntry(BaseModel):
-    """One [[token]] of the file."""
+    """One [[token]] entry of the file."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -133,7 +133,7 @@ class TokenEntry(BaseModel):
 
 
 class TokenTable(BaseModel):
-    """The file."""
+    """The content of the file."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -141,21 +141,21 @@ class TokenTable(BaseModel):
 
 
 class TokenFile:
-    """Tokens from a TOML file of hashes, read again whenever it has changed.
+    """Tokens from a TOML file of hashes, which is read again when it changes.
 
     [[token]]
-    name = "trucks"      # for people, and what bounds are counted under; without it, the beginning of the hash
-    sha256 = "9f86d0..." # of the token, in hexadecimal digits
-    read = ["fleet/"]    # prefixes of names; "" is every name
+    name = "trucks"      # for people and for limits; by default, the first digits of the hash
+    sha256 = "9f86d0..." # the hash of the token, in hexadecimal digits
+    read = ["fleet/"]    # prefixes of names; "" matches every name
     write = ["fleet/truck-"]
 
-    A file that has become unreadable or wrong is reported in the log, and the tokens stay as they were.
+    If the file becomes unreadable or invalid, the log reports it, and the tokens do not change.
 
     Attributes:
-        changed: called when other tokens have been read.
+        changed: called after changed tokens have been read.
 
     Raises:
-        ValueError: the file cannot be used. OSError: it cannot be read.
+        ValueError: the file is invalid. OSError: it cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -166,12 +166,12 @@ class TokenFile:
         self.changed: Callable[[], None] = lambda: None
 
     def authenticate(self, metadata: Iterable[tuple[str, Any]]) -> Caller:
-        """Who the caller with this metadata is, or raise UnauthenticatedError."""
+        """The caller with this metadata, or raise UnauthenticatedError."""
         self.look()
         return self.bearer(str(dict(metadata).get("authorization", "")))
 
     def bearer(self, authorization: str) -> Caller:
-        """Whose token this is, by what was last read, or raise UnauthenticatedError."""
+        """The caller with this token, as last read from the file, or raise UnauthenticatedError."""
         kind, _, token = authorization.partition(" ")
         if kind.lower() != "bearer":
             raise UnauthenticatedError
@@ -185,7 +185,7 @@ class TokenFile:
         return caller
 
     async def run(self) -> None:
-        """Look, every LOOK_SECONDS, so that what a change ends does not wait for somebody's next call."""
+        """Check the file, every LOOK_SECONDS, so that a change ends running calls without waiting for the next call."""
         self.look()
 
     def look(self) -> None:
@@ -196,9 +196,9 @@ class TokenFile:
                 return
             callers = self._load()
         except ValueError as error:
-            self._version = version  # it will not become right by itself
+            self._version = version  # it stays invalid until it changes
             self._complain(error)
-        except OSError as error:  # perhaps it can be read a moment later
+        except OSError as error:  # perhaps it can be read later
             self._complain(error)
         else:
             self._version, self._callers, self._trouble = version, callers, ""
@@ -206,12 +206,12 @@ class TokenFile:
             self.changed()
 
     def _complain(self, error: Exception) -> None:
-        if str(error) != self._trouble:  # once, for every call looks
+        if str(error) != self._trouble:  # log it once: each call checks the file
             self._trouble = str(error)
-            log.error("the tokens stay as they were: %s", error)  # the message says it all
+            log.error("the tokens do not change: %s", error)  # the message is complete without a traceback
 
     def _current_version(self) -> tuple[int, int, int]:
-        stat = os.stat(self._path)  # noqa: PTH116  # each call pays for it
+        stat = os.stat(self._path)  # noqa: PTH116  # faster, and each call runs it
         return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
     def _load(self) -> dict[str, Caller]:

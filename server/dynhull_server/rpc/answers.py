@@ -1,4 +1,4 @@
-"""What hulls are for, worked out from their vertices: long work for large hulls, in steps."""
+"""Answers computed from the vertices of hulls, in steps, because they take long for large hulls."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -39,8 +39,8 @@ async def measures(counts: Counts, vertices: Points, encoding: Encoding, run: Ru
 def separation(
     counts: Counts, vertices: Points, other_counts: Counts, other_vertices: Points, encoding: Encoding
 ) -> pb.SeparateResponse:
-    """How two hulls, neither of them empty, lie to each other."""
-    # A DynamicHull finds an extreme vertex without looking at all of them.
+    """The separation of two non-empty hulls."""
+    # A DynamicHull finds an extreme vertex without reading all of them.
     found = max_margin(DynamicHull(vertices), DynamicHull(other_vertices))
     normal_x, normal_y = found.normal.tolist()
     return pb.SeparateResponse(
@@ -59,7 +59,7 @@ def separation(
 async def phase_diagram(
     counts: Counts, vertices: Points, entries: Points, encoding: Encoding, run: Run
 ) -> pb.PhaseDiagramResponse:
-    """The phase diagram of entries that are compositions and energies, and what it says of others."""
+    """The phase diagram of a hull of compositions and energies, and its results for other entries."""
     diagram: PhaseDiagram = await run(partial(PhaseDiagram, vertices))
     stable = await run(diagram.stable)
 
@@ -87,12 +87,15 @@ async def phase_diagram(
 async def frontier(
     counts: Counts, vertices: Points, points: Points, rates: Sequence[float], encoding: Encoding, run: Run
 ) -> pb.FrontierResponse:
-    """The efficient frontier of risks and returns, and what it says of others. Without vertices, there are no rates."""
+    """The efficient frontier of a hull of risks and returns, and its results for other points.
+
+    Without vertices, `rates` must be empty.
+    """
     offers: Frontier = await run(partial(Frontier, vertices))
     efficient: Points = await run(offers.efficient)
 
     def turns(rows: slice) -> npt.NDArray[np.float64]:
-        """The rates at which the tangency leaves these corners: none for those beyond the greatest return."""
+        """The rates at which the tangency leaves these corners; none beyond the greatest return."""
         return Frontier(efficient[rows.start : rows.stop + 1]).tangencies().rates
 
     def tangencies(rows: slice) -> Points:
@@ -102,7 +105,7 @@ async def frontier(
         return np.array([offers.sharpe_ratio(rate) for rate in rates[rows]])
 
     turning_rates = await in_blocks(run, turns, max(len(efficient) - 1, 0))
-    block = max(BLOCK, len(efficient))  # for each the whole frontier is read
+    block = max(BLOCK, len(efficient))  # each block reads the whole frontier
     dominated = await in_blocks(run, lambda rows: offers.dominated(points[rows]), len(points), block)
     touched, sharpe_ratios = [await in_blocks(run, each, len(rates)) for each in (tangencies, ratios)]
     response: pb.FrontierResponse = await run(

@@ -1,4 +1,4 @@
-"""Background work for Prometheus: what fails, how often, and whether it makes the server unwell."""
+"""Metrics of the background work: its failures, and whether they make the server unhealthy."""
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
@@ -7,13 +7,13 @@ from ..engine.supervisor import Supervisor
 
 
 def background_families(supervisor: Supervisor) -> list[Metric]:
-    """Of each work: its failures, and since how many seconds it has been failing."""
+    """For each kind of work: the number of failures, and the seconds since it began to fail."""
     failures = CounterMetricFamily(
-        "dynhull_background_failures", "How often background work has failed, to be tried again.", labels=["work"]
+        "dynhull_background_failures", "Failures of background work, which is retried.", labels=["work"]
     )
     failing = GaugeMetricFamily(
         "dynhull_background_failing_seconds",
-        "For how long background work has been failing; 0 while it succeeds.",
+        "Seconds since background work began to fail; 0 while it succeeds.",
         labels=["work"],
     )
     unwell = GaugeMetricFamily(

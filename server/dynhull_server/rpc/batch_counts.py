@@ -1,4 +1,4 @@
-"""What has become of batches. They come in thousands a second: counted in plain numbers, on the event loop alone."""
+"""Counts of batches. Thousands arrive per second, so the counts are plain numbers, used only on the event loop."""
 
 from bisect import bisect_left
 from itertools import accumulate
@@ -11,10 +11,10 @@ from ..state.batch import Applied
 
 
 class BatchCounts:
-    """Counts of batches and their points, and a histogram of how long they took.
+    """Counts of batches and their points, and a histogram of their delays.
 
     Args:
-        buckets: the upper bounds in seconds, but for the last, which has none.
+        buckets: the upper bounds in seconds; one more bucket has no bound.
     """
 
     def __init__(self, buckets: tuple[float, ...]) -> None:
@@ -25,7 +25,7 @@ class BatchCounts:
         self._inserted = self._deleted = self._missing = 0
 
     def applied(self, applied: Applied, seconds: float) -> None:
-        """A batch has been applied, `seconds` after it came."""
+        """Count a batch that was applied `seconds` after its arrival."""
         self._took[bisect_left(self._bounds, seconds)] += 1
         self._seconds += seconds
         if applied.duplicate:
@@ -37,12 +37,12 @@ class BatchCounts:
         self._missing += applied.missing
 
     def refused(self) -> None:
-        """A batch has been refused."""
+        """Count a refused batch."""
         self._refused += 1
 
     def families(self) -> list[Metric]:
-        """All of it, for Prometheus."""
-        batches = CounterMetricFamily("dynhull_batches", "Batches, by what became of them.", labels=["outcome"])
+        """The metrics for Prometheus."""
+        batches = CounterMetricFamily("dynhull_batches", "Batches, by outcome.", labels=["outcome"])
         for outcome, count in (
             ("applied", self._applied),
             ("duplicate", self._duplicate),
@@ -53,7 +53,7 @@ class BatchCounts:
         for operation, count in (("insert", self._inserted), ("delete", self._deleted), ("missing", self._missing)):
             updates.add_metric([operation], count)
         durations = HistogramMetricFamily(
-            "dynhull_batch_duration_seconds", "From the arrival of a batch to its acknowledgement being ready."
+            "dynhull_batch_duration_seconds", "Seconds from the arrival of a batch until its acknowledgement is ready."
         )
         bounds = map(floatToGoString, (*self._bounds, INF))
         durations.add_metric([], list(zip(bounds, accumulate(self._took), strict=True)), self._seconds)

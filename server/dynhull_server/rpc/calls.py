@@ -1,4 +1,4 @@
-"""The calls under way: who calls, how many there are, refusals as statuses, what a draining server cuts off."""
+"""The calls in progress: authentication, limits, refusals as statuses, and the end of calls when the server drains."""
 
 import asyncio
 import logging
@@ -13,7 +13,7 @@ from google.protobuf.message import DecodeError, Message
 from grpc_status import rpc_status
 
 from ..state.errors import LimitExceededError
-from .access import NOBODY, Caller, PermissionDeniedError, Rights, UnauthenticatedError
+from .access import UNAUTHENTICATED_CALLER, Caller, PermissionDeniedError, Rights, UnauthenticatedError
 from .metrics import Metrics
 from .places import Places
 from .refusal_log import RefusalLog
@@ -21,10 +21,10 @@ from .status import ANSWERED, DrainingError, StartingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
 Work = Callable[["Call"], Awaitable[Any]]
-# A message and how many bytes it had, or what is wrong with it.
+# A message and its size in bytes, or the error that it is invalid.
 Received = tuple[Message, int] | Exception
 
-# The page for Prometheus among the methods that are counted.
+# The name of the metrics page in the counts of calls.
 METRICS_PAGE = "metrics"
 
 SUSPICIOUS = ("UNAUTHENTICATED", "PERMISSION_DENIED")
@@ -36,11 +36,11 @@ class Call:
     """One call.
 
     Attributes:
-        caller: who calls.
-        access: what the call may do.
-        batches: how many batches the call has applied; None for calls that apply none or one.
-        message_bytes: the size of the last message that came.
-        ending: what ends it; None as long as nothing does.
+        caller: the caller.
+        access: the permissions of the call.
+        batches: the number of batches the call has applied; None for calls that do not stream batches.
+        message_bytes: the size of the last message received.
+        ending: the error that ends it, or None.
         waiting: its tasks that `end` may cancel.
     """
 
@@ -71,13 +71,13 @@ class Call:
 
     @property
     def owner(self) -> str:
-        """Whose bounds the call counts under: the token's, or without tokens the address it comes from."""
+        """The owner whose limits apply: that of the token, or without tokens the address of the caller."""
         if not self._owner:
             self._owner = self._context.peer().partition(":")[2].rpartition(":")[0]
         return self._owner
 
     async def receive(self) -> Any:
-        """The only message of a call that is no stream."""
+        """The only message of a call that does not stream."""
         return self._take(await self._context.read())
 
     async def read(self) -> Any:
@@ -101,7 +101,7 @@ class Call:
             yield message
 
     def serialize(self, message: Message) -> bytes:
-        """The bytes of a message. Raises LimitExceededError where it is too large to be sent."""
+        """The bytes of a message. Raises LimitExceededError if it is too large to send."""
         data: bytes = message.SerializeToString()
         if len(data) > self._calls.max_message_bytes:
             raise LimitExceededError("max_message_bytes", self._calls.max_message_bytes)
@@ -112,16 +112,16 @@ class Call:
         try:
             await self._context.write(self.serialize(message))
         except grpc.aio.InternalError:
-            # The client has gone while the message was on its way.
+            # The client has disconnected during the write.
             raise asyncio.CancelledError from None
 
     async def write_within(self, seconds: float, message: Message) -> None:
-        """Send a message, or raise LimitExceededError where that took longer, or the error of `end`.
+        """Send a message. Raises LimitExceededError if that takes longer, or the error of `end`.
 
-        The client will get the message and then the error, for gRPC cannot take back what it has begun to send.
+        The client receives the message and then the error, because gRPC cannot cancel a message in part.
         """
         begun = time.monotonic()
-        if not self._begun:  # else a first message that is cut off leaves it open whether the call has begun
+        if not self._begun:  # otherwise a cut-off first message would leave unclear whether the call has begun
             self._begun = True
             await self._context.send_initial_metadata(())
         with self.cutoff():
@@ -130,21 +130,21 @@ class Call:
             raise LimitExceededError("max_watch_lag", seconds)
 
     def stream(self) -> AbstractContextManager[None]:
-        """What happens inside is a streaming call, of which there are not too many."""
+        """Holds a place of a streaming call, whose number is limited."""
         return self._calls.streams.take(self.owner)
 
     @contextmanager
     def short(self) -> Iterator[None]:
-        """What happens inside is finished, by a draining server and without its token."""
+        """Run the block to its end, even if the server drains or the token is removed."""
         self._calls.finish(_current_task())
         yield
 
     def cutoff(self) -> "Cutoff":
-        """Whatever happens inside ends with the error of `end`."""
+        """A block that `end` interrupts with its error."""
         return Cutoff(self)
 
     def end(self, error: Exception) -> None:
-        """End the call with an error, as soon as it waits for something."""
+        """End the call with an error, as soon as it waits."""
         if self.ending is None:
             self.ending = error
             for task in self.waiting:
@@ -155,10 +155,10 @@ class Calls:
     """Every call goes through `serve`.
 
     Args:
-        authenticate: who calls; raises UnauthenticatedError.
-        metrics: where calls are counted.
-        max_message_bytes: the largest message sent.
-        streams: the places of streaming calls.
+        authenticate: returns the caller, or raises UnauthenticatedError.
+        metrics: counts the calls.
+        max_message_bytes: the size of the largest message sent.
+        streams: limits the streaming calls.
     """
 
     def __init__(
@@ -179,11 +179,11 @@ class Calls:
         self._refusals = RefusalLog()
 
     def ready(self) -> None:
-        """From now on calls are served: before, they are told that the server is starting."""
+        """Serve calls from now on; before, they are refused with StartingError."""
         self._starting = False
 
     async def drain(self, grace: float) -> None:
-        """End the calls that wait, refuse new ones, and let the short ones finish for up to `grace` seconds."""
+        """End waiting calls, refuse new ones, and give short ones up to `grace` seconds to finish."""
         self._draining = True
         for call in self._open:
             call.end(DrainingError())
@@ -195,7 +195,7 @@ class Calls:
         """End the calls that their tokens no longer allow.
 
         Args:
-            known: the caller whose token has this hash, as it is now; raises UnauthenticatedError.
+            known: returns the present caller for the hash of a token, or raises UnauthenticatedError.
         """
         for call in self._open:
             try:
@@ -205,7 +205,7 @@ class Calls:
                 call.end(refusal)
 
     def admit(self, context: Context) -> Call:
-        """The call, if it may begin."""
+        """Begin a call, or raise the error that refuses it."""
         caller = self._authenticate(context)
         if self._starting:
             raise StartingError
@@ -216,11 +216,11 @@ class Calls:
         return call
 
     def admit_anybody(self, context: Context) -> Call:
-        """A call that needs no token and may begin at any time."""
-        return Call(self, context, NOBODY)
+        """Begin a call that needs no token, at any time."""
+        return Call(self, context, UNAUTHENTICATED_CALLER)
 
     def refused_elsewhere(self) -> Callable[[str, str, str], None]:
-        """What other threads call with the reason, code and peer of a request for metrics that they have refused."""
+        """A function for other threads, to report a refused request for metrics: its reason, code and peer."""
         loop = asyncio.get_running_loop()
 
         def count(reason: str, code: str, peer: str) -> None:
@@ -233,16 +233,16 @@ class Calls:
         return refused
 
     def finish(self, task: asyncio.Task[Any]) -> None:
-        """A draining server waits for this task."""
+        """Have a draining server wait for this task."""
         self._short.add(task)
         task.add_done_callback(self._short.discard)
 
     async def serve(
         self, method: str, admit: Callable[[Context], Call], work: Work, _: object, context: Context
     ) -> Any:
-        """What `work` makes of a call that was admitted. Refusals become statuses.
+        """Run `work` on an admitted call. Refusals become statuses.
 
-        Nothing of a call's messages is in memory before `work` reads them.
+        No message of the call is in memory before `work` reads it.
         """
         begun = time.perf_counter()
         code = "OK"
@@ -266,13 +266,13 @@ class Calls:
         finally:
             if call is not None:
                 self._open.discard(call)
-            # The answer leaves first: the caller waits for it.
+            # Count after the answer is sent, because the caller waits for it.
             seconds = time.perf_counter() - begun
             asyncio.get_running_loop().call_soon(self._metrics.call, method, code, seconds)
 
 
 class Cutoff:
-    """The context of `Call.cutoff`. A class, because each message of a stream goes through one."""
+    """The context manager of `Call.cutoff`; a class for speed, because each message of a stream uses one."""
 
     __slots__ = ("_call", "_task")
 

@@ -1,4 +1,4 @@
-"""Messages to values, checked. What cannot be raises InvalidFieldError."""
+"""Conversion of messages to checked values; InvalidFieldError for invalid ones."""
 
 import math
 import re
@@ -28,13 +28,13 @@ LARGEST_INTEGER = 2**63 - 1
 
 
 class InvalidFieldError(Exception):
-    """A field of a request holds what it cannot hold.
+    """A field of a request has an invalid value.
 
     Attributes:
-        field: its path in the request.
-        row: the row of the points at fault, None where the field as a whole is.
-        value: what it holds.
-        problem: what is wrong with it.
+        field: the path of the field in the request.
+        row: the row of the invalid point, None if the field as a whole is invalid.
+        value: the value.
+        problem: the reason why it is invalid.
     """
 
     def __init__(self, field: str, value: object, problem: str, row: int | None = None) -> None:
@@ -46,45 +46,45 @@ class InvalidFieldError(Exception):
 
 
 def decode_name(name: str, field: str = "name") -> str:
-    """A hull's name."""
+    """The name of a hull."""
     if not NAME.fullmatch(name):
         raise InvalidFieldError(field, name, 'a hull\'s name is 1 to 200 letters, digits and "._-/"')
     return name
 
 
 def decode_producer(producer: str) -> str:
-    """A producer's name, or none."""
+    """The name of a producer, or an empty one."""
     if producer and not NAME.fullmatch(producer):
         raise InvalidFieldError("producer", producer, 'a producer\'s name is 1 to 200 letters, digits and "._-/"')
     return producer
 
 
 def decode_sequence(producer: str, sequence: int) -> int:
-    """A number where there is a producer, 0 where there is none."""
+    """The sequence number of a producer, 0 without a producer."""
     if not producer and sequence:
-        raise InvalidFieldError("sequence", sequence, "only a producer numbers its batches")
+        raise InvalidFieldError("sequence", sequence, "a sequence number needs a producer")
     if producer and not 1 <= sequence <= LARGEST_INTEGER:
-        raise InvalidFieldError("sequence", sequence, f"a producer numbers its batches from 1 to {LARGEST_INTEGER}")
+        raise InvalidFieldError("sequence", sequence, f"a sequence number is from 1 to {LARGEST_INTEGER}")
     return sequence
 
 
 def decode_max_points(config: hull_pb2.HullConfig) -> int:
-    """The limit on the points of a hull to be; as yet there is one identity."""
+    """The limit on the points of a new hull; there is only one identity so far."""
     if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
-        raise InvalidFieldError("config.identity", config.identity, "not an identity this server knows")
+        raise InvalidFieldError("config.identity", config.identity, "not an identity that this server supports")
     if config.max_points > LARGEST_INTEGER:
         raise InvalidFieldError("config.max_points", config.max_points, f"must be at most {LARGEST_INTEGER}")
     return int(config.max_points)
 
 
 def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:
-    """The prefix, the name to begin after, and the size of a page."""
+    """The prefix, the name before the page, and the size of the page."""
     if not NAME_CHARACTERS.fullmatch(request.prefix):
         raise InvalidFieldError("prefix", request.prefix, 'names consist of letters, digits and "._-/"')
     if request.page_token and not (
         NAME.fullmatch(request.page_token) and request.page_token.startswith(request.prefix)
     ):
-        raise InvalidFieldError("page_token", request.page_token, "not a token of a call with this prefix")
+        raise InvalidFieldError("page_token", request.page_token, "not a page token of a call with this prefix")
     if request.page_size < 0:
         raise InvalidFieldError("page_size", request.page_size, "must not be negative")
     return request.prefix, request.page_token, min(request.page_size or DEFAULT_PAGE, LARGEST_PAGE)
@@ -96,10 +96,10 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
     if packed and coordinates:
         raise InvalidFieldError(field, "packed and coordinates", "use one encoding or the other")
     if len(packed) % BYTES_PER_POINT:
-        problem = f"{BYTES_PER_POINT} bytes a point, so the number of bytes must be a multiple of that"
+        problem = f"a point has {BYTES_PER_POINT} bytes, so the number of bytes must be a multiple of that"
         raise InvalidFieldError(f"{field}.packed", f"{len(packed)} bytes", problem)
     if len(coordinates) % 2:
-        problem = "two coordinates a point, so their number must be even"
+        problem = "a point has two coordinates, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
     xy = packed_points(packed) if packed else plain_points(np.array(coordinates, float).reshape(-1, 2))
     if xy is None:
@@ -109,25 +109,27 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
 
 
 def decode_directions(directions: points_pb2.Points) -> Points:
-    """An (n, 2) array of vectors, none of them 0."""
+    """An (n, 2) array of non-zero vectors."""
     vectors = decode_points(directions, "directions")
     _refuse_rows((vectors == 0).all(axis=1), "directions", vectors, "has no direction")
     return vectors
 
 
 def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Points, Points]:
-    """As many origins as targets, each another point than its target."""
+    """Equally many origins and targets, each origin different from its target."""
     origins = decode_points(request.origins, "origins")
     targets = decode_points(request.targets, "targets")
     if len(origins) != len(targets):
-        problem = f"there must be as many as there are origins, {len(origins)}"
+        problem = f"must be as many as the origins, {len(origins)}"
         raise InvalidFieldError("targets", f"{len(targets)} points", problem)
-    _refuse_rows((origins == targets).all(axis=1), "targets", targets, "the same point as the origin: no line")
+    _refuse_rows(
+        (origins == targets).all(axis=1), "targets", targets, "is the same point as the origin, so there is no line"
+    )
     return origins, targets
 
 
 def decode_read(points: points_pb2.Points, field: str, reading: Reading) -> Points:
-    """An (n, 2) array of points that can be read so."""
+    """An (n, 2) array of points that suit the reading."""
     xy = decode_points(points, field)
     _refuse_rows(reading.misfits(xy), field, xy, reading.rule)
     return xy
@@ -152,9 +154,9 @@ def _bad_row(bad: npt.ArrayLike, field: str, xy: Points, problem: str) -> Invali
 
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch:
-    """A batch whose moves have as many destinations as origins."""
+    """A batch whose moves have equally many origins and destinations."""
     if batch.missing_points not in MISSING_POINT_POLICIES:
-        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy this server knows")
+        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy that this server supports")
     inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
     deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
     moves = 0
@@ -163,28 +165,28 @@ def decode_batch(batch: batch_pb2.Batch) -> Batch:
         destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
         moves = len(origins)
         if len(destinations) != moves:
-            problem = f"there must be as many as there are origins, {moves}"
+            problem = f"must be as many as the origins, {moves}"
             raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
         inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
     return Batch(inserts, deletes, moves, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:
-    """A known encoding."""
+    """A supported encoding."""
     if encoding not in points_pb2.PointEncoding.values():
-        raise InvalidFieldError("encoding", encoding, "not an encoding this server knows")
+        raise InvalidFieldError("encoding", encoding, "not an encoding that this server supports")
     return encoding
 
 
 def decode_view(view: hull_service_pb2.HullView) -> bool:
-    """Whether vertices and measures are wanted."""
+    """Whether the view includes vertices and measures."""
     if view not in hull_service_pb2.HullView.values():
-        raise InvalidFieldError("view", view, "not a view this server knows")
+        raise InvalidFieldError("view", view, "not a view that this server supports")
     return view != hull_service_pb2.HULL_VIEW_BASIC
 
 
 def decode_sample_size(size: int) -> int:
-    """How many points at most."""
+    """The largest number of points."""
     if size < 0:
         raise InvalidFieldError("sample_size", size, "must not be negative")
     return min(size or DEFAULT_SAMPLE, LARGEST_SAMPLE)
@@ -192,33 +194,35 @@ def decode_sample_size(size: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """What a watcher holds already."""
+    """The state that a watcher already holds."""
 
     uid: str
     revision: int
 
 
 def decode_resume(request: hull_service_pb2.WatchRequest) -> Resume | None:
-    """What the watcher holds, None where it begins."""
+    """The state that the watcher already holds, None if it holds none."""
     if not request.HasField("resume"):
         return None
     if request.HasField("directions"):
-        raise InvalidFieldError("resume", "resume and directions", "a sketch is sent whole, there is nothing to resume")
+        raise InvalidFieldError(
+            "resume", "resume and directions", "a sketch is always sent as a whole, so it cannot be resumed"
+        )
     if not request.resume.uid:
-        raise InvalidFieldError("resume.uid", "", "which hull is to be resumed? Its uid came with the snapshot")
+        raise InvalidFieldError("resume.uid", "", "a uid is required: use that of the snapshot")
     return Resume(request.resume.uid, request.resume.revision)
 
 
 def decode_rate(events_per_second: float) -> float:
-    """The least number of seconds between two events."""
+    """The least number of seconds between events."""
     if not 0 <= events_per_second < math.inf:
         raise InvalidFieldError("max_events_per_second", events_per_second, "must be finite and not negative")
-    # A rate so low that an event would be a day away is as good as that.
+    # Lower rates are treated as one event per day.
     return min(1 / events_per_second, LONGEST_INTERVAL) if events_per_second else 0.0
 
 
 def decode_interval(request: hull_service_pb2.WatchRequest) -> float | None:
-    """Seconds from an event to a progress mark, None for no marks."""
+    """Seconds without an event before a progress mark, None for no marks."""
     if not request.HasField("progress_interval"):
         return None
     interval = request.progress_interval

@@ -1,4 +1,4 @@
-"""Values to messages."""
+"""Conversion of values to messages."""
 
 from functools import partial
 
@@ -17,7 +17,7 @@ from ..state.hull_state import Counts
 
 
 def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.Points:
-    """Points in the encoding asked for."""
+    """Points in the given encoding."""
     if encoding == points_pb2.POINT_ENCODING_COORDINATES:
         return points_pb2.Points(coordinates=xy.ravel().tolist())
     return points_pb2.Points(packed=np.asarray(xy, "<f8").tobytes())
@@ -38,7 +38,7 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
 
 
 async def encode_measures(vertices: Points, run: Run) -> hull_pb2.Measures:
-    """The measures of the hull with these vertices, a step each."""
+    """The measures of the hull with these vertices, one step per measure."""
     x, y = await run(partial(measure.centroid, vertices))
     min_x, min_y, max_x, max_y = await run(partial(measure.bounds, vertices))
     return hull_pb2.Measures(
@@ -54,7 +54,7 @@ async def encode_measures(vertices: Points, run: Run) -> hull_pb2.Measures:
 
 
 def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
-    """What a batch did, into the message: field by field, which takes half as long as a message to be copied."""
+    """Write the result of a batch into a message, field by field: twice as fast as copying a message."""
     result.revision = applied.revision
     result.inserted = applied.inserted
     result.deleted = applied.deleted
@@ -65,7 +65,7 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
 
 
 def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_service_pb2.WatchResponse:
-    """What a watcher is told, but for measures."""
+    """The message of an event, without measures."""
     message = hull_service_pb2.WatchResponse(revision=event.counts.revision, point_count=event.counts.points)
     match event:
         case Snapshot():
@@ -88,7 +88,7 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
 async def encode_measured_event(
     event: Event, encoding: points_pb2.PointEncoding, run: Run
 ) -> hull_service_pb2.WatchResponse:
-    """What a watcher is told, with the measures of the hull where the event has its vertices."""
+    """The message of an event, with the measures of the hull if the event has its vertices."""
     if isinstance(event, Progress):
         return encode_event(event, encoding)
     message: hull_service_pb2.WatchResponse = await run(partial(encode_event, event, encoding))

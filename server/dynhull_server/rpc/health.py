@@ -1,4 +1,4 @@
-"""Health by gRPC's own protocol, which needs no token: so it must cost nothing."""
+"""Health checks by gRPC's protocol. They need no token, so they must be cheap."""
 
 import asyncio
 import time
@@ -12,19 +12,19 @@ from .calls import Call
 from .places import Places
 from .status import ServiceUnknownError
 
-# A request is a name. gRPC tells no message's size before it has all of it in memory: so of each address one request is
-# read at a time, and what is not there at once is refused.
+# A request is a name. gRPC reads a whole message into memory before its size is known. Therefore only one request per
+# address is read at a time, and a request that does not arrive at once is refused.
 MAX_BYTES = 4096
 READ_SECONDS = 0.025
-# A loop that was late may not have looked for the message: so many times it gets the time again.
+# A delayed event loop may not have read a message that has arrived: it gets the time again, at most this many times.
 LATE = 20
 
 
 class Health:
-    """What is told of each service, and those who are told when it changes.
+    """The status of each service, and the calls that watch it.
 
     Args:
-        places: for calls that wait.
+        places: limits the calls in progress.
     """
 
     def __init__(self, places: Places) -> None:
@@ -34,13 +34,13 @@ class Health:
         self._reading: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
 
     def set(self, status: health_pb2.HealthCheckResponse.ServingStatus, *services: str) -> None:
-        """Tell this of the services from now on."""
+        """Set the status of services."""
         self._statuses.update(dict.fromkeys(services, status))
         self._changed.set()
         self._changed = asyncio.Event()
 
     def stop(self) -> None:
-        """Tell of all services that they do not serve."""
+        """Set all services to NOT_SERVING."""
         self.set(health_pb2.HealthCheckResponse.NOT_SERVING, *self._statuses)
 
     async def check(self, call: Call) -> bytes:
@@ -55,13 +55,13 @@ class Health:
         """The method Watch."""
         with self._places.take(call.owner):
             service = (await self._request(call)).service
-            told = None
+            sent = None
             while True:
                 changed = self._changed
                 status = self._statuses.get(service, health_pb2.HealthCheckResponse.SERVICE_UNKNOWN)
-                if status != told:
+                if status != sent:
                     await call.write(health_pb2.HealthCheckResponse(status=status))
-                told = status
+                sent = status
                 await changed.wait()
 
     async def _request(self, call: Call) -> Any:
@@ -70,7 +70,7 @@ class Health:
             try:
                 for _ in range(LATE):
                     begun = time.monotonic()
-                    # Not `timeout`: a request may be there at the same moment as the time is over.
+                    # Not asyncio.timeout: the request may arrive at the moment when the time is over.
                     await asyncio.wait([reading], timeout=READ_SECONDS)
                     if reading.done():
                         return reading.result()

@@ -1,4 +1,4 @@
-"""HullService: what dynhull.v1 promises, a method an RPC. The contract documents the methods."""
+"""HullService, one method per RPC of dynhull.v1. The .proto files document the methods."""
 
 import time
 from contextlib import aclosing
@@ -25,10 +25,10 @@ class HullService:
     """The service on an engine.
 
     Args:
-        engine: the state.
-        metrics: where work is counted.
-        create_on_write: whether a write to a hull that is not there creates it.
-        max_watch_lag: seconds that a watcher may take for an event.
+        engine: the hulls.
+        metrics: counts the work.
+        create_on_write: whether a write to a missing hull creates it.
+        max_watch_lag: the seconds that a watcher may take to receive an event.
     """
 
     def __init__(self, engine: Engine, metrics: Metrics, *, create_on_write: bool, max_watch_lag: float) -> None:
@@ -109,7 +109,7 @@ class HullService:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
         if not request.producer:
-            raise decode.InvalidFieldError("producer", "", "which producer?")
+            raise decode.InvalidFieldError("producer", "", "a producer is required")
         producer = decode.decode_producer(request.producer)
         last = await self._engine.get(name).last_sequence(producer)
         return pb.GetProducerResponse(last_sequence=last)
@@ -192,7 +192,7 @@ class HullService:
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
         encoding = decode.decode_encoding(request.encoding)
-        # A hull and itself are one, read once.
+        # If both are the same hull, it is read once.
         wanted = {hull: request.min_revision}
         wanted[other] = max(request.other_min_revision, wanted.get(other, 0))
         for each, revision in wanted.items():  # wait for both before reading one
@@ -274,7 +274,7 @@ class HullService:
                         await call.write_within(self._max_watch_lag, message)
 
     def _run(self, rows: int) -> Run:
-        """Where the steps of an answer that looks at so many rows are called."""
+        """The way to run the steps of an answer that reads this many rows."""
         return at_once if rows <= FEW_ROWS else self._engine.aside
 
     # Names
@@ -294,6 +294,8 @@ class HullService:
         with call.cutoff():
             first = await call.read()
         if first is None:
-            raise decode.InvalidFieldError("name", "", "the first message names the hull, and there was none")
+            raise decode.InvalidFieldError(
+                "name", "", "the first message must name the hull, but the call has no message"
+            )
         name = self._written(call, first.name)
         return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)

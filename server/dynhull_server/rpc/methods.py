@@ -1,7 +1,7 @@
-"""The services' methods as gRPC wants them: each through `Calls.serve`, bytes that are no message refused.
+"""The handlers of all methods for gRPC: each runs through `Calls.serve`, and refuses bytes that are no message.
 
-All are handlers of streams, also those of single messages. For these gRPC would read the message before it calls the
-handler, and strangers could fill the memory with what they may not send.
+All of them are stream handlers, even those of single messages: gRPC reads the message of a unary call before it calls
+the handler, so callers without permission could fill the memory.
 """
 
 from collections.abc import Awaitable, Callable, Mapping
@@ -28,17 +28,17 @@ DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
 HEALTH = health_pb2.DESCRIPTOR.services_by_name["Health"]
 REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 
-# A draining server finishes these, and cuts off the other calls.
+# A draining server lets these calls finish, and cuts off the others.
 FINISHED = {"CreateHull", "DeleteHull", "ListHulls", "Apply"}
 
-# What the methods that there are not are counted as.
+# The name of all unknown methods in the counts of calls.
 UNKNOWN_METHOD = "unknown"
 
 Behave = Callable[[Any, Call], Awaitable[Any]]
 
 
 def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
-    """The service of hulls."""
+    """The handlers of the hull service."""
     works = {}
     for method in DESCRIPTOR.methods:
         make = _streaming if method.client_streaming or method.server_streaming else _unary
@@ -47,13 +47,13 @@ def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
 
 
 def health_handlers(health: Health, calls: Calls) -> grpc.GenericRpcHandler:
-    """The service of health, which needs no token."""
+    """The handlers of the health service, which needs no token."""
     works = {"Check": health.check, "Watch": health.watch}
     return _handlers(HEALTH, works, f"{HEALTH.full_name}/", calls, calls.admit_anybody, MAX_BYTES)
 
 
 def reflection_handlers(calls: Calls) -> grpc.GenericRpcHandler:
-    """The service that describes all of them."""
+    """The handlers of reflection, which describes all services."""
     services = [each.full_name for each in (DESCRIPTOR, HEALTH, REFLECTION)]
     servicer = reflection.aio.ReflectionServicer(services)
 
@@ -68,7 +68,7 @@ def reflection_handlers(calls: Calls) -> grpc.GenericRpcHandler:
 
 
 class UnknownMethods(grpc.GenericRpcHandler):
-    """Every other method: refused, and counted as the others are."""
+    """Refuses and counts all other methods."""
 
     def __init__(self, calls: Calls) -> None:
         self._handler: Any = grpc.stream_stream_rpc_method_handler(
@@ -76,7 +76,7 @@ class UnknownMethods(grpc.GenericRpcHandler):
         )
 
     def service(self, _: grpc.HandlerCallDetails) -> Any:
-        """The same for all."""
+        """The handler, the same for all methods."""
         return self._handler
 
 
@@ -94,7 +94,7 @@ def _handlers(
 ) -> grpc.GenericRpcHandler:
     handlers = {}
     for method in service.methods:
-        if method.name not in works:  # a newer release of the service has it
+        if method.name not in works:  # only a newer release of the service has it
             continue
         make: Callable[..., Any] = grpc.stream_unary_rpc_method_handler
         if method.server_streaming:
@@ -140,7 +140,7 @@ def _streaming(method: MethodDescriptor, behave: Behave) -> Work:
 
 
 def _received(kind: type[Message], max_bytes: int) -> Callable[[bytes], Received]:
-    """A deserializer that returns what is wrong: what it raised, gRPC would answer with UNKNOWN."""
+    """A deserializer that returns errors, because gRPC answers raised ones with UNKNOWN."""
 
     def deserialize(data: bytes) -> Received:
         if len(data) > max_bytes:

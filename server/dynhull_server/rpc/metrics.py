@@ -1,4 +1,4 @@
-"""What Prometheus is told."""
+"""The metrics for Prometheus."""
 
 import asyncio
 import heapq
@@ -18,19 +18,19 @@ from ..engine.supervisor import Supervisor
 from .background import background_families
 from .batch_counts import BatchCounts
 
-# Seconds; from a small batch applied at once to one that fills a message.
+# Seconds, from the delay of a small batch to that of a batch that fills a message.
 BUCKETS = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-# Hulls that get lines of their own: the largest. A hundred thousand would be too many for any Prometheus.
+# The number of largest hulls with metrics of their own; for all hulls there would be too many for Prometheus.
 NAMED_HULLS = 100
 # Seconds to wait for the event loop.
 PATIENCE = 5.0
 
 
 class Metrics:
-    """Counters of one server, in a registry of its own.
+    """Counters of one server, in a separate registry.
 
     Attributes:
-        batches: counts of batches, which a StateCollector tells.
+        batches: counts of batches, which a StateCollector exports.
     """
 
     def __init__(self) -> None:
@@ -38,11 +38,11 @@ class Metrics:
         ProcessCollector(registry=self.registry)
         PlatformCollector(registry=self.registry)
         self._calls = Counter(
-            "dynhull_calls", "Calls that have ended, by method and status.", ["method", "code"], registry=self.registry
+            "dynhull_calls", "Completed calls, by method and status.", ["method", "code"], registry=self.registry
         )
         self._durations = Histogram(
             "dynhull_call_duration_seconds",
-            "From the beginning of a call to its end.",
+            "Seconds from the beginning of a call to its end.",
             ["method"],
             buckets=BUCKETS,
             registry=self.registry,
@@ -53,7 +53,7 @@ class Metrics:
         )
         self._verifications = Counter(
             "dynhull_verifications",
-            "Hulls compared with Chan's algorithm, by who asked and what came out.",
+            "Hulls compared with Chan's algorithm, by origin of the request and outcome.",
             ["origin", "outcome"],
             registry=self.registry,
         )
@@ -65,16 +65,16 @@ class Metrics:
         )
         self._scrubbed = Gauge(
             "dynhull_scrub_last_round_timestamp_seconds",
-            "When the scrub had last seen every hull.",
+            "Time when the scrub last completed a round of all hulls.",
             registry=self.registry,
         )
         self._watchers: dict[object, float | None] = {}
         self._ended: dict[tuple[str, str], tuple[Counter, Histogram]] = {}
 
     def call(self, method: str, code: str, seconds: float) -> None:
-        """A call has ended."""
+        """Count a completed call."""
         ended = self._ended.get((method, code))
-        if ended is None:  # finding the labels takes longer than counting
+        if ended is None:  # looking up the labels takes longer than counting
             ended = self._calls.labels(method, code), self._durations.labels(method)
             self._ended[method, code] = ended
         calls, durations = ended
@@ -82,17 +82,17 @@ class Metrics:
         durations.observe(seconds)
 
     def verified(self, origin: str, equal: bool, seconds: float = 0.0) -> None:
-        """A hull has been compared."""
+        """Count a verification."""
         self._verifications.labels(origin, "equal" if equal else "different").inc()
         self._scrub_seconds.inc(seconds)
 
     def scrub_round(self) -> None:
-        """The scrub has seen every hull."""
+        """Record a completed round of the scrub."""
         self._scrubbed.set_to_current_time()
 
     @contextmanager
     def watcher(self) -> Iterator[object]:
-        """A watcher is there; yields what `sending` calls it."""
+        """Count a watcher during the block; yields its handle for `sending`."""
         watcher = object()
         self._watchers[watcher] = None
         try:
@@ -102,7 +102,7 @@ class Metrics:
 
     @contextmanager
     def sending(self, watcher: object, kind: str) -> Iterator[None]:
-        """An event is on its way to the watcher."""
+        """Count an event, and measure how long its watcher takes to receive it."""
         self._watchers[watcher] = time.monotonic()
         yield
         self._watchers[watcher] = None
@@ -110,18 +110,18 @@ class Metrics:
 
     @property
     def watchers(self) -> int:
-        """How many there are."""
+        """The number of watchers."""
         return len(self._watchers)
 
     @property
     def lag(self) -> float:
-        """For how many seconds the slowest watcher has not taken its event."""
+        """The seconds since the slowest watcher was sent an event it has not received yet."""
         now = time.monotonic()
         return max((now - since for since in self._watchers.values() if since is not None), default=0.0)
 
 
 class StateCollector(Collector):
-    """Hulls, watchers and counts of batches at the moment of asking, in other threads than the event loop's."""
+    """Collects hulls, watchers and counts of batches on the event loop, when called from another thread."""
 
     def __init__(
         self, engine: Engine, metrics: Metrics, supervisor: Supervisor, loop: asyncio.AbstractEventLoop
@@ -132,7 +132,7 @@ class StateCollector(Collector):
         self._loop = loop
 
     def collect(self) -> Iterator[Metric]:
-        """Gauges of the state, and the counts."""
+        """The gauges of the state, and the counts."""
         yield from _on(self._loop, self._all)
 
     def _all(self) -> list[Metric]:
@@ -141,12 +141,14 @@ class StateCollector(Collector):
     def _gauges(self) -> list[GaugeMetricFamily]:
         hulls = list(self._engine)
         points = GaugeMetricFamily("dynhull_hull_points", "Points of the largest hulls.", labels=["hull"])
-        vertices = GaugeMetricFamily("dynhull_hull_vertices", "Their vertices when last told.", labels=["hull"])
+        vertices = GaugeMetricFamily(
+            "dynhull_hull_vertices", "Vertices of the largest hulls when last read.", labels=["hull"]
+        )
         for hull in heapq.nlargest(NAMED_HULLS, hulls, key=lambda hull: hull.counts.points):
             points.add_metric([hull.name], hull.counts.points)
             vertices.add_metric([hull.name], hull.vertex_count)
         total = sum(hull.counts.points for hull in hulls)
-        lag = "For how long the slowest watcher has not taken its event."
+        lag = "Seconds since the slowest watcher was sent an event it has not received yet."
         return [
             GaugeMetricFamily("dynhull_hulls", "Hulls.", value=len(hulls)),
             GaugeMetricFamily("dynhull_points", "Points of all hulls.", value=total),

@@ -1,4 +1,4 @@
-"""The page for Prometheus, in threads of its own. It names hulls, so other machines must show who they are."""
+"""The metrics page for Prometheus, in separate threads. It names hulls, so other machines must authenticate."""
 
 import socket
 import ssl
@@ -13,22 +13,22 @@ from prometheus_client.exposition import choose_encoder
 
 from .access import Caller, PermissionDeniedError, UnauthenticatedError
 
-# A connection that does not say what it wants for so many seconds is closed, and so is one beyond so many.
+# A connection that sends no request for this many seconds is closed, and so are more connections than this.
 PATIENCE = 5.0
 MOST_CONNECTIONS = 32
 
 
 class MetricsPage:
-    """Answers from `__init__` until `close`.
+    """Serves the page from `__init__` until `close`.
 
     Args:
         host: the address to listen on.
         port: the port to listen on; 0 for a free one.
-        registry: what is told.
-        bearer: whose token this value of the header Authorization has, or raises UnauthenticatedError; None where
-            no token is asked for.
+        registry: the metrics.
+        bearer: returns the caller for a value of the header Authorization, or raises UnauthenticatedError; None if no
+            token is required.
         tls: the certificates; None for HTTP.
-        refused: called in another thread with the status and the peer of each refused request.
+        refused: called in another thread with the reason, the status and the peer of each refused request.
 
     Attributes:
         port: the port it listens on.
@@ -59,7 +59,7 @@ class MetricsPage:
         self.port = self._server.server_port
 
     def close(self) -> None:
-        """Answer no more."""
+        """Stop serving."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()
@@ -71,10 +71,10 @@ class _Page(BaseHTTPRequestHandler):
     timeout = PATIENCE
 
     def require(self) -> None:
-        """Raise where the caller may not see the page."""
+        """Raise an error if the caller may not see the page."""
 
     def do_GET(self) -> None:
-        """Every path is the page."""
+        """Serve the page under every path."""
         try:
             self.require()
         except (UnauthenticatedError, PermissionDeniedError) as error:
@@ -94,7 +94,7 @@ class _Page(BaseHTTPRequestHandler):
         self.wfile.write(page)
 
     def log_message(self, *_: Any) -> None:
-        """Nothing: Prometheus comes every few seconds."""
+        """Log nothing: Prometheus sends a request every few seconds."""
 
 
 class _Server(ThreadingHTTPServer):
@@ -115,10 +115,10 @@ class _Server(ThreadingHTTPServer):
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         try:
-            if self._tls is not None:  # here, for it waits for the other end
+            if self._tls is not None:  # in this thread, because it waits for the client
                 request.settimeout(PATIENCE)
                 request = self._tls.wrap_socket(request, server_side=True)
-        except OSError:  # the other end is none, or speaks something else
+        except OSError:  # the client has disconnected, or does not use TLS
             self.shutdown_request(request)
         else:
             super().process_request_thread(request, client_address)
@@ -126,4 +126,4 @@ class _Server(ThreadingHTTPServer):
             self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Nothing: the other end has gone."""
+        """Log nothing: the client has disconnected."""

@@ -1,4 +1,4 @@
-"""Places for calls, of which one caller may not take all."""
+"""Limits on the calls in progress, in total and per caller."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -8,12 +8,12 @@ from ..state.errors import LimitExceededError
 
 
 class Places:
-    """At most so many at a time, and at most so many of each owner.
+    """A limited number of places, in total and per owner.
 
     Args:
-        limit: the name of the limit; that of each owner's is the same with "_per_caller".
-        most: how many in all.
-        most_each: how many of one owner.
+        limit: the name of the limit; that per owner has the suffix "_per_caller".
+        most: the limit in total.
+        most_each: the limit per owner.
     """
 
     def __init__(self, limit: str, most: int, most_each: int) -> None:
@@ -25,7 +25,7 @@ class Places:
 
     @contextmanager
     def take(self, owner: str) -> Iterator[None]:
-        """Hold a place, or raise LimitExceededError where there is none."""
+        """Hold a place during the block, or raise LimitExceededError if none is free."""
         if self._taken[owner] >= self._most_each:
             raise LimitExceededError(f"{self._limit}_per_caller", self._most_each)
         if self._all >= self._most:

@@ -1,4 +1,4 @@
-"""What the points of a hull can be read as, beside places in a plane."""
+"""Interpretations of points other than positions in a plane."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from ..state.errors import HullUnsuitableError
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A meaning of points.
+    """An interpretation of points.
 
     Attributes:
-        rule: what they must be, to have it.
-        misfits: which rows of an (n, 2) array are not so.
+        rule: the condition on the points, for error messages.
+        misfits: the rows of an (n, 2) array that violate it, as a mask.
     """
 
     rule: str
     misfits: Callable[[Points], npt.NDArray[np.bool_]]
 
     def require(self, name: str, vertices: Points) -> None:
-        """Raise HullUnsuitableError where the hull with these vertices cannot be read so."""
+        """Raise HullUnsuitableError if one of the vertices violates the rule."""
         misfits = vertices[self.misfits(vertices)]
         if len(misfits):
             x, y = misfits[0].tolist()

@@ -1,4 +1,4 @@
-"""Refusals of strangers in the log, which they must not fill."""
+"""Logging of refused calls, at a limited rate, so that strangers cannot fill the log."""
 
 import asyncio
 import logging
@@ -10,7 +10,7 @@ log = logging.getLogger(__name__)
 
 
 class RefusalLog:
-    """Logs at most LINES refusals in SECONDS, and then how many were left out."""
+    """Logs at most LINES refusals in SECONDS, and the number of those left out."""
 
     def __init__(self) -> None:
         self._since = -SECONDS
@@ -18,7 +18,7 @@ class RefusalLog:
         self._left_out = 0
 
     def add(self, what: str, method: str, code: str, peer: str) -> None:
-        """A call was refused."""
+        """Log a refused call, or count it as left out."""
         now = time.monotonic()
         if now - self._since >= SECONDS:
             self._since, self._lines = now, 0
@@ -31,7 +31,7 @@ class RefusalLog:
         self._left_out += 1
 
     def flush(self) -> None:
-        """Log how many were left out."""
+        """Log the number of refusals left out."""
         if self._left_out:
             log.warning("more calls were refused", extra={"left_out": self._left_out})
             self._left_out = 0

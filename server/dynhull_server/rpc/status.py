@@ -1,4 +1,4 @@
-"""Refusals as gRPC statuses with google.rpc details."""
+"""Conversion of refusals to gRPC statuses with google.rpc details."""
 
 from collections.abc import Mapping
 
@@ -29,22 +29,22 @@ from .decode import InvalidFieldError
 
 DOMAIN = "dynhull.v1"
 HULL_TYPE = "dynhull.v1.Hull"
-# Statuses travel as headers, which have little room.
+# Statuses are sent as headers, whose size is limited.
 LONGEST_VALUE = 120
 
 PART_FIELDS = {"deletes": "batch.deletes", "origins": "batch.moves.origins"}
 
 
 class DrainingError(Exception):
-    """The server is about to stop."""
+    """The server is shutting down."""
 
 
 class StartingError(Exception):
-    """The server is not ready yet."""
+    """The server is starting."""
 
 
 class ServiceUnknownError(RefusedError):
-    """There is no service of that name to ask the health of."""
+    """Health was requested of an unknown service."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"there is no service {_short(name)!r}")
@@ -52,7 +52,7 @@ class ServiceUnknownError(RefusedError):
 
 
 class MethodUnknownError(RefusedError):
-    """There is no such method."""
+    """The method does not exist."""
 
     def __init__(self) -> None:
         super().__init__("there is no such method")
@@ -70,9 +70,9 @@ ANSWERED = (
 
 
 def error_status(error: Exception, batch: int | None = None) -> Status:
-    """The status that tells a client of `error`, one of ANSWERED.
+    """The status for `error`, one of ANSWERED.
 
-    `batch` is how many batches the call has applied before it.
+    `batch` is the number of batches that the call applied before it.
     """
     where = {} if batch is None else {"batch": str(batch)}
     match error:

@@ -1,4 +1,4 @@
-"""Batches of one call, read ahead of the engine and told in order."""
+"""The batches of one call, read ahead of the engine and answered in order."""
 
 import asyncio
 import time
@@ -13,16 +13,16 @@ from . import decode
 from .calls import Call
 from .metrics import Metrics
 
-# While so many points are under way, or so many batches not told of, no more are read, and the client has to wait.
+# While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
 MOST_ROWS = 65_536
 MOST_BATCHES = 1_024
 
 
 def decode_write(request: Any, message_bytes: int, producer: str, owner: str) -> WriteBatch:
-    """The batch of a request, to be decoded when its turn comes; `owner` is who answers for the producer."""
+    """The batch of a request, decoded when it runs; `owner` is the caller that the producer belongs to."""
     batch = request.batch
     return WriteBatch(
-        message_bytes // decode.BYTES_PER_POINT,  # about: to look at the points is to copy them
+        message_bytes // decode.BYTES_PER_POINT,  # an estimate: reading the points would copy them
         lambda: decode.decode_batch(batch),
         producer,
         decode.decode_sequence(producer, request.sequence),
@@ -31,23 +31,23 @@ def decode_write(request: Any, message_bytes: int, producer: str, owner: str) ->
 
 
 class StreamedBatches:
-    """The batches of a call to one hull: one task reads and applies them, its caller tells what they did.
+    """The batches of a call to one hull: a task reads and applies them, and the caller answers them.
 
-    A context manager: it reads inside, and batches that have not begun when it ends are not applied.
+    A context manager: it reads during the block, and batches that have not begun at its end are not applied.
 
     Args:
         call: the call.
         first: its first message, which names the hull and may name a producer.
-        name: the hull's name.
-        engine: where it is.
-        create: whether a hull that is not there is created with its first batch.
-        metrics: where batches are counted.
+        name: the name of the hull.
+        engine: the hulls.
+        create: whether the first batch creates a missing hull.
+        metrics: counts the batches.
 
     Attributes:
-        name: the hull's name.
+        name: the name of the hull.
 
     Raises:
-        HullNotFoundError: there is no such hull, and none is to be created.
+        HullNotFoundError: no hull has that name, and `create` is False.
     """
 
     def __init__(self, call: Call, first: Any, name: str, engine: Engine, metrics: Metrics, *, create: bool) -> None:
@@ -55,7 +55,7 @@ class StreamedBatches:
         self.name = name
         self._producer = decode.decode_producer(first.producer)
         self._metrics = metrics
-        self._news: asyncio.Future[None] | None = None  # while the caller waits for some
+        self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._room = asyncio.Event()
         self._batches = engine.stream(name, self._notify, create=create)
         self._arrivals: deque[float] = deque()
@@ -72,9 +72,9 @@ class StreamedBatches:
         self._batches.close()
 
     async def more(self) -> bool:
-        """Wait until batches have been applied, to be taken with `applied`; False after the last.
+        """Wait until `applied` has batches; False after the last.
 
-        What refuses a batch is raised after the ones before it, DrainingError after those that are under way.
+        The error that refuses a batch is raised after the batches before it, DrainingError after those in flight.
         """
         batches = self._batches
         while not batches.applied:
@@ -90,7 +90,7 @@ class StreamedBatches:
         return True
 
     def applied(self) -> Iterator[tuple[int, Applied]]:
-        """The sequence number of each batch that has been applied, and what it did."""
+        """The sequence number and the result of each batch applied since the last call."""
         applied = self._batches.applied
         while applied:
             sequence, outcome = applied.popleft()
@@ -103,7 +103,7 @@ class StreamedBatches:
             self._news.set_result(None)
 
     async def _read(self) -> None:
-        """Take messages until the last, or until something is wrong with one."""
+        """Read messages until the last, or until an invalid one."""
         try:
             with self._call.cutoff():
                 while True:
@@ -114,17 +114,19 @@ class StreamedBatches:
                     if message is None:
                         return
                     self._take(message)
-        except Exception as failure:  # told after the batches before it
+        except Exception as failure:  # raised after the batches before it are answered
             self._failure = failure
 
     def _take(self, message: Any) -> None:
         if message.name not in ("", self.name):
             raise decode.InvalidFieldError("name", message.name, f"this call writes to {self.name!r}")
         if message.producer not in ("", self._producer):
-            raise decode.InvalidFieldError("producer", message.producer, f"this call's is {self._producer!r}")
+            raise decode.InvalidFieldError(
+                "producer", message.producer, f"the producer of this call is {self._producer!r}"
+            )
         if not message.HasField("batch"):
             if message.sequence:
-                raise decode.InvalidFieldError("sequence", message.sequence, "there is no batch to number")
+                raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")
             return
         request = decode_write(message, self._call.message_bytes, self._producer, self._call.owner)
         self._arrivals.append(time.perf_counter())

@@ -1,4 +1,4 @@
-"""A batch: inserts, deletes and moves that are applied all or none."""
+"""A batch: inserts, deletes and moves that are applied together or not at all."""
 
 from dataclasses import dataclass
 from typing import Literal, cast
@@ -15,7 +15,7 @@ from .errors import PointMissingError
 class Batch:
     """Points as (n, 2) arrays. The last `moves` of each are the origins and the destinations of moves.
 
-    With `count_missing`, points to delete that are not there are passed over and counted.
+    With `count_missing`, deletes of missing points are counted instead of refused.
     """
 
     inserts: Points
@@ -25,13 +25,13 @@ class Batch:
 
     @property
     def growth(self) -> int:
-        """How many more points there are afterwards, at most."""
+        """The largest increase in the number of points."""
         return len(self.inserts) if self.count_missing else len(self.inserts) - len(self.deletes)
 
 
 @dataclass(slots=True)
 class Applied:
-    """What a batch did, and the counts after it. Of a `duplicate`, a revision that has it in it."""
+    """The effect of a batch, and the counts after it. For a `duplicate`, `revision` is one that includes it."""
 
     revision: int
     inserted: int
@@ -43,10 +43,10 @@ class Applied:
 
 
 def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
-    """Apply `batch` to `hull`, as `revision`.
+    """Apply `batch` to `hull` as `revision`.
 
     Raises:
-        PointMissingError: a point to delete is not there, and missing points are not to be counted; nothing changed.
+        PointMissingError: a point to delete is missing, and `count_missing` is False; nothing has changed.
     """
     inserted, to_delete = len(batch.inserts), len(batch.deletes)
     changes = hull.changes
@@ -55,7 +55,7 @@ def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
 
 
 def _apply(hull: DynamicHull, batch: Batch) -> int:
-    """Returns how many points were deleted."""
+    """Returns the number of points deleted."""
     inserts, deletes = batch.inserts, batch.deletes
     missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
     try:
@@ -67,7 +67,7 @@ def _apply(hull: DynamicHull, batch: Batch) -> int:
         ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
         applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
     except MissingPointError as error:
-        row = cast("int", error.row) - len(inserts)  # of a batch there is one
+        row = cast("int", error.row) - len(inserts)  # always given for a batch
         first_origin = len(deletes) - batch.moves
         if row < first_origin:
             raise PointMissingError("deletes", row, error.point) from None

@@ -1,12 +1,12 @@
-"""The core of the server: names, the queue of each hull, and what becomes of commits. `step(event) -> effects`.
+"""The core of the server: names, the queue of each hull, and the outcome of commits. `step(event) -> effects`.
 
-It is synchronous and pure: no threads, clocks or I/O. Whoever drives it hands in one event at a time and carries out
-the effects after the step.
+It is synchronous and pure: no threads, clocks or I/O. The driver passes in one event at a time, and carries out the
+effects after the step.
 
-Each name has a queue. What waits in it goes on one *trip* together: the requests run in the order they came, their
-changes are committed at once, and nobody is told anything before that. So whatever comes during a commit shares the
-next one, and no reader sees what could be taken back. A queue has one trip at a time, and the trip belongs to the
-server: a caller that goes away is not told, and nothing else changes.
+Each name has a queue. The requests that wait in it make one *trip* together: they run in order of arrival, their
+changes are committed in one transaction, and their callers are answered only after the commit. Requests that arrive
+during a commit therefore share the next one, and no reader sees a change that could be undone. A queue has one trip at
+a time. The trip belongs to the server: when a caller disconnects, it is not answered, and nothing else changes.
 """
 
 from functools import partial
@@ -38,12 +38,12 @@ from .events import (
     Gone,
     NotExamined,
     ReadHull,
+    Reply,
     Request,
     Retried,
     Retry,
     Stopping,
     Tick,
-    Told,
     WriteBatch,
 )
 from .hull import Hull
@@ -57,9 +57,9 @@ if TYPE_CHECKING:
 
 # Requests for at most this many points together run at once: a tenth of a millisecond.
 SMALL = 128
-# Points that the requests of one trip look at together, at most, unless one request alone looks at more.
+# The most points that the requests of one trip read or write together, unless a single request exceeds it.
 TRIP_ROWS = 2**18
-# Seconds before the storage is examined again, the first time and at most.
+# Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 
 
@@ -68,11 +68,11 @@ class _Queue:
 
     Attributes:
         name: the name.
-        hull: the hull there is, as committed.
-        trip: what is under way.
-        waiting: what is not.
-        ill: why nothing can be done: a commit failed, and the storage cannot be read.
-        pause: seconds before it is read again.
+        hull: the committed hull of that name, or None.
+        trip: the trip in progress, or None.
+        waiting: the requests for later trips.
+        ill: set while a commit has failed and the storage cannot be read: the error of the last attempt.
+        pause: seconds before the next attempt.
     """
 
     __slots__ = ("hull", "ill", "name", "pause", "trip", "waiting")
@@ -87,7 +87,7 @@ class _Queue:
 
     @property
     def state(self) -> str:
-        """The state of the name: absent, there, creating, deleting or unknown."""
+        """One of absent, there, creating, deleting and unknown."""
         if self.ill is not None or (self.trip is not None and self.trip.failure is not None):
             return "unknown"
         if self.trip is None or self.trip.after is self.hull:
@@ -99,11 +99,11 @@ class Core:
     """All names of a server.
 
     Args:
-        limits: on the state.
-        next_number: greater than the number of every hull there has ever been.
-        now: seconds on a clock that never goes back.
-        immediate: whether a Commit is done when it is carried out, and cannot fail: then nothing is said of it.
-        keeps: whether batches are to be kept at all.
+        limits: the limits on the state.
+        next_number: a number greater than that of any hull ever created.
+        now: seconds on a monotonic clock.
+        immediate: whether a Commit is complete once carried out, and cannot fail: no Committed or Failed follows it.
+        keeps: whether the storage keeps batches.
     """
 
     def __init__(
@@ -142,12 +142,12 @@ class Core:
         }
 
     def step(self, event: Event) -> list[Effect]:
-        """Take up an event. The effects are to be carried out in their order, before the next step."""
+        """Process an event. Carry out the returned effects in order, before the next step."""
         effects: list[Effect] = []
         self._handlers[type(event)](event, effects)
         return effects
 
-    # What is committed
+    # Committed state
 
     @property
     def hulls(self) -> "SortedDict[str, Hull]":
@@ -163,21 +163,21 @@ class Core:
 
     @property
     def busy(self) -> bool:
-        """Whether any trip is under way."""
+        """Whether any trip is in progress."""
         return self._trips > 0
 
     @property
     def ill(self) -> bool:
-        """Whether there is a name about which nothing is known."""
+        """Whether the state of any name is unknown, because the storage cannot be read."""
         return any(queue.ill is not None for queue in self._queues.values())
 
     def state_of(self, name: str) -> str:
-        """The state of a name: absent, there, creating, deleting or unknown."""
+        """The state of a name: one of absent, there, creating, deleting and unknown."""
         queue = self._queues.get(name)
         return "absent" if queue is None else queue.state
 
     def restore(self, row: HullRow, state: HullState, unsaved: int) -> None:
-        """Take up a hull that was kept; before the first step."""
+        """Add a hull that the storage has kept. Call this before the first step."""
         hull = self._hulls[row.name] = Hull(row, state, unsaved)
         self._queues[row.name] = _Queue(row.name, hull)
 
@@ -191,7 +191,7 @@ class Core:
         if queue.trip is None and not self._stopping and not request.abandoned:
             if request.rows <= SMALL and type(request) is ReadHull:
                 self._read(queue, request)
-                effects.append(Told([request]))
+                effects.append(Reply([request]))
             elif self._immediate and queue.hull is not None and request.rows <= SMALL and type(request) is WriteBatch:
                 self._write(queue, queue.hull, request, effects)
             else:
@@ -205,7 +205,7 @@ class Core:
         self._go_on(queue, effects)
 
     def _read(self, queue: _Queue, request: ReadHull) -> None:
-        """A small read of a hull that nothing is done to needs no trip."""
+        """Run a small read. It needs no trip while the queue is idle."""
         hull = queue.hull
         if hull is None or hull is not request.hull:
             request.error = HullNotFoundError(queue.name)
@@ -213,11 +213,11 @@ class Core:
             return
         try:
             request.result = hull.counts, request.function(hull.state)
-        except Exception as error:  # whatever it is, it belongs to the caller
+        except Exception as error:  # any error is the answer to the caller
             request.error = error
 
     def _write(self, queue: _Queue, hull: Hull, request: WriteBatch, effects: list[Effect]) -> None:
-        """A small batch for a hull that is there needs no trip where commits are immediate: in memory most are so."""
+        """Apply a small batch to an existing hull. It needs no trip where commits are immediate, as in memory."""
         if request.stream is not None and request.stream.stopped:
             return
         records: list[Record] | None = [] if self._keeps else None
@@ -226,20 +226,20 @@ class Core:
             if records:
                 effects.append(Commit(None, [Append(hull.row.number, records)]))
             hull.counts = hull.state.counts
-            effects.append(Told([request], None if applied.duplicate else hull))
+            effects.append(Reply([request], None if applied.duplicate else hull))
         elif hull.state.torn:
             trip = queue.trip = Trip(queue.name, hull, [request], self._now, keeps=self._keeps)
             trip.torn = True
             self._trips += 1
             self._ran(queue, trip, effects)
         else:
-            effects.append(Told([request]))
+            effects.append(Reply([request]))
 
     def _gone(self, event: Gone, _: list[Effect]) -> None:
         event.what.leave()
 
     def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
-        """Begin trips with what waits, until one of them takes time."""
+        """Begin trips for the waiting requests, until one of them does not complete at once."""
         while queue.trip is None and queue.waiting:
             if self._stopping:
                 self._refuse_waiting(queue, StoppingError(), effects)
@@ -263,7 +263,7 @@ class Core:
         self._ran(queue, trip, effects)
 
     def _take(self, queue: _Queue) -> tuple[list[Request], int]:
-        """Requests for the next trip: as many as are bounded, and none behind a DeleteHull."""
+        """The requests of the next trip: at most TRIP_ROWS points, and a DeleteHull always alone."""
         waiting, queue.waiting = queue.waiting, []
         requests: list[Request] = []
         rows = 0
@@ -306,11 +306,11 @@ class Core:
         self._keep(queue, trip, effects)
 
     def _end(self, queue: _Queue, trip: Trip, effects: list[Effect], moved: Hull | None) -> None:
-        """The trip is over: tell its callers."""
+        """Complete the trip: answer its callers."""
         requests = trip.requests
         if len(requests) != 1 or requests[0].abandoned:
             requests = [request for request in requests if not request.abandoned]
-        effects.append(Told(requests, moved))
+        effects.append(Reply(requests, moved))
         self._over(queue, trip)
 
     def _over(self, queue: _Queue, trip: Trip) -> None:
@@ -322,7 +322,7 @@ class Core:
             self._creating -= 1
 
     def _rest(self, queue: _Queue) -> None:
-        """Forget the queue of a name without a hull."""
+        """Remove the queue of a name that has neither a hull nor a trip."""
         if queue.hull is None and queue.trip is None:
             del self._queues[queue.name]
 
@@ -334,7 +334,7 @@ class Core:
         self._go_on(queue, effects)
 
     def _keep(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
-        """The changes of the trip are there: everybody may see them."""
+        """Publish the changes of the trip, which are committed."""
         before, after = trip.before, trip.after
         if after is not None:
             after.counts = after.state.counts
@@ -359,41 +359,41 @@ class Core:
         self._go_on(queue, effects)
 
     def _fail(self, queue: _Queue, trip: Trip, error: Exception, effects: list[Effect]) -> None:
-        """Nothing of the trip is kept."""
+        """Handle a trip whose changes were not committed."""
         trip.failure = error
         self._refuse_changes(trip, _not_stored(error), effects)
         if trip.before is not None and (trip.applied or trip.torn):
-            self._examine(trip, effects)  # the batches are in its state
+            self._examine(trip, effects)  # its state in memory includes the batches
         else:
             self._again(queue, trip)
 
     def _refuse_changes(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
-        """Refuse the changes of the trip, and stop the streams they come from."""
+        """Refuse the changes of the trip, and stop the streams that sent them."""
         refused: list[Request] = []
         streams: set[int] = set()
         for request in trip.requests:
             if type(request) is ReadHull:
                 continue
             stream = request.stream if type(request) is WriteBatch else None
-            told_already = stream is not None and id(stream) in streams
-            if not request.abandoned and not told_already:
+            answered = stream is not None and id(stream) in streams
+            if not request.abandoned and not answered:
                 request.result, request.error = None, error
                 refused.append(request)
             request.abandoned = True
             if stream is not None:
                 stream.stopped = True
                 streams.add(id(stream))
-        effects.append(Told(refused))
+        effects.append(Reply(refused))
 
     def _again(self, queue: _Queue, trip: Trip) -> None:
-        """Nothing of the trip was kept: what it read must be read again."""
+        """Repeat the reads of a trip whose changes were not committed."""
         reads = [request for request in trip.requests if type(request) is ReadHull and not request.abandoned]
         for request in reads:
             request.result = request.error = None
         self._over(queue, trip)
         queue.waiting[:0] = reads
 
-    # What the storage has
+    # Examination of the storage
 
     def _examine(self, trip: Trip, effects: list[Effect]) -> None:
         hull = trip.before or trip.after
@@ -403,7 +403,7 @@ class Core:
         effects.append(Examine(trip, row.number, trip.unknown, load))
 
     def _under_way(self, trip: Trip) -> _Queue | None:
-        """The queue of a trip; None where the server is stopping, and did not wait for it."""
+        """The queue of a trip; None where the server is stopping and did not wait for it."""
         queue = self._queues.get(trip.name)
         return queue if queue is not None and queue.trip is trip else None
 
@@ -415,11 +415,11 @@ class Core:
         if trip.unknown and trip.landed(found):
             self._keep(queue, trip, effects)
         elif trip.before is not None and found is None:
-            self._not_examined(NotExamined(trip, LookupError("the storage does not know the hull")), effects)
+            self._not_examined(NotExamined(trip, LookupError("the hull is not in the storage")), effects)
         else:
             if trip.before is not None and found is not None:
                 trip.before.state = found
-            assert trip.failure is not None  # or it would not have been examined
+            assert trip.failure is not None  # a trip is examined only after a failure
             if trip.unknown:
                 self._refuse_changes(trip, _not_stored(trip.failure), effects)
             self._again(queue, trip)
@@ -458,9 +458,9 @@ class Core:
                 stream.stopped = True
             request.error = error
             refused.append(request)
-        effects.append(Told(refused))
+        effects.append(Reply(refused))
 
-    # Time and the end
+    # Time and shutdown
 
     def _tick(self, event: Tick, _: list[Effect]) -> None:
         self._now = event.now
@@ -470,10 +470,10 @@ class Core:
         for queue in list(self._queues.values()):
             if queue.ill is not None and queue.trip is not None:
                 self._abandon(queue, queue.trip, effects)
-            # What waits for a trip is refused after it: the answers of a stream come in their order.
+            # Requests that wait for a trip are refused after it, so that the answers of a stream keep their order.
 
     def _abandon(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
-        """The next start will find out what became of the trip."""
+        """End a trip with an unknown outcome; the next start reads the outcome from the storage."""
         self._over(queue, trip)
         self._go_on(queue, effects)
 
@@ -485,5 +485,5 @@ def _not_stored(error: Exception) -> NotStoredError:
 
 def _ill(error: Exception) -> NotStoredError:
     return NotStoredError(
-        f"the hull's last commit failed, and it cannot be read again yet ({words(error)}): try again later"
+        f"the last commit of the hull failed, and its data cannot be read yet ({words(error)}): try again later"
     )

@@ -1,8 +1,8 @@
-"""What the engine refuses, and why. A refused request has changed nothing."""
+"""The reasons why the engine refuses requests. A refused request has changed nothing."""
 
 
 def words(error: BaseException) -> str:
-    """What went wrong: a MemoryError, for one, has no message."""
+    """The message of an error, or its class name where it has none, as a MemoryError."""
     return str(error) or type(error).__name__
 
 
@@ -11,7 +11,7 @@ class RefusedError(Exception):
 
 
 class HullNotFoundError(RefusedError):
-    """There is no hull of that name."""
+    """No hull has that name."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"there is no hull {name!r}")
@@ -19,34 +19,34 @@ class HullNotFoundError(RefusedError):
 
 
 class HullExistsError(RefusedError):
-    """There is a hull of that name already."""
+    """A hull of that name already exists."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(f"there is a hull {name!r} already")
+        super().__init__(f"the hull {name!r} already exists")
         self.name = name
 
 
 class PointMissingError(RefusedError):
-    """A batch deletes a point which is not there, or not often enough.
+    """A batch deletes a point that the hull does not have, or not that often.
 
     Attributes:
-        part: the part of the batch that names it, "deletes" or "origins".
-        row: its row there.
+        part: the field of the batch that has the point, "deletes" or "origins".
+        row: its row in that field.
         point: its coordinates.
     """
 
     def __init__(self, part: str, row: int, point: tuple[float, float]) -> None:
-        super().__init__(f"{part} row {row}: there is no point {point} to delete; nothing of the batch was applied")
+        super().__init__(f"{part} row {row}: the hull has no point {point} to delete; nothing of the batch was applied")
         self.part = part
         self.row = row
         self.point = point
 
 
 class LimitExceededError(RefusedError):
-    """A request goes beyond one of the server's limits.
+    """A request exceeds one of the server's limits.
 
     Attributes:
-        limit: the limit's name.
+        limit: the name of the limit.
         maximum: its value.
     """
 
@@ -57,23 +57,23 @@ class LimitExceededError(RefusedError):
 
 
 class SequenceGapError(RefusedError):
-    """A producer's batch has a number beyond the next one.
+    """A producer skipped a sequence number.
 
     Attributes:
-        producer: who numbers.
-        sequence: the number.
-        expected: the one that should have come.
+        producer: the name of the producer.
+        sequence: the number sent.
+        expected: the next number.
     """
 
     def __init__(self, producer: str, sequence: int, expected: int) -> None:
-        super().__init__(f"batch {sequence} of producer {producer!r} came where {expected} was expected")
+        super().__init__(f"batch {sequence} of producer {producer!r} arrived, expected {expected}")
         self.producer = producer
         self.sequence = sequence
         self.expected = expected
 
 
 class HullEmptyError(RefusedError):
-    """A question that a hull without points has no answer to."""
+    """The query is undefined for a hull without points."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"the hull {name!r} has no points")
@@ -81,11 +81,11 @@ class HullEmptyError(RefusedError):
 
 
 class HullUnsuitableError(RefusedError):
-    """A question that has no answer for a hull with such a point.
+    """The query is undefined for a hull with a certain point.
 
     Attributes:
-        name: the hull.
-        point: the point.
+        name: the name of the hull.
+        point: the coordinates of the point.
     """
 
     def __init__(self, name: str, point: tuple[float, float], rule: str) -> None:
@@ -95,55 +95,55 @@ class HullUnsuitableError(RefusedError):
 
 
 class RevisionForgottenError(RefusedError):
-    """The hull of that revision is not remembered.
+    """The history no longer has that revision.
 
     Attributes:
         revision: the revision.
-        oldest: the oldest revision remembered.
+        oldest: the oldest revision in the history.
         newest: the newest.
     """
 
     def __init__(self, revision: int, oldest: int, newest: int) -> None:
-        super().__init__(f"revision {revision} is not remembered: the oldest is {oldest}, the newest {newest}")
+        super().__init__(f"revision {revision} is not in the history: the oldest is {oldest}, the newest {newest}")
         self.revision = revision
         self.oldest = oldest
         self.newest = newest
 
 
 class HullReplacedError(RefusedError):
-    """The hull of that name is another one than before.
+    """The hull of that name has been deleted and created again.
 
     Attributes:
         name: the name.
-        uid: the uid of the hull there is now.
+        uid: the uid of the present hull.
     """
 
     def __init__(self, name: str, uid: str) -> None:
-        super().__init__(f"the hull {name!r} is another one than the one resumed, it has the uid {uid}")
+        super().__init__(f"the hull {name!r} was created again since the watch began: its uid is now {uid}")
         self.name = name
         self.uid = uid
 
 
 class NotStoredError(RefusedError):
-    """The storage did not take a change: nothing of it was applied, and it may be sent again."""
+    """The storage failed to keep a change: nothing of it was applied, and it may be sent again."""
 
 
 class DiskFullError(NotStoredError):
-    """There is no room on the disk; nothing of the change was applied."""
+    """The disk is full; nothing of the change was applied."""
 
 
 class OutcomeUnknownError(Exception):
     """The storage failed in the middle of a change: it may have been applied or not.
 
-    Whoever numbers batches finds out by asking for the producer's last number; everybody else, by reading.
+    A caller that numbers its batches can ask for the producer's last number; any other can read the hull.
     """
 
     def __init__(self, reason: str) -> None:
         super().__init__(
-            f"whether this was applied is unknown until the disk can be read again ({reason}): "
-            "ask for the producer's last number, or read, before you send it again"
+            f"it is unknown whether this was applied, until the disk can be read again ({reason}): "
+            "ask for the producer's last number, or read the hull, before you send it again"
         )
 
 
 class StoppingError(Exception):
-    """The server is about to stop; nothing of the request was applied."""
+    """The server is shutting down; nothing of the request was applied."""

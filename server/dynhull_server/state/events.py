@@ -1,4 +1,4 @@
-"""What the core is told, and what it asks for. A ticket is a trip of one hull's work; only the core looks into it."""
+"""Events, the input of the core, and effects, its output. A ticket is a trip; only the core looks into it."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -16,25 +16,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Birth:
-    """Where a new hull comes from: `uid` tells it from others of its name, `created` is in seconds since 1970."""
+    """The origin of a new hull: `uid` distinguishes it from others of its name; `created` is in seconds since 1970."""
 
     uid: str
     created: float
 
 
-# Requests. Each is answered once, by a `Told` that names it, unless it was abandoned.
+# Requests. Each is answered once, by a `Reply` that lists it, unless it was abandoned.
 
 
 @dataclass(slots=True, eq=False)
 class Request:
-    """Something a caller wants done.
+    """A request of a caller.
 
     Attributes:
-        to: who is told; the core does not look at it.
-        rows: about how many points it looks at.
-        result: what came of it, once it is told.
-        error: what refused it, once it is told; None where nothing did.
-        abandoned: whether the caller has gone: it will not be told, and what has not begun is not done.
+        to: the recipient of the answer; the core does not look at it.
+        rows: the approximate number of points it reads or writes.
+        result: the result, once it is answered.
+        error: the reason of a refusal, once it is answered; None where it was not refused.
+        abandoned: whether the caller has disconnected: it is not answered, and the request is dropped if it has not
+            begun.
     """
 
     to: Any
@@ -44,13 +45,13 @@ class Request:
     abandoned: bool = field(default=False, init=False)
 
     def leave(self) -> None:
-        """The caller has gone."""
+        """Record that the caller has disconnected."""
         self.abandoned = True
 
 
 @dataclass(slots=True, eq=False)
 class CreateHull(Request):
-    """Make an empty hull. The result is the Hull."""
+    """Create an empty hull. The result is the Hull."""
 
     name: str
     birth: Birth
@@ -59,23 +60,23 @@ class CreateHull(Request):
 
 @dataclass(slots=True, eq=False)
 class DeleteHull(Request):
-    """Remove a hull."""
+    """Delete a hull."""
 
     name: str
 
 
 @dataclass(slots=True, eq=False)
 class WriteBatch(Request):
-    """Apply a batch, of about `rows` points. The result is what it did.
+    """Apply a batch of about `rows` points. The result is an `Applied`.
 
     Attributes:
-        make: decodes it, and raises what is wrong with it.
-        producer: who numbers it; empty where it is not numbered.
+        make: decodes the batch, and raises an error where it is invalid.
+        producer: the producer that numbers it; empty where it is not numbered.
         sequence: its number.
-        owner: the caller who answers for the producer.
-        name: the hull's; like the rest and `to`, whoever sends the request on its way says it.
-        birth: of the hull, where it is to be made if it is not there; None where that is to be refused.
-        stream: the stream that the batch is part of.
+        owner: the caller that the producer belongs to.
+        name: the name of the hull. The engine sets this, the attributes below and `to`.
+        birth: the origin of the hull, if a missing hull shall be created; None if it shall be refused.
+        stream: the stream that the batch is part of, or None.
     """
 
     to: Any = field(default=None, init=False)
@@ -91,7 +92,7 @@ class WriteBatch(Request):
 
 @dataclass(slots=True, eq=False)
 class ReadHull(Request):
-    """Read a hull. The result is the counts at one revision, and what `function` returned at it."""
+    """Read a hull. The result is the counts at one revision, and the value of `function` at it."""
 
     hull: "Hull"
     function: "Callable[[HullState], Any]"
@@ -99,14 +100,14 @@ class ReadHull(Request):
 
 @dataclass(slots=True, eq=False)
 class Stream:
-    """Batches of one caller to one hull, applied in the order they are asked for.
+    """Batches of one caller to one hull, applied in the order of their requests.
 
-    A batch that is refused stops the stream: nothing after it is applied, and nobody is told of what came after it.
+    A refused batch stops the stream: the batches after it are neither applied nor answered.
 
     Attributes:
-        name: the hull's.
-        hull: the hull, once one batch has been applied to it: it must not become another one.
-        stopped: whether a batch has been refused, or the caller has gone.
+        name: the name of the hull.
+        hull: the hull, once a batch has been applied to it: all later ones must apply to the same hull.
+        stopped: whether a batch has been refused, or the caller has disconnected.
     """
 
     name: str
@@ -114,7 +115,7 @@ class Stream:
     stopped: bool = False
 
     def leave(self) -> None:
-        """The caller has gone."""
+        """Record that the caller has disconnected."""
         self.stopped = True
 
 
@@ -123,14 +124,14 @@ class Stream:
 
 @dataclass(slots=True)
 class Gone:
-    """A caller does not wait any more."""
+    """A caller no longer waits."""
 
     what: Request | Stream
 
 
 @dataclass(slots=True)
 class Computed:
-    """The work of a trip is done."""
+    """A trip has run."""
 
     ticket: "Trip"
 
@@ -153,7 +154,7 @@ class Failed:
 
 @dataclass(slots=True)
 class Examined:
-    """What the storage has of a hull: None where there is none."""
+    """The state of a hull in the storage; None where the storage has no such hull."""
 
     ticket: "Trip"
     state: "HullState | None"
@@ -169,21 +170,21 @@ class NotExamined:
 
 @dataclass(slots=True)
 class Retried:
-    """The pause that the core asked for is over."""
+    """The pause of a Retry is over."""
 
     ticket: "Trip"
 
 
 @dataclass(slots=True)
 class Tick:
-    """Time has passed: seconds on a clock that never goes back."""
+    """The time, in seconds on a monotonic clock."""
 
     now: float
 
 
 @dataclass(slots=True)
 class Stopping:
-    """Begin nothing more."""
+    """The server shuts down: begin no more trips."""
 
 
 Event = Request | Gone | Computed | Committed | Failed | Examined | NotExamined | Retried | Tick | Stopping
@@ -194,14 +195,14 @@ Event = Request | Gone | Computed | Committed | Failed | Examined | NotExamined 
 
 @dataclass(slots=True)
 class Compute:
-    """Call `ticket.run()`, which takes long, away from everything else; then say Computed."""
+    """Call `ticket.run()` on another thread, for it takes long; then send Computed."""
 
     ticket: "Trip"
 
 
 @dataclass(slots=True)
 class Commit:
-    """Keep all of the changes or none; then say Committed or Failed, or nothing where there is no ticket."""
+    """Commit all of the changes or none; then send Committed or Failed, or nothing if there is no ticket."""
 
     ticket: "Trip | None"
     changes: list[Change]
@@ -209,9 +210,9 @@ class Commit:
 
 @dataclass(slots=True)
 class Examine:
-    """Find out what the storage has of a hull; then say Examined, with the state `load` makes of it, or NotExamined.
+    """Read a hull from the storage; then send Examined, with the state that `load` makes of it, or NotExamined.
 
-    With `settle`, a commit with an unknown outcome has to be decided first.
+    With `settle`, decide a commit with an unknown outcome first.
     """
 
     ticket: "Trip"
@@ -222,7 +223,7 @@ class Examine:
 
 @dataclass(slots=True)
 class Retry:
-    """Say Retried after a pause in seconds."""
+    """Send Retried after a pause in seconds."""
 
     ticket: "Trip"
     pause: float
@@ -230,14 +231,14 @@ class Retry:
 
 
 @dataclass(slots=True)
-class Told:
-    """Tell the callers of requests their results or errors, in this order.
+class Reply:
+    """Send the callers of requests their results or errors, in this order.
 
-    First, whoever waits for `moved` may look: it has a new revision, or it is no more.
+    Before that, wake the watchers of `moved`: it has a new revision, or was deleted.
     """
 
     requests: list[Request]
     moved: "Hull | None" = None
 
 
-Effect = Compute | Commit | Examine | Retry | Told
+Effect = Compute | Commit | Examine | Retry | Reply

@@ -1,4 +1,4 @@
-"""Hulls of earlier revisions, for watchers that resume."""
+"""Vertices at earlier revisions, for watchers that resume."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from dynhull.arrays import Points
 
 from .errors import RevisionForgottenError
 
-# What an entry takes beside its vertices, about.
+# The approximate size of an entry beside its vertices.
 ENTRY_BYTES = 300
 
 
 @dataclass(slots=True)
 class Entry:
-    """The vertices from the first of these revisions to the last; `last` is None for as long as the hull stays so."""
+    """The vertices between two revisions, inclusive; `last` is None while the hull has not changed since."""
 
     first: int
     last: int | None
@@ -21,15 +21,14 @@ class Entry:
 
 
 class History:
-    """The vertices somebody has been told, by revision; the oldest are forgotten.
+    """The vertices that have been sent to any client, by revision; the oldest are dropped.
 
-    A watcher resumes from what it was told. So hulls that nobody was told are not kept, and a batch that nobody looks
-    after costs nothing.
+    A watcher resumes from vertices it was sent. Others are not kept, so a batch costs nothing while nobody reads.
 
     Args:
-        most_bytes: how much to remember, about.
-        vertices: the hull at the revision `first`.
-        first: where the history begins.
+        most_bytes: the approximate limit on memory.
+        vertices: the vertices at the revision `first`.
+        first: the first revision of the history.
     """
 
     def __init__(self, most_bytes: int, vertices: Points, first: int = 0) -> None:
@@ -37,23 +36,23 @@ class History:
         self._entries = deque([Entry(first, None, vertices)])
         self._bytes = ENTRY_BYTES
 
-    def told(self, first: int, vertices: Points) -> None:
-        """The hull has these vertices, and has had them since the revision `first`."""
+    def record(self, first: int, vertices: Points) -> None:
+        """Add the present vertices, which the hull has had since the revision `first`."""
         self._entries.append(Entry(first, None, vertices))
         self._bytes += ENTRY_BYTES + vertices.nbytes
         while self._bytes > self._most_bytes and len(self._entries) > 1:
             self._bytes -= ENTRY_BYTES + self._entries.popleft().vertices.nbytes
 
     def changed(self, revision: int) -> None:
-        """The hull is another one from this revision on."""
+        """Record that the vertices have changed at this revision."""
         if self._entries[-1].last is None:
             self._entries[-1].last = revision - 1
 
     def at(self, revision: int, newest: int) -> Points | None:
-        """The vertices at a revision, None where nobody was told them.
+        """The vertices at a revision; None where they were never sent.
 
         Raises:
-            RevisionForgottenError: it is older than all that is remembered, or beyond `newest`, which is now.
+            RevisionForgottenError: the revision is older than the history, or later than `newest`, the present one.
         """
         oldest = self._entries[0].first
         if not oldest <= revision <= newest:

@@ -1,4 +1,4 @@
-"""A hull as everybody sees it: what is committed."""
+"""A hull as clients see it: its committed state."""
 
 from .hull_state import Counts, HullState
 from .records import HullRow
@@ -8,9 +8,9 @@ class Hull:
     """One hull from its creation to its deletion.
 
     Attributes:
-        row: what is kept of it beside its points.
-        state: its points; to be read and changed in its turn only.
-        counts: as of the latest revision that anybody may be told of.
+        row: its identity and settings, as stored.
+        state: its points; read and change them only in a trip of its queue.
+        counts: the counts at the latest committed revision.
         unsaved: points in batches since the last snapshot.
         ended: whether it has been deleted.
     """
@@ -31,10 +31,10 @@ class Hull:
 
     @property
     def uid(self) -> str:
-        """What tells it from other hulls of its name."""
+        """Distinguishes it from other hulls of its name."""
         return self.row.uid
 
     @property
     def vertex_count(self) -> int:
-        """The number of vertices when somebody last looked."""
+        """The number of vertices when they were last read."""
         return self.state.vertex_count

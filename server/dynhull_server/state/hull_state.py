@@ -1,4 +1,4 @@
-"""One hull: its points, its revision, its producers, and the vertices that somebody has been told."""
+"""One hull: its points, its revision, its producers, and the history of its vertices."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from .records import Kept, Record
 if TYPE_CHECKING:
     from .events import WriteBatch
 
-# Batches are replayed together up to this many points: as a set, which is many times faster.
+# Batches are replayed as one set of up to this many points, which is many times faster.
 REPLAYED_TOGETHER = 65_536
 
 
 @dataclass(slots=True)
 class Counts:
-    """How much a hull holds at a revision; `points` with multiplicity."""
+    """The counts of a hull at a revision; `points` with multiplicity."""
 
     revision: int
     points: int
@@ -33,11 +33,11 @@ class Counts:
 
 
 class HullState:
-    """The points of a hull, and what follows from them.
+    """The points of a hull, and the values derived from them.
 
     Attributes:
         hull: the points.
-        counts: as of the last batch.
+        counts: the counts after the last batch.
         torn: whether a batch has been applied in part, because memory ran out in the middle of it.
     """
 
@@ -55,14 +55,14 @@ class HullState:
 
     @property
     def vertex_count(self) -> int:
-        """The number of vertices when somebody last looked."""
+        """The number of vertices when they were last read."""
         return len(self._vertices)
 
     def apply(self, write: "WriteBatch", now: float, records: list[Record] | None) -> Applied:
-        """Apply a batch as the next revision, and put it to the records where there are such.
+        """Apply a batch as the next revision, and append it to `records` unless that is None.
 
         Raises:
-            Exception: what refuses the batch; nothing has changed.
+            Exception: the batch is refused; nothing has changed.
         """
         counts = self.counts
         if write.producer and not self._producers.is_new(write.producer, write.sequence, write.owner, now):
@@ -91,20 +91,20 @@ class HullState:
         return applied
 
     def vertices(self) -> Points:
-        """The vertices; the very same array for as long as the hull has not changed."""
+        """The vertices; the same array object while the hull has not changed."""
         if self._vertices_as_of != self.hull.changes:
             self._vertices = self.hull.vertices()
             self._vertices.setflags(write=False)
             self._vertices_as_of = self.hull.changes
-            self._history.told(self._changed_at, self._vertices)
+            self._history.record(self._changed_at, self._vertices)
         return self._vertices
 
     def earlier_vertices(self, revision: int) -> Points | None:
-        """The vertices at an earlier revision, None where nobody was told them; raises RevisionForgottenError."""
+        """The vertices at an earlier revision, None where they were never sent; raises RevisionForgottenError."""
         return self._history.at(revision, self.counts.revision)
 
     def last_sequence(self, producer: str) -> int:
-        """The last number of a producer that was applied, 0 where there is none."""
+        """The last sequence number applied of a producer, 0 where there is none."""
         return self._producers.last(producer)
 
     def producers(self) -> dict[str, int]:
@@ -116,14 +116,14 @@ EMPTY = Kept(0, np.empty((0, 2)), {}, [])
 
 
 def replayed(kept: Kept) -> DynamicHull:
-    """The hull that a snapshot and the batches after it make. O(n log n)."""
+    """The hull of a snapshot and the batches after it. O(n log n)."""
     hull = DynamicHull(kept.points)
     replay(hull, kept.records)
     return hull
 
 
 def replay(hull: DynamicHull, records: Iterable[Record]) -> None:
-    """Apply batches again, many at a time."""
+    """Apply recorded batches, many at a time."""
     for group in _together(records):
         inserts = np.concatenate([record.inserts for record in group])
         deletes = np.concatenate([record.deletes for record in group])
@@ -140,7 +140,7 @@ def _last_sequences(kept: Kept) -> dict[str, int]:
 
 
 def _together(records: Iterable[Record]) -> Iterable[list[Record]]:
-    """Records that may be applied as one set: none whose deletes depend on what was there at the time."""
+    """Groups of records to apply as one set. A lenient one stays alone: its deletes depend on the points before it."""
     group: list[Record] = []
     rows = 0
     for record in records:

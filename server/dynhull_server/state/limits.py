@@ -1,4 +1,4 @@
-"""How much the state may hold."""
+"""Limits on the state."""
 
 from dataclasses import dataclass
 
@@ -8,11 +8,11 @@ class Limits:
     """Limits on the state; error messages use the field names.
 
     Attributes:
-        max_hulls: hulls at a time.
-        max_points: points of a hull, with multiplicity.
-        max_producers: writers that number their batches, a hull.
-        max_producers_per_caller: how many of those one caller may name, a hull.
-        history_bytes: memory for what watchers may resume from, a hull.
+        max_hulls: the number of hulls.
+        max_points: the number of points per hull, with multiplicity.
+        max_producers: the number of producers (writers that number their batches) per hull.
+        max_producers_per_caller: the number of producers per hull that belong to one caller.
+        history_bytes: the memory per hull for the history that watchers resume from.
     """
 
     max_hulls: int

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from .errors import LimitExceededError, SequenceGapError
 
-# A producer idle for this many seconds is forgotten when another one needs the room.
+# A producer idle for this many seconds may be dropped to make room for another.
 IDLE = 24 * 3600.0
 
 
@@ -20,13 +20,13 @@ class _Producer:
 class Producers:
     """The last sequence number of each producer of one hull.
 
-    A refused batch does not use up its number: whatever the producer had sent after it is a gap, and so refused too.
+    A refused batch does not use its number: later batches of the producer are then a gap, and refused too.
 
     Args:
-        most: how many producers there may be.
-        most_of_one: how many of them may be one caller's.
-        last: the last sequence number of each that is known already.
-        now: seconds on a clock that never goes back.
+        most: the limit on the number of producers.
+        most_of_one: the limit on those of one caller.
+        last: the last sequence number of each known producer.
+        now: seconds on a monotonic clock.
     """
 
     def __init__(self, most: int, most_of_one: int, last: Mapping[str, int], now: float) -> None:
@@ -40,16 +40,16 @@ class Producers:
         return {name: each.last for name, each in self._producers.items()}
 
     def last(self, producer: str) -> int:
-        """The last number applied, 0 for a producer that is not known."""
+        """The last number applied, 0 for an unknown producer."""
         known = self._producers.get(producer)
         return 0 if known is None else known.last
 
     def is_new(self, producer: str, sequence: int, owner: str, now: float) -> bool:
-        """Whether the batch is the next one, False where it has been applied before.
+        """Whether the batch is the next one; False where it has already been applied.
 
         Raises:
-            SequenceGapError: there are batches missing before it.
-            LimitExceededError: there is no room for another producer.
+            SequenceGapError: batches before it are missing.
+            LimitExceededError: the hull has too many producers to add one.
         """
         last = self.last(producer)
         if sequence > last + 1:
@@ -59,7 +59,7 @@ class Producers:
         return sequence > last
 
     def applied(self, producer: str, sequence: int, owner: str, now: float) -> None:
-        """Remember that the batch has been applied."""
+        """Record that the batch has been applied."""
         known = self._producers.get(producer)
         if known is None:
             self._producers[producer] = _Producer(sequence, now, owner)
@@ -69,7 +69,7 @@ class Producers:
         self._producers.move_to_end(producer)
 
     def _make_room(self, owner: str, now: float) -> None:
-        """Forget producers that have been idle for long, where there is no room for another one."""
+        """Drop idle producers where a limit leaves no room for another one."""
         if self._owned[owner] >= self._most_of_one:
             self._forget_idle(now)
             if self._owned[owner] >= self._most_of_one:

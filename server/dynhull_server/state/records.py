@@ -1,4 +1,4 @@
-"""What the state asks the storage to keep: hulls, and the batches applied to them."""
+"""The data that the storage keeps: hulls, and the batches applied to them."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from dynhull.arrays import Points
 
 @dataclass(frozen=True, slots=True)
 class HullRow:
-    """A hull as it is kept.
+    """A hull as stored, without its points.
 
     Attributes:
-        number: its number; a number is never used for another hull.
+        number: its number, never used for another hull.
         name: its name.
-        uid: tells it from other hulls of its name.
+        uid: distinguishes it from other hulls of its name.
         created: seconds since 1970.
         max_points: the limit on its points, 0 for the server's own.
     """
@@ -29,12 +29,12 @@ class Record:
     """One batch, as applied.
 
     Attributes:
-        revision: the revision that it made.
+        revision: the revision after it.
         inserts: (n, 2) points inserted.
         deletes: (m, 2) points deleted.
-        producer: who wrote it; empty for a writer without a name.
-        sequence: the batch's number among the producer's.
-        lenient: whether some of the deletes were passed over, because the point was not there.
+        producer: the producer that numbered it; empty where it has no number.
+        sequence: its number.
+        lenient: whether some of the deletes were ignored because the point was missing.
     """
 
     revision: int
@@ -62,7 +62,7 @@ class Append:
 
 @dataclass(frozen=True, slots=True)
 class Delete:
-    """A hull is gone, with all its batches and snapshots."""
+    """The deletion of a hull with all its batches and snapshots."""
 
     number: int
 
@@ -72,7 +72,7 @@ Change = Create | Append | Delete
 
 @dataclass(slots=True)
 class Kept:
-    """One hull as the storage has it: a snapshot, and the batches after it.
+    """One hull as stored: a snapshot, and the batches after it.
 
     Attributes:
         revision: the revision of the points.

@@ -1,19 +1,20 @@
-"""A few of many points."""
+"""A sample of many points."""
 
 import numpy as np
 
 from dynhull.arrays import Points
 
-# Odd, so that multiplication loses nothing: the golden ratio's fraction and the second constant of MurmurHash3's end.
+# Odd, so that multiplication is invertible: the fraction of the golden ratio, and the second constant of MurmurHash3's
+# finalizer.
 FACTORS = np.array([0x9E3779B97F4A7C15, 0xC4CEB9FE1A85EC53], np.uint64)
 HALF = np.uint64(32)
 
 
 def sample(points: Points, size: int) -> Points:
-    """The `size` points of smallest hash, in the order given, of more than that. O(n).
+    """The `size` points of smallest hash, in their given order; `points` must have more rows. O(n).
 
-    A point that comes or goes changes at most one of the sample, so that a picture of it does not flicker: bottom-k
-    sampling (Cohen and Kaplan, "Summarizing data using bottom-k sketches", 2007).
+    An insert or delete changes at most one point of the sample, so a picture of it does not flicker: bottom-k sampling
+    (Cohen and Kaplan, "Summarizing data using bottom-k sketches", 2007).
     """
     mixed = np.ascontiguousarray(points).view(np.uint64) * FACTORS
     mixed ^= mixed >> HALF

@@ -1,4 +1,4 @@
-"""One trip of a hull's work: requests that run together, and whose changes are committed together."""
+"""One trip of a hull: requests that run together, and whose changes are committed together."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from .records import Append, Change, Create, Delete, HullRow, Record
 
 @dataclass(slots=True)
 class Place:
-    """What a new hull needs: a number, or why there may be no more hulls; and the limits on its state."""
+    """The data for a new hull: its number, the reason if no more hulls are allowed, and the limits on its state."""
 
     number: int
     refusal: Exception | None
@@ -21,23 +21,23 @@ class Place:
 
 
 class Trip:
-    """Runs requests on a hull, in order. The hull as others see it does not change before the trip is committed.
+    """Runs requests on a hull, in order. Clients see the changes only after the trip is committed.
 
     Args:
-        name: the hull's name.
-        hull: the hull there is of that name.
-        requests: what is to be done.
-        now: seconds on a clock that never goes back.
+        name: the name of the hull.
+        hull: the hull of that name, or None.
+        requests: the requests to run.
+        now: seconds on a monotonic clock.
         keeps: whether the storage keeps batches.
 
     Attributes:
-        before: the hull before the trip; None where there was none.
-        after: the hull after it.
+        before: the hull before the trip, or None.
+        after: the hull after it, or None.
         applied: whether any batch was applied.
-        unsaved: points in the batches applied.
-        torn: whether a batch was applied in part: memory ran out in the middle of it.
-        failure: why it could not be committed.
-        unknown: whether it may have been committed all the same.
+        unsaved: the number of points in the batches applied.
+        torn: whether a batch was applied in part, because memory ran out in the middle of it.
+        failure: the error of the commit, or None.
+        unknown: whether it may have been committed despite the failure.
     """
 
     __slots__ = (
@@ -67,24 +67,24 @@ class Trip:
         self._records: list[Record] | None = [] if keeps else None
 
     def may_make(self, place: Place) -> None:
-        """There is no hull; the trip may make one."""
+        """Allow the trip to create the hull, which does not exist."""
         self._place = place
 
     def run(self) -> None:
-        """Do what is requested; results and errors are put into the requests."""
+        """Run the requests; their results and errors are stored in them."""
         for request in self.requests:
             try:
                 if type(request) is WriteBatch:
                     self._write(request)
                 else:
                     request.result = self._do(request)
-            except Exception as error:  # whatever it is, it belongs to the caller
+            except Exception as error:  # any error is the answer to the caller
                 refuse(request, error)
-            if self.torn:  # what comes after would run on a part of a batch
+            if self.torn:  # later requests would see a part of a batch
                 return
 
     def changes(self) -> list[Change]:
-        """What has to be kept."""
+        """The changes to commit."""
         before, after, records = self.before, self.after, self._records
         if after is before:
             return [Append(after.row.number, records)] if records and after is not None else []
@@ -98,7 +98,7 @@ class Trip:
         return changes
 
     def landed(self, found: HullState | None) -> bool:
-        """Whether the trip is committed, given what the storage has of the hull: all changes are kept, or none."""
+        """Whether the trip was committed, given the state of the hull in the storage: it has all changes, or none."""
         if self.after is None:
             return found is None
         return found is not None and found.counts.revision >= self.after.state.counts.revision
@@ -119,7 +119,7 @@ class Trip:
                     raise AssertionError("a hull is deleted in a trip of its own")
                 self.after = None
                 return None
-        raise AssertionError(f"no request: {request}")
+        raise AssertionError(f"not a request: {request}")
 
     def _write(self, request: WriteBatch) -> None:
         stream, hull = request.stream, self.after
@@ -149,20 +149,20 @@ class Trip:
         place, birth = self._place, request.birth
         if place.refusal is not None:
             raise place.refusal
-        assert birth is not None  # or the request would have been refused
+        assert birth is not None  # otherwise the request was refused
         most = request.max_points if type(request) is CreateHull else 0
         row = HullRow(place.number, self.name, birth.uid, birth.created, most)
         return Hull(row, HullState(place.limits, most, EMPTY, self._now))
 
 
 def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:
-    """Apply a batch to a hull; what came of it is put into the request. None where it was refused."""
+    """Apply a batch to a hull, and store the result or the error in the request. None where it was refused."""
     stream = request.stream
     try:
         if stream is not None and stream.hull is not hull and stream.hull is not None:
             raise HullNotFoundError(hull.name)
         request.result = applied = hull.state.apply(request, now, records)
-    except Exception as error:  # whatever it is, it belongs to the caller
+    except Exception as error:  # any error is the answer to the caller
         refuse(request, error)
         return None
     if stream is not None:
@@ -171,7 +171,7 @@ def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | N
 
 
 def refuse(request: Request, error: Exception) -> None:
-    """Answer a request with an error. Nothing that follows it in a stream is applied."""
+    """Store an error in the request, and stop its stream."""
     request.error = error
     if type(request) is WriteBatch and request.stream is not None:
         request.stream.stopped = True

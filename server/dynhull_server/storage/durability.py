@@ -1,14 +1,14 @@
-"""What an acknowledgement promises."""
+"""The durability of acknowledged batches."""
 
 from enum import StrEnum
 
 
 class Durability(StrEnum):
-    """What an acknowledgement promises. A batch is whole or absent in every case.
+    """The durability of acknowledged batches. With each of them a batch is kept as a whole or not at all.
 
-    SYNC: it is on the disk, and survives a power failure. INTERVAL: it survives the end of the process at once, a power
-    failure after a tenth of a second. NONE: it survives the end of the process at once, a power failure when the
-    operating system chooses.
+    SYNC: a batch survives a power failure. INTERVAL: it survives the end of the process, and a power failure after a
+    tenth of a second. NONE: it survives the end of the process, and a power failure once the operating system has
+    written it.
     """
 
     SYNC = "sync"

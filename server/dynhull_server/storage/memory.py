@@ -1,4 +1,4 @@
-"""A storage in memory: for servers that keep nothing, and as the simplest one that fulfils the port."""
+"""A storage in memory: for servers without a data folder, and as the simplest implementation of the port."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ KEPT_SNAPSHOTS = 2
 
 @dataclass(slots=True)
 class _Snapshot:
-    """A step that is a whole snapshot."""
+    """A step: a whole snapshot."""
 
     number: int
     revision: int
@@ -36,7 +36,7 @@ class MemoryStorage:
     """Hulls in memory.
 
     Args:
-        keeps: keep batches and snapshots; otherwise the hulls' rows only, and nothing can be read back.
+        keeps: whether to keep batches and snapshots; without them hulls cannot be read back.
     """
 
     immediate = True
@@ -45,10 +45,10 @@ class MemoryStorage:
         self.keeps = keeps
         self._hulls: dict[int, _Hull] = {}
         self._next_number = 1
-        self._turn = Lock()  # commits and reads may come from different threads
+        self._turn = Lock()  # commits and reads run in different threads
 
     def open(self, progress: Progress) -> Contents:
-        """What is there."""
+        """The hulls."""
         progress(0, len(self._hulls))
         rows = sorted((hull.row for hull in self._hulls.values()), key=lambda row: row.name)
         return Contents(rows, self._next_number, [])
@@ -61,20 +61,20 @@ class MemoryStorage:
                 self._carry_out(change)
 
     def settle(self) -> None:
-        """Every commit is kept: there is nothing to decide."""
+        """Do nothing: the outcome of a commit is never unknown."""
 
     def row(self, number: int) -> HullRow | None:
-        """The hull of that number, None where there is none."""
+        """The hull with that number, or None."""
         hull = self._hulls.get(number)
         return None if hull is None else hull.row
 
     def read(self, number: int, until: int = NEWEST) -> Kept:
-        """A hull as it was at a revision. DamagedError where its batches were not kept."""
+        """A hull at a revision; DamagedError if its batches were not kept."""
         hull = self._hulls[number]
         if not self.keeps:
             raise DamagedError(f"the batches of {hull.row.name} were not kept")
         if until < self.oldest(number):
-            raise DamagedError(f"revision {until} of hull {hull.row.name!r} is not kept any more")
+            raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
         with self._turn:
             base = next((each for each in reversed(hull.snapshots) if each.revision <= until), None)
             if base is None:
@@ -83,7 +83,7 @@ class MemoryStorage:
         return Kept(base.revision, base.points, dict(base.producers), records)
 
     def oldest(self, number: int) -> int:
-        """The oldest revision that `read` can go back to."""
+        """The oldest revision that `read` can return."""
         hull = self._hulls[number]
         if not self.keeps:
             return NEWEST
@@ -95,29 +95,29 @@ class MemoryStorage:
             yield _Snapshot(number, revision, points, dict(producers))
 
     def sweep(self) -> Iterator[Step]:
-        """Nothing is left behind."""
+        """No steps: deletes leave nothing behind."""
         return iter(())
 
     def sync(self) -> None:
-        """There is nothing more durable."""
+        """Do nothing: memory is never durable."""
 
     def checkpoint(self) -> None:
-        """There is nothing to keep."""
+        """Do nothing: memory needs no checkpoints."""
 
     def bytes_used(self) -> int:
-        """None on the disk."""
+        """0: nothing is on the disk."""
         return 0
 
     def close(self) -> None:
-        """Nobody else waits for it."""
+        """Do nothing."""
 
     def _examine(self, changes: Sequence[Change | Step]) -> None:
-        """Raise NotCommittedError where one of them cannot be carried out behind those before it."""
-        last: dict[int, int | None] = {}  # revisions, as the changes make them; None for a hull that they delete
+        """Raise NotCommittedError if one of them cannot be applied after those before it."""
+        last: dict[int, int | None] = {}  # revisions after the changes so far; None for a hull they delete
         for change in changes:
             if isinstance(change, Create):
                 if self._last(change.row.number, last) is not None:
-                    raise NotCommittedError(f"there is a hull {change.row.number} already")
+                    raise NotCommittedError(f"hull {change.row.number} already exists")
                 last[change.row.number] = 0
             elif isinstance(change, Append | Delete):
                 before = self._last(change.number, last)
@@ -132,7 +132,7 @@ class MemoryStorage:
                 last[change.number] = before + len(revisions)
 
     def _last(self, number: int, changed: Mapping[int, int | None]) -> int | None:
-        """The last revision of a hull, None where there is none."""
+        """The last revision of a hull, None if it does not exist."""
         if number in changed:
             return changed[number]
         hull = self._hulls.get(number)

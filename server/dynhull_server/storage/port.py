@@ -1,7 +1,7 @@
-"""The port: what the engine asks of a storage, whatever is behind it.
+"""The port: the interface between the engine and any storage.
 
-Calls block until they are done. One thread commits; reads come from any thread, at any time. A storage starts no
-threads of its own: the engine calls `sync` and `checkpoint`, and carries out the steps of `snapshot` and `sweep`.
+Calls block until they are complete. One thread commits; any thread may read at any time. A storage starts no threads:
+the engine calls `sync` and `checkpoint`, and commits the steps of `snapshot` and `sweep`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,14 +18,14 @@ Progress = Callable[[int, int], None]
 
 
 class StorageError(Exception):
-    """The storage cannot do what it was asked; the message says why and what to do."""
+    """The storage cannot do what was requested; the message says why, and what to do."""
 
 
 class NotCommittedError(StorageError):
-    """A commit has changed nothing, and never will.
+    """A commit has changed nothing, and will not take effect later.
 
     Attributes:
-        full: whether there was no room.
+        full: whether the disk is full.
     """
 
     def __init__(self, message: str, *, full: bool = False) -> None:
@@ -34,29 +34,29 @@ class NotCommittedError(StorageError):
 
 
 class DamagedError(StorageError):
-    """Something that was kept is not what was written."""
+    """Stored data differs from what was written."""
 
 
 class LockedError(StorageError):
-    """Another server works on this storage."""
+    """Another server uses this storage."""
 
 
 class FormatError(StorageError):
-    """A newer version wrote it, or it is another program's."""
+    """The data was written by a newer version, or by another program."""
 
 
 class Step(Protocol):
-    """A part of a snapshot or of a sweep, to be committed as a change; only its storage knows what is in it."""
+    """A part of a snapshot or of a sweep, committed like a change; its content is private to the storage."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What a storage holds when it is opened.
+    """The contents of a storage when it is opened.
 
     Attributes:
-        hulls: in the order of their names.
-        next_number: greater than the number of every hull there has ever been.
-        notes: what was lost or repaired, in words.
+        hulls: the hulls, ordered by name.
+        next_number: a number greater than that of any hull ever created.
+        notes: messages about what was lost or repaired.
     """
 
     hulls: list[HullRow]
@@ -68,78 +68,78 @@ class Storage(Protocol):
     """Keeps hulls.
 
     Attributes:
-        immediate: commits take no time, and cannot fail: they need no thread.
-        keeps: it keeps batches; otherwise it wants to see none.
+        immediate: whether commits take no time and cannot fail, and so need no thread.
+        keeps: whether it keeps batches; if not, it is given none.
     """
 
     immediate: bool
     keeps: bool
 
     def open(self, progress: Progress) -> Contents:
-        """Examine what is there, repair what can be, and take it up. Called once, before everything else.
+        """Examine the data, repair what can be repaired, and load it. Called once, before all other methods.
 
         Raises:
-            LockedError, FormatError: it cannot be used.
-            DamagedError: something acknowledged is lost, and which batches are lost is not certain.
+            LockedError, FormatError: the storage cannot be used.
+            DamagedError: acknowledged batches are lost, and it is uncertain which.
         """
 
     def commit(self, changes: Sequence["Change | Step"]) -> None:
-        """Keep all of the changes or none, as durably as was promised.
+        """Commit all of the changes or none, with the configured durability.
 
-        A change applies to what the ones before it have made. A step of a hull that was deleted changes nothing.
+        Changes apply in order. A step of a deleted hull changes nothing.
 
         Raises:
-            NotCommittedError: none was kept, and none will be found later. Also where a hull is there that is to be
-                created, or is not there, or has not the revision that batches follow.
-            Exception: anything else: whether they are kept is unknown until `settle` has returned.
+            NotCommittedError: none was committed, and none will be found later. Also if a hull to create exists, if a
+                hull to change does not exist, or if batches do not follow its last revision.
+            Exception: any other error: the outcome is unknown until `settle` has returned.
         """
 
     def settle(self) -> None:
-        """After a commit with an unknown outcome: decide it. From then on `read` and `row` tell what it was.
+        """Decide a commit with an unknown outcome. From then on `read` and `row` show the outcome.
 
-        Before, `commit`, `read`, `row` and `oldest` raise StorageError.
+        Until then `commit`, `read`, `row` and `oldest` raise StorageError.
 
         Raises:
-            Exception: it cannot be decided as yet; to be called again later.
+            Exception: it cannot be decided yet; call this again later.
         """
 
     def row(self, number: int) -> HullRow | None:
-        """The hull of that number, None where there is none."""
+        """The hull with that number, or None."""
 
     def read(self, number: int, until: int = NEWEST) -> Kept:
-        """A hull as it was at revision `until`, or at the last one before, as of the last commit.
+        """A hull at revision `until`, or at its last committed revision if that is earlier.
 
         Raises:
-            KeyError: there is no hull of that number.
-            DamagedError: a part that is needed for it is damaged, or not kept any more.
+            KeyError: no hull has that number.
+            DamagedError: the data for that revision is damaged, or no longer kept.
         """
 
     def oldest(self, number: int) -> int:
-        """The oldest revision of a hull that `read` can go back to; KeyError where there is none of that number."""
+        """The oldest revision of a hull that `read` can return; KeyError if no hull has that number."""
 
     def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator["Step"]:
-        """Write a snapshot, then drop what it makes superfluous: each step is to be committed before the next is taken.
+        """Write a snapshot, then drop the rows it supersedes: commit each step before the next is taken.
 
-        A snapshot counts from its last writing step on. Steps are small, so that other commits need not wait for them.
-        Close the iterator of a snapshot that is given up; what it leaves, `sweep` drops. Snapshots of several hulls may
-        be written at the same time.
+        A snapshot is valid from its last writing step on. Steps are small, so that other commits wait only briefly for
+        them. To abandon a snapshot, close its iterator; `sweep` drops the rest of it. Snapshots of several hulls may be
+        written at the same time.
         """
 
     def sweep(self) -> Iterator["Step"]:
-        """Drop what deleted hulls and unfinished snapshots have left, in the same way. One at a time."""
+        """Drop the rows of deleted hulls and unfinished snapshots, in the same way. Run only one sweep at a time."""
 
     def sync(self) -> None:
-        """Make durable what was committed, where commits themselves do not.
+        """Make earlier commits durable, for storages whose commits are not.
 
         Raises:
-            Exception: it is not durable as yet; to be called again later.
+            Exception: they are not durable yet; call this again later.
         """
 
     def checkpoint(self) -> None:
-        """Housekeeping, called a few times a second beside commits. It may fail, and be called again later."""
+        """Housekeeping, called several times per second during commits. It may fail, and is called again later."""
 
     def bytes_used(self) -> int:
-        """What it takes on the disk."""
+        """The size on the disk in bytes."""
 
     def close(self) -> None:
-        """Let others have it. Called once, after everything else has returned."""
+        """Release the storage. Called once, after all other calls have returned."""

@@ -1,4 +1,4 @@
-"""Copies of a data folder, and looks into one, beside a server that may be running on it."""
+"""Copying and checking a data folder, also while a server uses it."""
 
 import os
 import sqlite3
@@ -22,12 +22,12 @@ PAGES_A_STEP = 256
 
 @dataclass(frozen=True, slots=True)
 class HullReport:
-    """One hull of a folder, in words.
+    """A description of one hull in a folder.
 
     Attributes:
         name: its name.
-        summary: what there is of it.
-        whole: whether all of it is as it was written.
+        summary: its revision, rows and snapshots.
+        whole: whether all of its data is intact.
     """
 
     name: str
@@ -37,12 +37,12 @@ class HullReport:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A folder, in words.
+    """A description of a folder.
 
     Attributes:
-        hulls: in the order of their names.
-        notes: what is lost or damaged, and can be served without.
-        fatal: why it cannot be served; empty where it can.
+        hulls: the hulls, ordered by name.
+        notes: losses and damage that do not prevent serving the folder.
+        fatal: the reasons why it cannot be served; empty where it can.
     """
 
     hulls: list[HullReport]
@@ -51,14 +51,14 @@ class Report:
 
 
 def check(path: Path, progress: Progress) -> Report:
-    """Examine everything that a folder holds, and change nothing. A server may be writing to it.
+    """Examine all data of a folder without changing anything. A server may be writing to it.
 
     Args:
         path: a data folder or a backup.
-        progress: called with rows done and rows in all.
+        progress: called with the rows examined so far and the total.
 
     Raises:
-        StorageError: it holds no hulls, or cannot be read at all.
+        StorageError: the folder has no database, or cannot be read at all.
     """
     with _opened(path) as opened:
         findings = examine(opened.connection, opened.version, opened.own, progress)
@@ -66,19 +66,19 @@ def check(path: Path, progress: Progress) -> Report:
 
 
 def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = False) -> Report:
-    """Make a folder with all that another holds, its log included, as of one moment. Returns what is in the copy.
+    """Copy a folder, including its log, as of one moment. Returns a report on the copy.
 
-    A copy has another name until it is whole and on the disk: half of one is never taken for one.
+    The copy has a different file name until it is complete and on the disk, so a partial copy is never used.
 
     Args:
         source: a data folder or a backup; a server may be writing to it.
-        target: the new folder; it may be there, and empty.
-        progress: called with pages done and pages in all.
-        accept_loss: whether to do without what is damaged or missing of the log.
+        target: the new folder; it must be empty if it exists.
+        progress: called with the pages copied so far and the total.
+        accept_loss: whether to copy without the damaged or missing part of the log.
 
     Raises:
-        StorageError: there is no database in the source, or something in the target.
-        DamagedError: what was copied is not whole.
+        StorageError: the source has no database, or the target is not empty.
+        DamagedError: the copied data is damaged.
     """
     with _opened(source, accept_loss=accept_loss) as opened:
         made = _claim(target)
@@ -105,10 +105,10 @@ def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = 
 
 
 def read(path: Path, name: str) -> tuple[Kept, list[str]]:
-    """A hull as of the last commit, and what was lost at the end of the log.
+    """A hull as of the last commit, and messages about losses at the end of the log.
 
     Raises:
-        StorageError: there is no such hull.
+        StorageError: no hull has that name.
         DamagedError: it cannot be read.
     """
     with _opened(path) as opened:
@@ -121,13 +121,13 @@ def read(path: Path, name: str) -> tuple[Kept, list[str]]:
 
 @dataclass(frozen=True, slots=True)
 class _Opened:
-    """A database, inside a transaction that reads.
+    """A database with an open read transaction.
 
     Attributes:
-        connection: to it.
+        connection: the connection to it.
         version: its format.
-        notes: what was lost at the end of its log.
-        own: the totals in its own file, None where a server works on it.
+        notes: messages about losses at the end of its log.
+        own: the totals in its own file, None while a server uses it.
     """
 
     connection: sqlite3.Connection
@@ -137,19 +137,19 @@ class _Opened:
 
 
 def _claim(target: Path) -> bool:
-    """Make the folder for a copy; whether it was not there before."""
+    """Make the folder for a copy; returns whether it is new."""
     if not target.exists():
         target.mkdir(parents=True)
         return True
     if (target / UNFINISHED).exists():
         raise StorageError(f"{target} {UNFINISHED_WORDS}")
     if any(target.iterdir()):
-        raise StorageError(f"{target} is not empty: name a folder that is, or that is not there yet")
+        raise StorageError(f"{target} is not empty: name an empty folder, or one that does not exist yet")
     return False
 
 
 def _make_durable(path: Path) -> None:
-    """A file's content, or the names in a folder."""
+    """Sync the content of a file, or the names in a folder."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -163,37 +163,37 @@ def _opened(path: Path, *, accept_loss: bool = False) -> Iterator[_Opened]:
     with ExitStack() as stack:
         notes: list[str] = []
         own = None
-        # A log that is being written to cannot be examined, and need not be: its server has read it.
+        # A log in use cannot be examined, and need not be: its server has examined it.
         if stack.enter_context(folder.alone()):
             try:
                 notes, own = folder.check_log()
             except DamagedError as error:
                 if not accept_loss:
                     raise
-                notes = [f"done without what is lost: {error}"]
+                notes = [f"copied without what is lost: {error}"]
         if not folder.disk.size(folder.database):
-            raise StorageError(f"{path} holds no hulls: there is no {DATABASE} in it")
-        # Without a log nothing needs to be written beside the database to read it.
+            raise StorageError(f"{path} is no data folder: it has no {DATABASE}")
+        # Without a log, SQLite need not create files to read the database.
         access = Access.READ if folder.disk.size(folder.log) else Access.RAW
         try:
             connection = stack.enter_context(closing(folder.connect(access)))
             connection.execute("BEGIN")
             version = format_of(connection, folder.database)
             if version == 0:
-                raise StorageError(f"{path} holds no hulls")
+                raise StorageError(f"{path} is no data folder: its {DATABASE} is empty")
             yield _Opened(connection, version, notes, own)
         except sqlite3.Error as error:
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
 
 def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
-    """Make a folder of today's format that nobody works on out of copied pages, and examine it."""
+    """Examine copied pages, and turn them into a database of the present format that is marked as not in use."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("BEGIN IMMEDIATE")
     findings = examine(connection, opened.version, opened.own, lambda *_: None)
     report = _report(findings, opened.notes)
     if report.fatal:
-        raise DamagedError(f"it is damaged, so it was not copied: {'; '.join(report.fatal)}")
+        raise DamagedError(f"the data is damaged and was not copied: {'; '.join(report.fatal)}")
     findings.ledger.totals = findings.ledger.totals._replace(mode=STOPPED)
     if opened.version < FORMAT:
         migrate(connection, findings.ledger)

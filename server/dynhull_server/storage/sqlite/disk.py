@@ -1,4 +1,4 @@
-"""Everything that the storage asks of the operating system: a test may put another disk here."""
+"""All calls of the storage to the operating system; a test may substitute another disk."""
 
 import fcntl
 import os
@@ -9,10 +9,10 @@ from typing import IO
 
 
 class Access(StrEnum):
-    """How a database is opened.
+    """The mode in which a database is opened.
 
-    WRITE: to read and to write; it is made where it is missing. READ: nothing is changed, not even when it is closed.
-    RAW: as READ, of the database's file alone, as if it had no log.
+    WRITE: for reading and writing; a missing database is created. READ: nothing is changed, not even on closing. RAW:
+    as READ, but only the database file is read, as if it had no log.
     """
 
     WRITE = "mode=rwc"
@@ -24,11 +24,11 @@ class Disk:
     """The machine's own disk."""
 
     def make(self, folder: Path) -> None:
-        """Make a folder where it is missing."""
+        """Create a folder if it is missing."""
         folder.mkdir(parents=True, exist_ok=True)
 
     def lock(self, file: Path) -> IO[str] | None:
-        """Take a lock, held until the file is closed; None where somebody else holds it."""
+        """Take a lock, held until the file is closed; None if another process holds it."""
         opened = file.open("a")
         try:
             fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -38,14 +38,14 @@ class Disk:
         return opened
 
     def size(self, file: Path) -> int | None:
-        """Bytes of a file, None where there is none. Takes no descriptor."""
+        """The size of a file in bytes, None if it does not exist. Uses no file descriptor."""
         try:
             return file.stat().st_size
         except FileNotFoundError:
             return None
 
     def identity(self, file: Path) -> tuple[int, int] | None:
-        """What tells a file from another one that is put in its place, None where there is none."""
+        """A value that differs for another file under the same name; None if the file does not exist."""
         try:
             stat = file.stat()
         except FileNotFoundError:
@@ -53,7 +53,7 @@ class Disk:
         return stat.st_dev, stat.st_ino
 
     def open(self, file: Path) -> IO[bytes]:
-        """A file to read, or to `sync`."""
+        """Open a file for reading, or for `sync`."""
         return file.open("rb")
 
     def sync(self, file: IO[bytes]) -> None:
@@ -61,6 +61,6 @@ class Disk:
         os.fsync(file.fileno())
 
     def connect(self, database: Path, access: Access) -> sqlite3.Connection:
-        """A connection to a database, for any thread, one at a time."""
+        """A connection to a database, usable from any thread, by one at a time."""
         address = f"{database.absolute().as_uri()}?{access.value}"
         return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=30)

@@ -10,7 +10,7 @@ from dynhull.arrays import Points
 
 from ...state.records import HullRow, Record
 
-# Inserts, deletes, the batch's number among its producer's, length of the producer's name, whether lenient.
+# The numbers of inserts and of deletes, the sequence number, the length of the producer's name, whether lenient.
 HEADER = struct.Struct("<IIQHB")
 POINT_BYTES = 16
 
@@ -27,17 +27,17 @@ def encode(records: Iterable[Record]) -> bytes:
 
 
 def decode(payload: bytes, revision: int) -> Iterator[Record]:
-    """The records of a payload, the first of which made `revision`. ValueError where the bytes are no records."""
+    """The records of a payload; `revision` is that of the first. ValueError if the bytes are no records."""
     position = 0
     while position < len(payload):
         if position + HEADER.size > len(payload):
-            raise ValueError(f"a header is cut at byte {position}")
+            raise ValueError(f"a header is cut short at byte {position}")
         inserts, deletes, sequence, name, lenient = HEADER.unpack_from(payload, position)
         start = position + HEADER.size + name
         middle = start + inserts * POINT_BYTES
         end = middle + deletes * POINT_BYTES
         if end > len(payload):
-            raise ValueError(f"a record is cut at byte {position}")
+            raise ValueError(f"a record is cut short at byte {position}")
         producer = payload[position + HEADER.size : start].decode()
         inserted, deleted = points_from(payload[start:middle]), points_from(payload[middle:end])
         yield Record(revision, inserted, deleted, producer, sequence, bool(lenient))
@@ -45,17 +45,17 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
 
 
 def checksum(payload: bytes, *keys: int) -> int:
-    """CRC-32 of a payload and of where it belongs, so that a row in another's place is noticed too."""
+    """CRC-32 of a payload and its keys, so that a row in the place of another is noticed too."""
     return zlib.crc32(struct.pack(f"<{len(keys)}q", *keys), zlib.crc32(payload))
 
 
 def weight(stored: int, *keys: int) -> int:
-    """What a row of batches adds to the sum of all: of its checksum and of where it belongs, whatever its payload."""
+    """The contribution of a row of batches to the sum of the totals: CRC-32 of its stored checksum and its keys."""
     return checksum(b"", *keys, stored)
 
 
 def hull_checksum(row: HullRow) -> int:
-    """CRC-32 of a hull's row."""
+    """CRC-32 of the row of a hull."""
     text = f"{row.name}\n{row.uid}".encode()
     return checksum(text + struct.pack("<d", row.created), row.number, row.max_points)
 
@@ -66,5 +66,5 @@ def point_bytes(points: Points) -> bytes:
 
 
 def points_from(data: bytes) -> Points:
-    """The points of `point_bytes`."""
+    """The inverse of `point_bytes`."""
     return np.frombuffer(data, dtype="<f8").reshape(-1, 2).astype(np.float64, copy=False)

@@ -1,4 +1,4 @@
-"""Is everything there, and as it was written? And where does it lie?"""
+"""Examination of a database: is all data present and intact, and which rows belong to which hull?"""
 
 import json
 import sqlite3
@@ -20,23 +20,23 @@ from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
 from .schema import APPLICATION_ID, FORMAT, PAGE_BYTES, SCHEMAS, found
 from .totals import Totals, read_totals
 
-MOST_MESSAGES = 5  # of SQLite's own, about one database
+MOST_MESSAGES = 5  # of SQLite's checks
 PROGRESS_ROWS = 1000
 
-MISSING = 0  # no row has this number
+MISSING = 0  # the number of no row
 
 
 @dataclass(slots=True)
 class Findings:
-    """What an examination has found.
+    """The result of an examination.
 
     Attributes:
-        ledger: what is there.
-        fatal: what is lost for certain or perhaps, and cannot be told batch by batch.
-        notes: what is lost or repaired, in words that name it.
-        damaged: the numbers of the hulls that something is wrong with.
-        repairs: what makes the database whole again.
-        both_totals: whether both copies of the totals are whole.
+        ledger: the rows of each hull.
+        fatal: damage that prevents serving the database, because it is uncertain which batches are lost.
+        notes: losses and repairs that are known exactly.
+        damaged: the numbers of the damaged hulls.
+        repairs: the steps that repair the database.
+        both_totals: whether both copies of the totals are intact.
     """
 
     ledger: Ledger = field(default_factory=Ledger)
@@ -47,14 +47,14 @@ class Findings:
     both_totals: bool = True
 
     def blame(self, hull: HullRows, text: str, *, fatal: bool) -> None:
-        """Something is wrong with a hull."""
+        """Record damage to a hull."""
         self.damaged.add(hull.row.number)
         (self.fatal if fatal else self.notes).append(f"hull {hull.row.name!r}: {text}")
 
 
 @dataclass(slots=True)
 class _Scanned:
-    """One hull's rows, as they come."""
+    """The rows of one hull, in the order read."""
 
     rows: HullRows
     lasts: "array[int]" = field(default_factory=lambda: array("q"))
@@ -64,32 +64,32 @@ class _Scanned:
 
 
 def format_of(connection: sqlite3.Connection, database: Path) -> int:
-    """The format of a database, 0 where it is empty.
+    """The format of a database, 0 if it is empty.
 
     Raises:
-        FormatError: it is another program's, or a newer version's.
+        FormatError: it was written by another program, or by a newer version.
     """
     application, version, tables = found(connection)
     if not tables and application == version == 0:
         return 0
     if application != APPLICATION_ID:
-        raise FormatError(f"{database} is the database of another program: choose another folder")
+        raise FormatError(f"{database} belongs to another program: choose another folder")
     if version not in SCHEMAS:
         raise FormatError(
-            f"{database} has format {version}, this server knows formats 1 to {FORMAT}: run the newer version of "
+            f"{database} has format {version}, this version reads formats 1 to {FORMAT}: run the newer version of "
             "dynhull that wrote it"
         )
     return version
 
 
 def examine(connection: sqlite3.Connection, version: int, own: Totals | None, progress: Progress) -> Findings:
-    """Compare everything that a database holds with what its checksums and totals say.
+    """Compare all data of a database with its checksums and totals.
 
     Args:
-        connection: inside a transaction, so that all is of one moment.
-        version: its format.
-        own: the totals in the database's own file, without its log; None where they are not known.
-        progress: called with rows done and rows in all.
+        connection: a connection with an open transaction, so that all data is of one moment.
+        version: the format.
+        own: the totals in the database file, without its log; None if unknown.
+        progress: called with the rows examined so far and the total.
     """
     findings = Findings()
     try:
@@ -107,10 +107,10 @@ def examine(connection: sqlite3.Connection, version: int, own: Totals | None, pr
 
 
 def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
-    """Where everything lies, of a database that was whole when it was opened.
+    """The ledger of a database that was intact when it was opened.
 
     Raises:
-        DamagedError: it is not whole any more.
+        DamagedError: it is damaged.
     """
     findings = Findings()
     if _has_tables(connection, version, findings):
@@ -121,7 +121,7 @@ def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
 
 
 def _has_tables(connection: sqlite3.Connection, version: int, findings: Findings) -> bool:
-    """Whether the tables are those of the format. Otherwise nothing can be read."""
+    """Whether the tables are those of the format; if not, nothing can be read."""
     *_, tables = found(connection)
     if tables != SCHEMAS[version]:
         findings.fatal.append("the tables are not those of this format")
@@ -129,12 +129,12 @@ def _has_tables(connection: sqlite3.Connection, version: int, findings: Findings
 
 
 def _check_structure(connection: sqlite3.Connection, version: int, findings: Findings) -> None:
-    """Whether every page has one use, and is in order: SQLite looks at pages and cells."""
+    """Have SQLite check the structure of pages and cells."""
     settings = {"page_size": PAGE_BYTES, "auto_vacuum": 0, "encoding": "UTF-8"}
     for name, expected in settings.items():
         if connection.execute(f"PRAGMA {name}").fetchone() != (expected,):
             findings.fatal.append(f"the database's header is damaged ({name})")
-    # Format 1 reads by its indexes, so they have to agree with the tables.
+    # Format 1 is read through its indexes, which must agree with the tables.
     check = "quick_check" if version == FORMAT else "integrity_check"
     messages = [text for (text,) in connection.execute(f"PRAGMA {check}({MOST_MESSAGES})")]
     if messages != ["ok"]:
@@ -142,7 +142,7 @@ def _check_structure(connection: sqlite3.Connection, version: int, findings: Fin
 
 
 class _Examination:
-    """Reads every row. Without `contents` payloads and points are left out, and believed."""
+    """Reads every row. Without `contents`, payloads and points are neither read nor checked."""
 
     def __init__(
         self,
@@ -187,10 +187,12 @@ class _Examination:
         totals, self._findings.both_totals = read_totals(self._connection)
         if totals is None:
             self._findings.fatal.append(
-                "both copies of the totals are damaged, so that missing batches would go unseen"
+                "both copies of the totals are damaged, so missing batches could not be noticed"
             )
         elif not self._findings.both_totals:
-            self._findings.notes.append("one of the two copies of the totals was damaged: made anew from the other")
+            self._findings.notes.append(
+                "one of the two copies of the totals was damaged, and was restored from the other"
+            )
         return totals
 
     def _hull_rows(self) -> Iterator[HullRow]:
@@ -213,7 +215,7 @@ class _Examination:
                 scanned.rows.snapshots.append(Snapshot(place, revision if isinstance(revision, int) else 0))
 
     def _chunks(self) -> None:
-        """Fill in where the snapshots' chunks lie."""
+        """Assign the chunks to their snapshots."""
         chunks = {key: snapshot.chunks for each in self._hulls.values() for key, snapshot in each.snapshots.items()}
         column = "points" if self._contents else "NULL"
         query = f"SELECT rowid, snapshot, number, checksum, {column} FROM chunks ORDER BY rowid"  # noqa: S608  (ours)
@@ -264,22 +266,22 @@ class _Examination:
                 self._progress(self._done, self._all)
 
     def _compare(self, totals: Totals | None) -> None:
-        """What there is with what there must be."""
+        """Compare the rows found with the totals."""
         hulls = self._ledger.hulls.values()
         there = Totals(next_number=max([self._next_number, *(number + 1 for number in self._ledger.hulls)]))
         there = there.plus(len(hulls), sum(len(hull.ids) for hull in hulls), sum(hull.sum for hull in hulls))
         self._ledger.totals = totals or there
         if totals is not None and (totals.hulls, totals.batches, totals.sum) != (there.hulls, there.batches, there.sum):
             self._findings.fatal.append(
-                f"there must be {totals.hulls} hulls with {totals.batches} rows of batches, and there are "
-                f"{there.hulls} with {there.batches}, or others: rows are missing, or log and database do not belong "
-                "together"
+                f"the totals record {totals.hulls} hulls with {totals.batches} rows of batches, the tables have "
+                f"{there.hulls} with {there.batches}, or different ones: rows are missing, or log and database do not "
+                "belong together"
             )
         names = Counter(hull.row.name for hull in hulls)
-        self._findings.fatal += [f"{times} hulls are named {name!r}" for name, times in names.items() if times > 1]
+        self._findings.fatal += [f"{times} hulls have the name {name!r}" for name, times in names.items() if times > 1]
 
     def _judge(self, scanned: _Scanned) -> None:
-        """Can the hull's newest revision be read?"""
+        """Determine whether the newest revision of the hull can be read."""
         hull = scanned.rows
         base = self._judge_snapshots(scanned)
         if not (scanned.gaps or scanned.damaged) and (not hull.firsts or hull.firsts[0] <= base + 1):
@@ -296,11 +298,11 @@ class _Examination:
         for row in (np.flatnonzero(firsts[1:] != expected[1:]) + 1).tolist():
             text = f"revisions {expected[row]} to {firsts[row] - 1} are missing"
             if firsts[row] < expected[row]:
-                text = f"revisions {firsts[row]} to {lasts[row - 1]} are there twice"
+                text = f"revisions {firsts[row]} to {lasts[row - 1]} are stored twice"
             if row > needed:
                 self._findings.blame(hull, text, fatal=True)
             else:
-                self._findings.blame(hull, f"{text}, which only looking back needs", fatal=False)
+                self._findings.blame(hull, f"{text}, which only affects resuming from old revisions", fatal=False)
         for row, first in enumerate(firsts.tolist()):
             if first in scanned.damaged:
                 self._judge_damaged(scanned, row, needed, base, f"revisions {first} to {lasts[row]} are damaged")
@@ -308,30 +310,32 @@ class _Examination:
     def _judge_damaged(self, scanned: _Scanned, row: int, needed: int, base: int, text: str) -> None:
         hull = scanned.rows
         if row < needed:
-            self._findings.blame(hull, f"{text}, which only looking back needs", fatal=False)
+            self._findings.blame(hull, f"{text}, which only affects resuming from old revisions", fatal=False)
         elif row + 1 == len(hull.firsts):
             last = max(base, hull.firsts[row] - 1)
-            self._findings.blame(hull, f"{text}: cut off at revision {last}, the last whole one", fatal=False)
+            self._findings.blame(
+                hull, f"{text}: the hull was cut back to revision {last}, the last intact one", fatal=False
+            )
             self._findings.repairs.append(Cut(hull.row.number, last, scanned.damaged[hull.firsts[row]]))
         else:
-            self._findings.blame(hull, f"{text}, and later ones are there", fatal=True)
+            self._findings.blame(hull, f"{text}, and later ones exist", fatal=True)
 
     def _judge_snapshots(self, scanned: _Scanned) -> int:
-        """The revision of the newest whole one, 0 where there is none."""
+        """The revision of the newest intact snapshot, 0 if there is none."""
         hull = scanned.rows
         lost = hull.snapshots[:]
         lost += [snapshot for snapshot in scanned.snapshots.values() if MISSING in snapshot.chunks]
         hull.snapshots += scanned.snapshots.values()
         hull.snapshots.sort(key=lambda snapshot: snapshot.revision)
         for snapshot in lost:
-            text = f"the snapshot at revision {snapshot.revision} is damaged, and is left out"
+            text = f"the snapshot at revision {snapshot.revision} is damaged, and was dropped"
             self._findings.blame(hull, text, fatal=False)
             self._findings.repairs.append(DropSnapshot(hull.row.number, snapshot))
         return max((snapshot.revision for snapshot in hull.snapshots if snapshot not in lost), default=0)
 
 
 def hull_rows(connection: sqlite3.Connection, version: int) -> Iterator[tuple[HullRow, bool]]:
-    """The hulls, and whether each row is as it was written."""
+    """The hulls, and whether each row is intact."""
     if version == FORMAT:
         for *values, stored in connection.execute("SELECT id, name, uid, created, max_points, checksum FROM hulls"):
             row = HullRow(*values)
@@ -342,8 +346,8 @@ def hull_rows(connection: sqlite3.Connection, version: int) -> Iterator[tuple[Hu
         return
     for number, name, created, config in connection.execute("SELECT id, name, created, config FROM hulls"):
         try:
-            told = json.loads(config)
-            yield HullRow(number, name, told["uid"], created, told["config"]["max_points"]), True
+            settings = json.loads(config)
+            yield HullRow(number, name, settings["uid"], created, settings["config"]["max_points"]), True
         except (ValueError, TypeError, KeyError):
             yield HullRow(number, str(name), "", 0.0), False
 

@@ -1,4 +1,4 @@
-"""The folder of a server's data: one SQLite database in WAL mode, its log, and a lock that one process holds."""
+"""The data folder of a server: one SQLite database in WAL mode, its log, and a lock held by one process."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -12,9 +12,9 @@ from .totals import Totals, read_totals
 
 DATABASE = "dynhull.db"
 LOCK = "dynhull.lock"
-# A copy has this name until it is whole.
+# A copy has this name until it is complete.
 UNFINISHED = "unfinished.db"
-UNFINISHED_WORDS = "is a copy that was not finished: remove it, and copy again"
+UNFINISHED_WORDS = "is an unfinished copy: remove it, and copy again"
 
 CACHE_KILOBYTES = 2000
 
@@ -23,11 +23,11 @@ class Folder:
     """A data folder.
 
     Args:
-        path: where it is.
-        disk: what it is on.
+        path: its path.
+        disk: the disk it is on.
 
     Attributes:
-        database: the database's file.
+        database: the database file.
         log: the database's write-ahead log.
     """
 
@@ -39,37 +39,36 @@ class Folder:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Keep others out. LockedError where somebody is in."""
+        """Hold the lock. LockedError if another process holds it."""
         lock = self.disk.lock(self.path / LOCK)
         if lock is None:
             raise LockedError(
-                f"another server, or a command, works on {self.path}: stop it first, or choose another folder "
-                "with --data"
+                f"another server or command uses {self.path}: stop it first, or choose another folder with --data"
             )
         with lock:
             yield
 
     @contextmanager
     def alone(self) -> Iterator[bool]:
-        """Whether no server works on it; none begins before the end of the block."""
+        """Yields whether no server uses the folder; none can start before the end of the block."""
         file = self.path / LOCK
         try:
             lock: AbstractContextManager[object] | None = (
                 self.disk.lock(file) if self.disk.size(file) is not None else nullcontext()
             )
-        except OSError:  # it cannot be written to: no server can work on it
+        except OSError:  # the folder is read-only: no server can use it
             lock = nullcontext()
         with lock or nullcontext():
             yield lock is not None
 
     def connect(self, access: Access) -> sqlite3.Connection:
-        """A connection, which does not believe what the database's header says about caches."""
+        """A connection. The size of its cache is set here, because that in the header could be damaged."""
         connection = self.disk.connect(self.database, access)
         try:
             connection.execute(f"PRAGMA cache_size = -{CACHE_KILOBYTES}")
             connection.execute("PRAGMA cell_size_check = ON")
             connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
-        except UnicodeDecodeError as error:  # SQLite complains with a piece of a damaged schema
+        except UnicodeDecodeError as error:  # SQLite's message quotes a damaged schema
             connection.close()
             raise sqlite3.DatabaseError("malformed database schema") from error
         except BaseException:
@@ -78,12 +77,12 @@ class Folder:
         return connection
 
     def check_log(self) -> tuple[list[str], Totals | None]:
-        """Examine the log before SQLite reads it, while nobody writes.
+        """Examine the log before SQLite reads it, while no process writes.
 
-        Returns what was lost at its end, in words, and the totals in the database's own file.
+        Returns messages about losses at its end, and the totals in the database file itself.
 
         Raises:
-            FormatError: the folder is a copy that was not finished.
+            FormatError: the folder is an unfinished copy.
             DamagedError: acknowledged batches are lost.
         """
         if self.disk.size(self.path / UNFINISHED) is not None:
@@ -93,13 +92,13 @@ class Folder:
         return ([] if note is None else [note]), own
 
     def _own_totals(self) -> Totals | None:
-        """The totals in the database's own file, without its log; None where they cannot be read."""
+        """The totals in the database file, without its log; None if they cannot be read."""
         if not self.disk.size(self.database):
             if self.disk.size(self.log):
-                raise DamagedError(f"{self.database} is missing or empty, and its log is there: restore a backup")
+                raise DamagedError(f"{self.database} is missing or empty, but its log exists: restore a backup")
             return None
         try:
             with closing(self.connect(Access.RAW)) as connection:
                 return read_totals(connection)[0]
         except sqlite3.Error:
-            return None  # of format 1, or damaged: then the examination will say so
+            return None  # format 1, or damaged, which the examination reports

@@ -1,4 +1,4 @@
-"""Where each hull's rows lie, and what there must be: kept in memory, beside the tables it is about."""
+"""The ledger: the row numbers of each hull, and the totals, kept in memory."""
 
 from array import array
 from bisect import bisect_right, insort
@@ -13,9 +13,9 @@ from .encoding import checksum, encode, hull_checksum, weight
 from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
 from .totals import Totals
 
-KEPT = 2  # snapshots a hull; the older one is there in case the newer is damaged
+KEPT = 2  # snapshots per hull; the older one serves if the newer is damaged
 
-# Tables that deleted hulls and unfinished snapshots leave rows in; what takes room in these.
+# The tables in which deleted hulls and unfinished snapshots leave rows, and their largest column.
 DROPPED = {"snapshots": "state", "batches": "payload", "chunks": "points"}
 
 Statement = tuple[str, tuple[Any, ...]]
@@ -23,7 +23,7 @@ Statement = tuple[str, tuple[Any, ...]]
 
 @dataclass(slots=True)
 class Snapshot:
-    """Where a snapshot lies; `chunks` are rows of its points."""
+    """The row numbers of a snapshot; `chunks` are those of its points."""
 
     id: int
     revision: int
@@ -32,15 +32,15 @@ class Snapshot:
 
 @dataclass(slots=True)
 class HullRows:
-    """One hull's rows.
+    """The rows of one hull.
 
     Attributes:
-        row: the hull's own.
-        sum: of the weights of its rows of batches, and the checksum of its own.
-        firsts: for each row of batches the first revision in it, in order.
-        ids: the rows.
+        row: the row of the hull itself.
+        sum: the sum of its checksum and of the weights of its rows of batches.
+        firsts: the first revision in each row of batches, ascending.
+        ids: the numbers of these rows.
         last: the newest revision.
-        snapshots: in the order of their revisions.
+        snapshots: the snapshots, ordered by revision.
     """
 
     row: HullRow
@@ -52,51 +52,51 @@ class HullRows:
 
     @property
     def oldest(self) -> int:
-        """The oldest revision that can be read back."""
+        """The oldest revision that can be read."""
         if len(self.snapshots) >= KEPT:
             return self.snapshots[-KEPT].revision
         complete = not self.snapshots or (len(self.firsts) > 0 and self.firsts[0] == 1)
         return 0 if complete else self.snapshots[0].revision
 
     def copy(self) -> Self:
-        """As it is now."""
+        """A copy of the present state."""
         return replace(self, firsts=self.firsts[:], ids=self.ids[:], snapshots=self.snapshots[:])
 
     def between(self, after: int, until: int) -> "array[int]":
-        """The rows with the revisions after one, until another."""
+        """The rows with the revisions `after` + 1 to `until`."""
         start = max(0, bisect_right(self.firsts, after + 1) - 1)
         return self.ids[start : bisect_right(self.firsts, until)]
 
     def superfluous(self) -> "array[int]":
-        """The rows that nothing which is kept is read from."""
+        """The rows that no readable revision needs."""
         if len(self.snapshots) < KEPT:
             return array("q")
         oldest = self.snapshots[-KEPT].revision
         return self.ids[:] if self.last <= oldest else self.ids[: max(0, bisect_right(self.firsts, oldest + 1) - 1)]
 
     def append(self, first: int, last: int, place: int, weight: int) -> None:
-        """A row of batches has come."""
+        """Add a row of batches."""
         self.firsts.append(first)
         self.ids.append(place)
         self.last = last
         self.sum += weight
 
     def drop(self, rows: int, weights: int) -> None:
-        """The oldest rows of batches have gone."""
+        """Remove the oldest rows of batches."""
         del self.firsts[:rows], self.ids[:rows]
         self.sum -= weights
 
 
 @dataclass(slots=True)
 class Ledger:
-    """All hulls' rows, as of the last commit.
+    """The rows of all hulls, as of the last commit.
 
     Attributes:
-        totals: what there must be.
-        hulls: by number.
-        dead: by table, the rows that belong to nothing any more and are to be dropped.
-        batch_ids, chunk_ids, snapshot_ids: the next. None is used twice while the storage is open: then what was found
-            dead cannot be somebody's by the time it is dropped.
+        totals: the number and the sum of all valid rows.
+        hulls: the hulls by number.
+        dead: by table, the rows to drop because no hull or snapshot needs them.
+        batch_ids, chunk_ids, snapshot_ids: the next numbers. No number is used twice while the storage is open, so a
+            row found dead cannot belong to anything else when it is dropped.
     """
 
     totals: Totals = field(default_factory=Totals)
@@ -107,7 +107,7 @@ class Ledger:
     snapshot_ids: "count[int]" = field(default_factory=lambda: count(1))
 
     def go_on_from(self, before: "Ledger", under_way: Set[int]) -> None:
-        """Take the place of a ledger; chunks of snapshots that are `under_way` are not dead."""
+        """Replace an earlier ledger; chunks of snapshots that are `under_way` are not dead."""
         for name in ("batch_ids", "chunk_ids", "snapshot_ids"):
             setattr(self, name, count(max(next(getattr(self, name)), next(getattr(before, name)))))
         self.dead["chunks"] = array("q", (place for place in self.dead["chunks"] if place not in under_way))
@@ -125,7 +125,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """Step: a snapshot counts from here on."""
+    """Step: makes a snapshot valid."""
 
     number: int
     snapshot: Snapshot
@@ -134,7 +134,7 @@ class Finish:
 
 @dataclass(frozen=True, slots=True)
 class DropSnapshot:
-    """Step: a hull's snapshot is gone; its chunks are dead."""
+    """Step: deletes a snapshot; its chunks become dead."""
 
     number: int
     snapshot: Snapshot
@@ -142,7 +142,7 @@ class DropSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class DropBatches:
-    """Step: a hull's oldest rows of batches are gone; `weights` is the sum of theirs."""
+    """Step: deletes the oldest rows of batches of a hull; `weights` is the sum of their weights."""
 
     number: int
     ids: "array[int]"
@@ -151,7 +151,7 @@ class DropBatches:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Step: a hull's newest row of batches, which is damaged, is gone; it ends at revision `last`."""
+    """Step: deletes the newest row of batches of a hull, which is damaged; the hull ends at revision `last`."""
 
     number: int
     last: int
@@ -160,7 +160,7 @@ class Cut:
 
 @dataclass(frozen=True, slots=True)
 class DropDead:
-    """Step: the first of the dead rows of a table are gone."""
+    """Step: deletes the first dead rows of a table."""
 
     table: str
     ids: "array[int]"
@@ -170,18 +170,18 @@ AnyStep = Chunk | Finish | DropSnapshot | DropBatches | Cut | DropDead
 
 
 class Group:
-    """Changes that are committed together: what the database is to do, and what the ledger will say then.
+    """Changes that are committed together: the statements for the database, and the updates of the ledger.
 
-    The ledger stays as it is until `adopt`: nobody sees what is not committed.
+    The ledger does not change before `adopt`, so no reader sees uncommitted rows.
 
     Attributes:
-        statements: for the database, the totals last.
+        statements: the SQL statements, that for the totals last.
     """
 
     def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
         self._ledger = ledger
         self._totals = ledger.totals
-        # What the group has made of the hulls it has to do with so far.
+        # The hulls it concerns, after the changes so far.
         self._now: dict[int, _Now] = {}
         self._effects: list[Callable[[], object]] = []
         self.statements: list[Statement] = []
@@ -191,7 +191,7 @@ class Group:
         self.statements.append((UPDATE_TOTALS, self._totals.row))
 
     def adopt(self) -> None:
-        """It is committed."""
+        """Update the ledger, after the commit."""
         for effect in self._effects:
             effect()
         self._ledger.totals = self._totals
@@ -220,7 +220,7 @@ class Group:
                 self._drop_dead(change)
 
     def _hull(self, number: int) -> "_Now | None":
-        """A hull as the group has made it so far, None where there is none."""
+        """A hull after the changes so far, None if it does not exist."""
         now = self._now.get(number)
         if now is None and (rows := self._ledger.hulls.get(number)):
             now = self._now[number] = _Now(rows, len(rows.ids), rows.sum, rows.last)
@@ -228,7 +228,7 @@ class Group:
 
     def _create(self, row: HullRow) -> None:
         if self._hull(row.number):
-            raise NotCommittedError(f"there is a hull {row.number} already")
+            raise NotCommittedError(f"hull {row.number} already exists")
         stored = hull_checksum(row)
         rows = HullRows(row, stored)
         self._now[row.number] = _Now(rows, 0, stored, 0)
@@ -257,7 +257,7 @@ class Group:
         self._effects.append(lambda: now.rows.append(first, last, place, each))
 
     def _delete(self, number: int) -> None:
-        """Its batches and snapshots stay for `sweep`: a large hull's would hold up every commit behind this one."""
+        """Delete the row of the hull. `sweep` drops the rest, which for a large hull would delay other commits."""
         now = self._hull(number)
         if now is None:
             raise NotCommittedError(f"there is no hull {number}")
@@ -339,7 +339,7 @@ class Group:
 
 @dataclass(slots=True)
 class _Now:
-    """A hull in the middle of a group: its rows as they will be, `rows` as they are."""
+    """A hull after a part of the changes; `rows` is its present state in the ledger."""
 
     rows: HullRows
     batches: int

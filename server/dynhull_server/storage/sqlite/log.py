@@ -1,12 +1,12 @@
-"""Is the write-ahead log whole? SQLite itself drops everything after a damaged frame, and does not say so.
+"""Examination of the write-ahead log. SQLite itself silently drops all frames after a damaged one.
 
-The format is SQLite's own, https://www.sqlite.org/fileformat2.html, section 4. A frame counts where both of its salts
-are those of the header, and its checksum, which runs on from frame to frame, is right. Behind the last commit may lie
+For the format see https://www.sqlite.org/fileformat2.html, section 4. A frame is valid if both of its salts are those
+of the header and its checksum, which continues from frame to frame, is right. The last commit may be followed by
 
-* frames of an earlier use of the file: both of their salts are others;
-* one commit that did not finish, because the process, the power or the room ended: nobody was told of it.
+* frames of an earlier use of the file, both of whose salts differ;
+* one unfinished commit, because the process ended, the power failed or the disk was full: it was not acknowledged.
 
-Everything else is damage. One salt that differs alone is, too: SQLite would take the rest for an earlier use.
+Everything else is damage, also a frame with only one different salt: SQLite would take it for one of an earlier use.
 """
 
 import struct
@@ -25,35 +25,34 @@ from .disk import Disk
 from .totals import MODES, STOPPED, Totals
 
 HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
-CHECKED_BYTES = 24  # of the header
+CHECKED_BYTES = 24  # of the header, before its checksum
 MAGIC = (0x377F0682, 0x377F0683)  # checksums over little-endian, over big-endian words
 
 REMEDY = "restore a backup, or what is left without the newest commits (dynhull restore --accept-loss)"
 
-# After a power failure, what was not synced may have holes, and whole commits behind them.
+# In these modes, after a power failure the log may have holes followed by intact commits.
 UNSYNCED = (MODES[Durability.INTERVAL], MODES[Durability.NONE])
 
 Words = npt.NDArray[np.uint32]
 
 
 def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
-    """What was lost at the end of the log, in words; None where it is whole, or where there need not be one.
+    """A message about what was lost at the end of the log; None if nothing was, or if no log is needed.
 
     Args:
-        disk: where it is.
+        disk: the disk it is on.
         path: the log.
-        own: the totals in the database's own file, as of the last checkpoint.
+        own: the totals in the database file, as of the last checkpoint.
 
     Raises:
-        DamagedError: the log is not what was written, and acknowledged batches are lost.
+        DamagedError: the log is damaged, and acknowledged batches are lost.
     """
     size = disk.size(path) or 0
     in_use = own is not None and own.mode != STOPPED
     if size < HEADER_BYTES + FRAME_HEADER_BYTES:
         if in_use:
             raise DamagedError(
-                f"{path} is missing or cut short, and the database beside it is incomplete without it: put it back, "
-                f"or {REMEDY}"
+                f"{path} is missing or cut short, and the database is incomplete without it: put it back, or {REMEDY}"
             )
         return None
     with disk.open(path) as file:
@@ -63,24 +62,23 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
         state = _checksum((0, 0), header[:CHECKED_BYTES], order)
         if magic not in MAGIC or state != (sum0, sum1):
             if own is not None and not in_use:
-                return None  # just begun: nobody was told of anything in it
+                return None  # a new log, without acknowledged commits
             raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: {REMEDY}")
         damage = _damage(_frames(file, page_bytes), (salts[0], salts[1]), state, order)
     if damage is None:
         return None
     frame, commits, others_follow = damage
     if others_follow and (own is None or own.mode not in UNSYNCED):
-        raise DamagedError(f"{path}: frame {frame} is damaged, and whole commits follow it: {REMEDY}")
+        raise DamagedError(f"{path}: frame {frame} is damaged, and intact commits follow it: {REMEDY}")
     return (
         f"{path}: the end, from frame {frame} on, is incomplete or damaged and was dropped, with at most "
-        f"{commits or 1} of the newest commits; whoever wrote them was not told that they were kept, unless the disk "
-        "lost them afterwards"
+        f"{commits or 1} of the newest commits; these had not been acknowledged, unless the disk lost them afterwards"
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Frame:
-    """A page as of some commit; `commit` is not 0 in the last frame of one."""
+    """A page as of a commit; `commit` is non-zero in the last frame of a commit."""
 
     header: bytes
     page: bytes
@@ -106,9 +104,9 @@ def _frames(file: IO[bytes], page_bytes: int) -> Iterator[_Frame]:
 def _damage(
     frames: Iterable[_Frame], salts: tuple[int, int], state: tuple[int, int], order: str
 ) -> tuple[int, int, bool] | None:
-    """The first damaged frame, how many commits end in it and behind it, and whether others follow the first of these.
+    """The first damaged frame, the number of commits that end in or after it, and whether intact ones follow the first.
 
-    The frames behind the damaged one are taken for whole where their checksums run on from the one before.
+    A frame after the damaged one counts as intact if its checksum continues that of the frame before.
     """
     damaged: int | None = None
     foreign: int | None = None

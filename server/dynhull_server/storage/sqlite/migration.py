@@ -1,4 +1,4 @@
-"""How a database comes to have the tables of today's format. Each function runs inside a transaction."""
+"""Creation of the tables, and migration from older formats. Each function runs inside a transaction."""
 
 import sqlite3
 
@@ -9,7 +9,7 @@ from .totals import Totals, renew_totals
 
 
 def make_tables(connection: sqlite3.Connection) -> None:
-    """The tables of an empty database."""
+    """Create the tables in an empty database."""
     for sql in TABLES.values():
         connection.execute(sql)
     renew_totals(connection, Totals())
@@ -17,11 +17,11 @@ def make_tables(connection: sqlite3.Connection) -> None:
 
 
 def migrate(connection: sqlite3.Connection, ledger: Ledger) -> None:
-    """Bring a database of format 1 to this one. Batches and snapshots stay where they are.
+    """Migrate a database of format 1. Batches and snapshots are not rewritten.
 
     Args:
-        connection: to the database.
-        ledger: what was found in it.
+        connection: a connection to the database.
+        ledger: its rows.
     """
     for index in ("batches_by_revision", "chunks_by_number"):
         connection.execute(f"DROP INDEX {index}")

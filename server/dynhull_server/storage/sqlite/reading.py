@@ -1,4 +1,4 @@
-"""Reading hulls beside commits, also while there are no file descriptors left."""
+"""Reading hulls during commits, even when the process has run out of file descriptors."""
 
 import json
 import sqlite3
@@ -20,10 +20,10 @@ KEPT_OPEN = 4
 
 
 class Readers:
-    """Connections for reading. Some are always open; more are opened where they can be.
+    """Connections for reading. Some are always open; more are opened when needed and possible.
 
     Args:
-        connect: opens one.
+        connect: opens a connection.
 
     Raises:
         sqlite3.Error: the first ones cannot be opened.
@@ -42,7 +42,7 @@ class Readers:
 
     @contextmanager
     def lend(self) -> Iterator[sqlite3.Connection]:
-        """A connection, in no transaction before and after."""
+        """A connection, without an open transaction before and after."""
         connection = self._take()
         try:
             yield connection
@@ -57,7 +57,7 @@ class Readers:
                 spare.close()
 
     def close(self) -> None:
-        """Close those that nobody has."""
+        """Close the idle connections."""
         for connection in self._idle:
             connection.close()
         self._idle = []
@@ -68,31 +68,31 @@ class Readers:
                 return self._idle.pop()
         try:
             return self._connect()
-        except sqlite3.Error:  # no descriptors: wait for one that is open
+        except sqlite3.Error:  # no file descriptors: wait for an open connection
             with self._returned:
                 self._returned.wait_for(lambda: self._idle)
                 return self._idle.pop()
 
 
 def begin(connection: sqlite3.Connection) -> None:
-    """Fix what the connection sees, until the end of its transaction."""
+    """Begin a read transaction, and fix the commit it reads."""
     connection.execute("BEGIN")
     connection.execute("SELECT id FROM totals").fetchone()
 
 
 def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kept:
-    """A hull as it was at revision `until`, or at the last one before.
+    """A hull at revision `until`, or at its last one if that is earlier.
 
     Args:
-        connection: inside the transaction that `hull` was copied in.
-        hull: where its rows lie.
-        until: a revision.
+        connection: a connection whose transaction was open when `hull` was copied.
+        hull: the rows of the hull.
+        until: the revision.
 
     Raises:
         DamagedError: a row is damaged or missing.
     """
     if until < hull.oldest:
-        raise DamagedError(f"revision {until} of hull {hull.row.name!r} is not kept any more")
+        raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
     try:
         kept = _newest_snapshot(connection, hull, until)
         ids = hull.between(kept.revision, until)
@@ -111,8 +111,8 @@ def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kep
 def rows_by_id(
     connection: sqlite3.Connection, columns: str, table: str, ids: "array[int]"
 ) -> Iterator[tuple[Any, ...]]:
-    """Some columns of rows, in the order of their numbers; those that are not there are left out."""
-    # Numbers as JSON: one query for many rows. A cross join is carried out from left to right.
+    """Some columns of rows, in the order of `ids`; missing rows are left out."""
+    # The numbers as JSON make one query for many rows. SQLite runs a cross join from left to right.
     sql = f"SELECT {columns} FROM json_each(?) AS id CROSS JOIN {table} ON {table}.rowid = id.value"  # noqa: S608  (ours)
     for start in range(0, len(ids), ROWS_A_QUERY):
         yield from connection.execute(sql, (json.dumps(ids[start : start + ROWS_A_QUERY].tolist()),))
@@ -128,7 +128,7 @@ def _newest_snapshot(connection: sqlite3.Connection, hull: HullRows, until: int)
 
 
 def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -> Kept | None:
-    """A snapshot, None where it is damaged."""
+    """A snapshot, None if it is damaged."""
     query = "SELECT state, checksum FROM snapshots WHERE id = ? AND hull = ? AND revision = ? AND chunks = ?"
     keys = snapshot.id, number, snapshot.revision, len(snapshot.chunks)
     row = connection.execute(query, keys).fetchone()

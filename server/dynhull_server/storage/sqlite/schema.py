@@ -1,10 +1,10 @@
-"""The tables, and how older folders come to have them."""
+"""The tables of each format, and the statements to fill them."""
 
 import sqlite3
 
 APPLICATION_ID = 0x64796E68  # "dynh"
 FORMAT = 2
-PAGE_BYTES = 8192  # a batch of many points spans few pages, and wastes half of one
+PAGE_BYTES = 8192  # a large batch spans several pages, and wastes half of one
 
 TABLES = {
     "batches": """CREATE TABLE batches (
@@ -48,7 +48,7 @@ TABLES = {
 )""",
 }
 
-# Format 1 had a blob for what hulls were told at their creation, no totals, and indexes.
+# Format 1 had a blob for the settings of a hull, no totals, and indexes.
 FORMAT_1 = {
     "hulls": """CREATE TABLE hulls (
     id INTEGER PRIMARY KEY,
@@ -73,13 +73,13 @@ UPDATE_TOTALS = "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_nu
 
 
 def found(connection: sqlite3.Connection) -> tuple[int, int, dict[str, str | None]]:
-    """Application id, format and tables of a database."""
+    """The application id, the format and the tables of a database."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     return application, version, dict(connection.execute("SELECT name, sql FROM sqlite_schema"))
 
 
 def stamp(connection: sqlite3.Connection) -> None:
-    """Say whose database it is, and of which format."""
+    """Set the application id and the format."""
     connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
     connection.execute(f"PRAGMA user_version = {FORMAT}")

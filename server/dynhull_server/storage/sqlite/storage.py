@@ -1,12 +1,12 @@
-"""The storage on SQLite: the port's methods, and what the folder needs for them.
+"""The storage on SQLite: an implementation of the port.
 
-Outcomes. A commit that fails before its COMMIT has written no frame with a commit mark, and is rolled back. At COMMIT
-itself SQLite writes the frames in order, the one with the mark last, so a write that fails leaves no whole mark either.
-Everything else that COMMIT may fail with (a sync, no memory, shared memory that cannot grow) can come after the mark: a
-crash now would make the next recovery find the commit, though this process does not see it. `settle` decides it with a
-commit of its own. That one is written either behind the frames in question, if they are part of the log as SQLite sees
-it now, or over them. In the second case the first of them is gone, and with it all: checksums run on from frame to
-frame, so none behind it can be valid. Once it is durable, the outcome is what can be read.
+Outcomes. A commit that fails before its COMMIT has written no frame with a commit mark, and is rolled back. During
+COMMIT SQLite writes the frames in order, the one with the mark last, so a failed write leaves no complete mark either.
+All other errors of COMMIT (a failed sync, no memory, shared memory that cannot grow) may happen after the mark: after a
+crash, the next recovery would find the commit, although this process does not see it. `settle` decides the outcome with
+a commit of its own. SQLite writes it either after the frames in question, if it considers them part of the log, or over
+them. In the second case all of them become invalid, because checksums continue from frame to frame. Once that commit is
+durable, reading shows the outcome.
 """
 
 import json
@@ -53,23 +53,23 @@ from .reading import Readers, begin, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
 from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
-CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays the ones behind it by little
-DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # a step
+CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays later ones only briefly
+DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
 
-CHECKPOINT_BYTES = 16 * 2**20  # of log, before it is copied into the database
-LONGEST_LOG_BYTES = 64 * 2**20  # kept when the log is begun anew
-START_PATIENCE_MS = 1000  # for readers, at the start
-PATIENCE_MS = 10  # for writers and readers, before the log is begun anew; meanwhile no commit begins
+CHECKPOINT_BYTES = 16 * 2**20  # the size of the log that starts a checkpoint
+LONGEST_LOG_BYTES = 64 * 2**20  # a longer log is truncated when it restarts
+START_PATIENCE_MS = 1000  # waiting for readers at the start
+PATIENCE_MS = 10  # waiting for writers and readers before the log restarts; meanwhile no commit begins
 
 SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durability.NONE: "OFF"}
 
-# A write failed: there is no whole frame with a commit mark.
+# A write failed, so no complete frame has a commit mark.
 NOTHING_WRITTEN = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE)
 
 
 @contextmanager
-def _in_words() -> Iterator[None]:
-    """What SQLite raises is a fault of the disk, or of what is on it."""
+def _as_storage_errors() -> Iterator[None]:
+    """Convert errors of SQLite, whose cause is the disk or the data on it, to StorageError."""
     try:
         yield
     except sqlite3.Error as error:
@@ -80,9 +80,9 @@ class SQLiteStorage:
     """Hulls in a folder.
 
     Args:
-        path: the folder, made where it is missing.
-        durability: what a commit promises.
-        disk: what it is on.
+        path: the folder, created if it is missing.
+        durability: the durability of a commit.
+        disk: the disk it is on.
     """
 
     immediate = False
@@ -92,19 +92,19 @@ class SQLiteStorage:
         self._folder = Folder(path, disk or Disk())
         self._durability = durability
         self._ledger = Ledger()
-        self._visible = Lock()  # held while what is committed and what the ledger says may differ
+        self._visible = Lock()  # held while the ledger may differ from the committed rows
         self._unsettled = False
         self._writer: sqlite3.Connection | None = None
         self._housekeeping = Lock()
         self._log_in_doubt = False
         self._gone: Path | None = None
-        self._under_way: dict[int, set[int]] = {}  # chunks of snapshots that are being written
+        self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._open = ExitStack()
 
     # Opening and closing
 
     def open(self, progress: Progress) -> Contents:
-        """Examine the folder, repair what can be, and take it up."""
+        """Examine the folder, repair what can be repaired, and load it."""
         self._folder.disk.make(self._folder.path)
         with ExitStack() as stack:
             stack.enter_context(self._folder.held())
@@ -114,9 +114,9 @@ class SQLiteStorage:
                 if findings.fatal:
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
-                self._take_up(findings, version)
+                self._load(findings, version)
                 self._checkpointer = stack.enter_context(closing(self._folder.connect(Access.WRITE)))
-                self._begin_log_anew(own)
+                self._restart_log(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
                 self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
                 self._files = {
@@ -126,16 +126,18 @@ class SQLiteStorage:
                 raise StorageError(f"{self._folder.database} cannot be opened: {error}") from error
             except sqlite3.Error as error:
                 raise DamagedError(
-                    f"{self._folder.database} is no readable database ({error}): restore a backup"
+                    f"{self._folder.database} cannot be read as a database ({error}): restore a backup"
                 ) from error
             self._open = stack.pop_all()
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
-        return Contents(rows, self._ledger.totals.next_number, notes + [self._word(note) for note in findings.notes])
+        return Contents(
+            rows, self._ledger.totals.next_number, notes + [self._prefixed(note) for note in findings.notes]
+        )
 
     def close(self) -> None:
-        """Let others have the folder."""
+        """Release the folder."""
         if not self._unsettled and self._writer is not None:
-            # Where there is no room for it, the folder is taken for a killed server's, and its log stays.
+            # On a full disk the folder stays marked as in use, as if the server had been killed, and its log remains.
             with suppress(sqlite3.Error, StorageError, MemoryError):
                 self._writer.execute("PRAGMA synchronous = FULL")
                 self._write(Group(self._in_mode(STOPPED), []))
@@ -144,24 +146,24 @@ class SQLiteStorage:
 
     # Committing
 
-    @_in_words()
+    @_as_storage_errors()
     def commit(self, changes: Sequence[Change | Step]) -> None:
-        """Keep all of the changes or none."""
+        """Commit all of the changes or none."""
         if self._unsettled:
-            raise StorageError("the outcome of the commit before is not known yet")
+            raise StorageError("the outcome of the previous commit is not known yet")
         if self._gone is not None:
             raise NotCommittedError(_gone(self._gone))
         try:
-            group = Group(self._ledger, changes)  # type: ignore[arg-type]  # steps are ours
+            group = Group(self._ledger, changes)  # type: ignore[arg-type]  # all steps come from this class
         except NotCommittedError:
             raise
-        except Exception as error:  # a value that has no place in a row, or no memory
+        except Exception as error:  # a value that does not fit a column, or no memory
             raise _not_committed(error) from error
         self._write(group)
 
-    @_in_words()
+    @_as_storage_errors()
     def settle(self) -> None:
-        """Decide what became of the last commit; see the top of this file."""
+        """Decide the outcome of the last commit, as described at the top of this file."""
         if not self._unsettled:
             return
         self._disconnect()
@@ -175,7 +177,7 @@ class SQLiteStorage:
         connection.execute("COMMIT")
         self._set_synchronous(connection)
         with self._housekeeping:
-            self._copy_log("RESTART")  # if it can be: else what failed stays behind the log's end for a while
+            self._copy_log("RESTART")  # if possible; otherwise the failed frames stay after the end of the log
         connection.execute("BEGIN")
         ledger = load(connection)
         connection.execute("COMMIT")
@@ -211,7 +213,7 @@ class SQLiteStorage:
             self._unsettled = False
 
     def _roll_back(self) -> None:
-        """Leave no transaction open, whatever it takes."""
+        """End the transaction; if that fails, close the connection."""
         if self._writer is None:
             return
         try:
@@ -223,14 +225,14 @@ class SQLiteStorage:
     # Reading
 
     def row(self, number: int) -> HullRow | None:
-        """The hull of that number, None where there is none."""
+        """The hull with that number, or None."""
         with self._visible:
             hull = self._settled().hulls.get(number)
             return None if hull is None else hull.row
 
-    @_in_words()
+    @_as_storage_errors()
     def read(self, number: int, until: int = NEWEST) -> Kept:
-        """A hull as it was at a revision."""
+        """A hull at a revision."""
         with self._readers.lend() as connection:
             with self._visible:
                 hull = self._settled().hulls[number].copy()
@@ -238,7 +240,7 @@ class SQLiteStorage:
             return read_hull(connection, hull, until)
 
     def oldest(self, number: int) -> int:
-        """The oldest revision that `read` can go back to."""
+        """The oldest revision that `read` can return."""
         with self._visible:
             return self._settled().hulls[number].oldest
 
@@ -247,10 +249,10 @@ class SQLiteStorage:
             raise StorageError("the outcome of the last commit is not known yet")
         return self._ledger
 
-    # Snapshots, and what they and deleted hulls leave behind
+    # Snapshots, and the removal of superseded rows
 
     def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
-        """Write a snapshot, then drop what it makes superfluous."""
+        """Write a snapshot, then drop the rows it supersedes."""
         starts = range(0, len(points), CHUNK_POINTS)
         ids = [next(self._ledger.chunk_ids) for _ in starts]
         snapshot = Snapshot(next(self._ledger.snapshot_ids), revision, array("q", ids))
@@ -275,7 +277,7 @@ class SQLiteStorage:
             yield DropBatches(number, ids[: len(rows)], weights)
 
     def sweep(self) -> Iterator[Step]:
-        """Drop what deleted hulls and unfinished snapshots have left."""
+        """Drop the rows of deleted hulls and unfinished snapshots."""
         self._look_for_dead_chunks()
         for table, column in DROPPED.items():
             yield from self._drop_dead(table, column)
@@ -284,9 +286,9 @@ class SQLiteStorage:
         while ids := self._ledger.dead[table][:DROPPED_ROWS]:
             yield DropDead(table, ids[: max(1, len(self._few(ids, "NULL", table, column)))])
 
-    @_in_words()
+    @_as_storage_errors()
     def _look_for_dead_chunks(self) -> None:
-        """Snapshots that were given up have left some, too."""
+        """Find the chunks that belong to no snapshot, also those of abandoned ones."""
         with self._readers.lend() as connection:
             rows = connection.execute("SELECT rowid, snapshot FROM chunks").fetchall()
         with self._visible:
@@ -294,9 +296,9 @@ class SQLiteStorage:
             live |= self._under_way.keys()
             self._ledger.dead["chunks"] = array("q", (place for place, snapshot in rows if snapshot not in live))
 
-    @_in_words()
+    @_as_storage_errors()
     def _few(self, ids: "array[int]", columns: str, table: str, sized: str) -> list[Sequence[int]]:
-        """Some columns of the first of the rows: as many as fit into a step, at least one."""
+        """Some columns of the first rows: as many as fit into a step, but at least one."""
         taken: list[Sequence[int]] = []
         size = 0
         with self._readers.lend() as connection:
@@ -309,15 +311,15 @@ class SQLiteStorage:
 
     # Housekeeping
 
-    @_in_words()
+    @_as_storage_errors()
     def sync(self) -> None:
-        """Make durable what was committed."""
+        """Make earlier commits durable."""
         if self._log_in_doubt:
-            # After a sync that failed, the next may succeed without the pages that the first one lost.
+            # After a failed sync, the next one may succeed although the pages of the first were lost.
             with self._housekeeping:
                 busy, left = self._copy_log("FULL")
             if busy or left:
-                raise StorageError("the log is in use: it is made durable later")
+                raise StorageError("the log is in use: it will be made durable later")
             self._log_in_doubt = False
             return
         try:
@@ -326,12 +328,12 @@ class SQLiteStorage:
             self._log_in_doubt = True
             raise
 
-    @_in_words()
+    @_as_storage_errors()
     def checkpoint(self) -> None:
-        """Copy the log into the database beside commits, when it is long, then begin it anew.
+        """Copy a long log into the database, during commits, then restart it.
 
-        One that grows makes every commit wait where the file system writes its own journal. While one of the files has
-        been moved or deleted, nothing is committed: what was written would be lost.
+        A growing log would delay each commit on file systems with a journal. While one of the files is moved or
+        deleted, nothing is committed, because it would be lost.
         """
         disk = self._folder.disk
         self._gone = next((file for file, identity in self._files.items() if disk.identity(file) != identity), None)
@@ -339,32 +341,32 @@ class SQLiteStorage:
             raise StorageError(_gone(self._gone))
         if (disk.size(self._folder.log) or 0) > CHECKPOINT_BYTES:
             with self._housekeeping:
-                for mode in ("PASSIVE", "RESTART"):  # for the second, little is left to copy
+                for mode in ("PASSIVE", "RESTART"):  # the second has little left to copy
                     self._copy_log(mode)
 
     def bytes_used(self) -> int:
-        """What the database and its log take on the disk."""
+        """The size of the database and its log in bytes."""
         return sum(self._folder.disk.size(file) or 0 for file in (self._folder.database, self._folder.log))
 
     def _copy_log(self, mode: str) -> tuple[int, int]:
-        """Copy it into the database. Returns whether somebody was in the way, and how many pages are left."""
+        """Copy the log into the database. Returns whether another process prevented it, and the pages left."""
         busy, pages, copied = self._checkpointer.execute(f"PRAGMA wal_checkpoint({mode})").fetchone()
         return busy, pages - copied
 
     # Opening
 
     def _examined(self, stack: ExitStack, own: Totals | None, progress: Progress) -> tuple[Findings, int]:
-        """What is there, and its format; nothing is changed, but that a database is made where there is none.
+        """Examine the database, and return its format. A missing database is created; otherwise nothing is changed.
 
-        The last connection that is closed drops the log, but not if it only reads. A log that is gone while the
-        database's own file says that it is in use is taken for lost. So the connection that reads here outlives all
-        others, unless the database says that it is not in use any more.
+        The last connection to close deletes the log, unless it is read-only. A log that is missing while the database
+        file is marked as in use counts as lost. The read-only connection opened here therefore outlives all others,
+        unless the database has been marked as stopped.
         """
         if not self._folder.disk.size(self._folder.database):
             self._make_database()
         connection = self._guard = stack.enter_context(closing(self._folder.connect(Access.READ)))
         version = format_of(connection, self._folder.database)
-        if version == 0:  # a server was killed before it had made the tables
+        if version == 0:  # a server was killed before it created the tables
             self._make_database()
             version = FORMAT
         connection.execute("BEGIN")
@@ -378,8 +380,8 @@ class SQLiteStorage:
             make_tables(connection)
             connection.execute("COMMIT")
 
-    def _take_up(self, findings: Findings, version: int) -> None:
-        """Bring the database to today's format and repair it, and say in it that somebody works on it."""
+    def _load(self, findings: Findings, version: int) -> None:
+        """Migrate and repair the database, and mark it as in use."""
         connection = self._writer = self._connect_writer()
         connection.execute("PRAGMA synchronous = FULL")
         self._ledger = findings.ledger
@@ -396,13 +398,13 @@ class SQLiteStorage:
         self._ledger.totals = self._ledger.totals._replace(mode=mode)
         return self._ledger
 
-    def _begin_log_anew(self, own: Totals | None) -> None:
-        """So that the database's own file says who works on it, and nothing that failed lies behind the log's end."""
+    def _restart_log(self, own: Totals | None) -> None:
+        """Write the mark into the database file itself, and leave no failed frames after the end of the log."""
         self._checkpointer.execute(f"PRAGMA busy_timeout = {START_PATIENCE_MS}")
         busy, _ = self._copy_log("RESTART")
-        # A backup may have begun before the server that was here stopped: then the file says it already.
+        # A backup may have begun while the previous server ran: then the file already has the mark.
         if busy and (own is None or own.mode == STOPPED):
-            raise LockedError(f"somebody reads {self._folder.database}: wait until they are done")
+            raise LockedError(f"another process reads {self._folder.database}: wait until it has finished")
         self._checkpointer.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
 
     def _connect_writer(self) -> sqlite3.Connection:
@@ -420,7 +422,7 @@ class SQLiteStorage:
         return connection
 
     def _connect_reader(self) -> sqlite3.Connection:
-        """Reads once, so that its files are open."""
+        """A connection that has read once, so that its files are open."""
         connection = self._folder.connect(Access.READ)
         try:
             connection.execute("SELECT id FROM totals").fetchone()
@@ -433,18 +435,18 @@ class SQLiteStorage:
         connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS[self._durability]}")
 
     def _disconnect(self) -> None:
-        """Also ends a transaction."""
+        """Close the connection, which also ends its transaction."""
         if self._writer is not None:
             self._writer.close()
             self._writer = None
 
-    def _word(self, note: str) -> str:
+    def _prefixed(self, note: str) -> str:
         return f"{self._folder.database}: {note}"
 
 
 def _not_committed(error: BaseException) -> NotCommittedError:
     if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
-        return NotCommittedError("the disk is full: make room, and writes are taken again", full=True)
+        return NotCommittedError("the disk is full: free some space, and writes are accepted again", full=True)
     return NotCommittedError(f"nothing was written: {words(error)}")
 
 

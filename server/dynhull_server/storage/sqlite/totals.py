@@ -1,4 +1,4 @@
-"""The row that says what there must be: kept twice, renewed in each commit."""
+"""The totals of all rows: stored twice, updated in each commit."""
 
 import sqlite3
 from typing import NamedTuple, Self
@@ -9,22 +9,22 @@ from .encoding import checksum
 COPIES = 2
 SUM_BITS = 63
 
-# What `Totals.mode` says: nobody has the folder open, or what those who have it promise to their callers.
+# Values of `Totals.mode`: no server uses the folder, or the durability of the server that does.
 STOPPED = 0
 MODES = {Durability.SYNC: 1, Durability.INTERVAL: 2, Durability.NONE: 3}
 
 
 class Totals(NamedTuple):
-    """What there must be.
+    """The totals of all valid rows.
 
     Attributes:
-        commits: how many there were before this one: it only grows.
-        hulls: rows of hulls.
-        batches: rows of batches, of hulls that were not deleted.
-        sum: of the checksums of the former and the weights of the latter.
-        next_number: greater than the number of every hull there has ever been.
-        mode: STOPPED or one of MODES. In the database's own file it is STOPPED only where the log holds nothing that
-            anybody was told of.
+        commits: the number of earlier commits; it only grows.
+        hulls: the number of hulls.
+        batches: the number of rows of batches, without those of deleted hulls.
+        sum: the sum of the checksums of the hulls and of the weights of these rows.
+        next_number: a number greater than that of any hull ever created.
+        mode: STOPPED or one of MODES. In the database file itself it is STOPPED only if the log has no acknowledged
+            commits.
     """
 
     commits: int = 0
@@ -35,21 +35,21 @@ class Totals(NamedTuple):
     mode: int = STOPPED
 
     def plus(self, hulls: int, batches: int, checksums: int) -> Self:
-        """After rows have come or, with negative numbers, gone."""
+        """The totals after adding rows or, with negative numbers, removing them."""
         total = (self.sum + checksums) % 2**SUM_BITS
         return self._replace(hulls=self.hulls + hulls, batches=self.batches + batches, sum=total)
 
     @property
     def row(self) -> tuple[int, ...]:
-        """As it is stored, with its checksum."""
+        """The values as stored, with their checksum."""
         return *self, checksum(b"", *self)
 
 
 def read_totals(connection: sqlite3.Connection) -> tuple[Totals | None, bool]:
-    """The row, None where it is damaged; and whether both copies of it are whole.
+    """The totals, None if damaged; and whether both copies are intact.
 
     Raises:
-        sqlite3.Error: there is no such table, or it cannot be read.
+        sqlite3.Error: the table is missing, or cannot be read.
     """
     query = "SELECT commits, hulls, batches, sum, next_number, mode, checksum FROM totals"
     whole = set()
@@ -62,7 +62,7 @@ def read_totals(connection: sqlite3.Connection) -> tuple[Totals | None, bool]:
 
 
 def renew_totals(connection: sqlite3.Connection, totals: Totals) -> None:
-    """Write both copies anew."""
+    """Rewrite both copies."""
     columns = "commits, hulls, batches, sum, next_number, mode, checksum"
     connection.execute("DELETE FROM totals")
     sql = f"INSERT INTO totals ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?)"  # noqa: S608  (ours)
