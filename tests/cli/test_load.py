@@ -106,7 +106,7 @@ BAD_LINES_REASONS = [
     ("line 3", "Expecting ',' delimiter: line 2 column 1 (char 8)"),
     ("line 4", "neither an object nor an array"),
     ("line 5", "x is missing"),
-    ("line 6", "its geometry is Polygon, not a Point"),
+    ("line 6", "its geometry is Polygon, not a Point (--vertices takes the vertices of every geometry)"),
     ("line 7", "y is nan, not finite"),
 ]
 
@@ -143,15 +143,15 @@ def test_bad_rows_of_parquet(tmp_path, name):
 @pytest.mark.parametrize(
     ("file", "content", "options", "message"),
     [
-        ("a.csv", "", [], "a.csv is empty: it needs a header line"),
+        ("a.csv", "", [], "a.csv is empty"),
         ("a.csv", "x,y\n", [], "a.csv has no points"),
         ("a.csv", "x,y\na,b\n", [], "line 2: x is 'a', not a number"),
         ("a.csv", "a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
         ("a.csv", "a,b\n1,2\n", ["--x", "a", "--y", "c"], "has no column 'c' (--y); it has a, b"),
         ("a.geojson", '{"type": "FeatureCollection", "features": []}', [], "has no points"),
-        ("a.geojson", '{"features": [', [], "a.geojson is no GeoJSON"),
-        ("a.parquet", "x,y\n1,2\n", [], "a.parquet is no Parquet file"),
-        ("a.xls", "", [], "the name must end in .csv, .parquet, .geojson, .ndjson, .jsonl"),
+        ("a.geojson", '{"features": [', [], "a.geojson is not valid JSON"),
+        ("a.parquet", "x,y\n1,2\n", [], "a.parquet is not a Parquet file"),
+        ("a.xls", "", [], "the name must end in .csv, .tsv, .parquet, .json, .geojson, .ndjson, .txt, .jsonl"),
         ("a.csv", "x,y\n1,2\n", ["--resume", "--again"], "give one"),
     ],
 )

@@ -66,7 +66,8 @@ def test_a_format_that_is_not_installed(tmp_path: Path) -> None:
 def test_help_works_without_the_extra() -> None:
     result = run_without("grpc", "--help")
     assert result.returncode == 0
-    assert 'needs the extra "server"' in result.stdout
+    assert "Serve hulls over gRPC." in result.stdout
+    assert 'needs the extra "server"' in run_without("grpc", "serve", "--help").stdout
 
 
 def test_without_a_command_line() -> None:

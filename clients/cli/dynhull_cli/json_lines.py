@@ -8,7 +8,7 @@ import numpy as np
 
 
 def json_line(**members: Any) -> str:
-    """An object on one line. What JSON has no number for, NaN and the infinities, is null."""
+    """An object on one line. NaN and the infinities, which JSON cannot write, become null."""
     return json.dumps(_plain(members), allow_nan=False)
 
 

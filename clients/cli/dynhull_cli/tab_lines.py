@@ -7,7 +7,7 @@ import numpy as np
 
 
 def tab_line(*values: Any) -> str:
-    """Everything in some values, however deep in arrays and tuples, between tabs."""
+    """The values, with nested arrays and tuples flattened, between tabs."""
     return "\t".join(map(str, _flat(values)))
 
 

@@ -1,4 +1,4 @@
-"""Rows that are no points: counted, the first ones shown, all of them written to a file where wanted."""
+"""Rows that cannot be read as points: counted, the first ones shown, all of them written to a file if wanted."""
 
 import csv
 from collections.abc import Iterable, Iterator
@@ -11,7 +11,7 @@ from .chunks import BadRow, Chunk, Points
 
 
 class BadRows:
-    """The bad rows of a load; ValueError as soon as there are more than `most`."""
+    """The bad rows of a load, written to `file` if there is one; ValueError as soon as there are more than `most`."""
 
     def __init__(self, file: TextIO | None, most: int | None) -> None:
         self.count = 0
@@ -28,7 +28,7 @@ class BadRows:
             yield chunk.points
 
     def report(self) -> list[str]:
-        """Lines about them."""
+        """Lines for the user: how many there are, and the first ones."""
         return bad_rows_left_out([f"{each.place}: {each.reason}" for each in self._first], self.count)
 
     def _add(self, rows: list[BadRow]) -> None:
@@ -41,5 +41,5 @@ class BadRows:
 
 
 def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:
-    """The file to write them to."""
+    """The file for the bad rows, if one is wanted."""
     return nullcontext() if path is None else path.open("w", encoding="utf-8", newline="")
