@@ -1,14 +1,14 @@
 """Addresses of servers, as people write them."""
 
 import re
+from ipaddress import AddressValueError, IPv6Address
 
 DEFAULT_PORT = 50051
 MAX_PORT = 65535
 TLS_BY_SCHEME = {"": False, "http": False, "https": True, "grpc": False, "grpcs": True}
 RESOLVERS = ("dns", "ipv4", "ipv6", "unix", "unix-abstract", "vsock", "xds")  # gRPC's own names, passed through
 
-URL = re.compile(r"(?:(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://)?(?P<place>.*?)/?")
-PLACE = re.compile(r"(?P<host>\[[^\[\]]+\]|[^:\[\]/\s]+)(?::(?P<port>\d+))?")
+PLACE = re.compile(r"(?P<host>\[[\w:.%]+\]|[^:\[\]/\s]+)(?::(?P<port>\d+))?")
 EXAMPLE = f"Write HOST or HOST:PORT, for example 127.0.0.1:{DEFAULT_PORT}"
 
 
@@ -20,17 +20,22 @@ def target(address: str) -> tuple[str, bool]:
     """
     if address.split(":", 1)[0] in RESOLVERS:
         return address, False
-    url = URL.fullmatch(address)
-    scheme = (url["scheme"] or "").lower() if url else ""
-    place = url["place"] if url else address
+    before, mark, after = address.partition("://")
+    scheme, place = (before.lower(), after.removesuffix("/")) if mark else ("", address)
     if scheme not in TLS_BY_SCHEME:
         raise ValueError(f"address {address!r}: a server is not reached by {scheme}://. {EXAMPLE}")
-    if place.count(":") > 1 and "[" not in place:
-        place = f"[{place}]"
-    found = PLACE.fullmatch(place)
+    found = PLACE.fullmatch(f"[{place}]" if _is_ipv6(place) else place)
     if found is None:
         raise ValueError(f"address {address!r} is not a host and a port. {EXAMPLE}")
     port = int(found["port"] or DEFAULT_PORT)
     if not 0 < port <= MAX_PORT:
         raise ValueError(f"address {address!r}: port {port} is not from 1 to {MAX_PORT}. {EXAMPLE}")
     return f"{found['host']}:{port}", TLS_BY_SCHEME[scheme]
+
+
+def _is_ipv6(text: str) -> bool:
+    try:
+        IPv6Address(text)
+    except AddressValueError:
+        return False
+    return True

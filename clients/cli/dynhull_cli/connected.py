@@ -6,7 +6,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import Annotated, Any, NoReturn, Protocol, TypeVar
 
 import grpc
 import typer
@@ -94,10 +94,12 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         try:
             address, encrypted = target(address)
-            credentials = _credentials(tls or encrypted, tls_ca, client_cert, client_key)
+            tls = tls or encrypted
+            credentials = _credentials(tls, tls_ca, client_cert, client_key)
             command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
         except (UnavailableError, DeadlineError) as error:
-            advice = "Is it running (dynhull serve), is the address right (--address), does it want TLS (--tls)?"
+            encryption = "does it serve TLS at all" if tls or tls_ca or client_cert else "does it want TLS (--tls)"
+            advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
         except UnauthenticatedError as error:
             fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
@@ -121,7 +123,7 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def fail(code: Exit, message: str) -> None:
+def fail(code: Exit, message: str) -> NoReturn:
     """Print an error and end the command."""
     typer.echo(f"error: {message}", err=True)
     sys.exit(code)

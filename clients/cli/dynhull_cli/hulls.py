@@ -18,9 +18,7 @@ Names = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the h
 @connected
 def list_hulls(
     client: HullClient,
-    prefix: Annotated[
-        str, typer.Argument(metavar="PREFIX", help="List only hulls whose names begin with this.")
-    ] = "",
+    prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="List only hulls whose names begin with this.")] = "",
     as_json: AsJson = False,
 ) -> None:
     """List the hulls of the server by name, with their points, distinct points and revision.

@@ -5,10 +5,10 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from dynhull_client import Applied, HullClient
+from dynhull_client import Applied, HullClient, PointMissingError
 from dynhull_client.messages import Points
 
-from .connected import AsJson, HullName, connected
+from .connected import AsJson, Exit, HullName, connected, fail
 from .json_lines import json_line
 from .rows import given_or_read, number_rows
 
@@ -44,7 +44,11 @@ def remove(
 
     Of a point that is there several times, one is removed for each time it is given.
     """
-    applied = client.apply(name, delete=_all_rows(points), missing="count" if missing_ok else "raise")
+    try:
+        applied = client.apply(name, delete=_all_rows(points), missing="count" if missing_ok else "raise")
+    except PointMissingError as error:
+        which = "a point" if error.row is None else f"point {error.row + 1}, {error.value},"
+        fail(Exit.FAILED, f"{which} is not in the hull; nothing was removed. --missing-ok skips such points")
     skipped = f", {applied.missing:,} were not there" if applied.missing else ""
     _report(name, applied, f"{applied.deleted:,} points removed{skipped}", as_json)
 

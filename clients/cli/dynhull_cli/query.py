@@ -48,9 +48,7 @@ def query(
     ] = Question.VERTICES,
     points: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="X,Y", help="The points; X,Y,X,Y for a line. Default, or -: lines of standard input."
-        ),
+        typer.Argument(metavar="X,Y", help="The points; X,Y,X,Y for a line. Default, or -: lines of standard input."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -29,9 +29,7 @@ class Row:
 @connected
 def top(
     client: HullClient,
-    prefix: Annotated[
-        str, typer.Argument(metavar="PREFIX", help="Show only hulls whose names begin with this.")
-    ] = "",
+    prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="Show only hulls whose names begin with this.")] = "",
     interval: Annotated[float, typer.Option(min=0.01, help="Seconds between two readings.")] = 1.0,
     looks: Annotated[
         int | None, typer.Option(min=1, help="End after this many readings. Default: 1; on a terminal, never.")

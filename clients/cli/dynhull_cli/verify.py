@@ -15,9 +15,7 @@ from .json_lines import json_line
 @connected
 def verify(
     client: HullClient,
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.")
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.")] = None,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds that each hull may take.")] = 600.0,
     as_json: AsJson = False,
 ) -> None:

@@ -9,7 +9,6 @@ from dynhull_cli.connected import Connect, connecting
 from dynhull_client import AsyncHullClient
 
 from .hub import Hub
-from .serve import serve
 
 
 @connecting
@@ -36,6 +35,8 @@ def dashboard(
 
     dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # of dynhull serve --metrics-port 9464
     """
+
+    from .serve import serve  # imports Bokeh, which --help does not need
 
     async def show() -> None:
         async with connect(AsyncHullClient, retries=0) as client:
