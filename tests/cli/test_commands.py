@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import subprocess
 
 import pytest
@@ -235,6 +236,12 @@ def test_tls(tmp_path):
         assert dynhull("top", *where, "--tls-ca", tmp_path / "ca").exit_code == 0
         assert dynhull("top", *where).exit_code == 3
         assert dynhull("top", *where, "--tls").exit_code == 3
+        assert dynhull("top", "--address", f"https://{server.address}", "--tls-ca", tmp_path / "ca").exit_code == 0
+        # gRPC reads the certificates that the machine trusts once in a process.
+        trusting = {**os.environ, "GRPC_DEFAULT_SSL_ROOTS_FILE_PATH": str(tmp_path / "ca")}
+        assert subprocess.run([COMMAND, "list", *where, "--tls"], env=trusting, check=False).returncode == 0
+        pair = ["--client-cert", tmp_path / "cert", "--client-key", tmp_path / "key"]
+        assert dynhull("top", *where, "--tls-ca", tmp_path / "ca", *pair).exit_code == 0
         done = dynhull("top", *where, "--client-key", tmp_path / "key")
         assert (done.exit_code, done.stderr) == (2, "error: --client-cert and --client-key must be given together\n")
 

@@ -9,6 +9,7 @@ import pytest
 from command_line import dynhull
 from server_process import COMMAND, PATIENCE
 
+from dynhull_cli.address import target
 from dynhull_client import HullClient
 
 
@@ -110,12 +111,6 @@ def test_addresses_as_people_write_them(served, name):
     dynhull("create", name)
     for address in (f"http://{served}", f"http://{served}/", f"grpc://{served}", f"dns:{served}", f"HTTP://{served}"):
         assert dynhull("list", name, "--address", address).stdout.startswith(name), address
-    for address in (host, f"http://{host}"):
-        done = dynhull("list", "--address", address, "--token", "none")
-        assert done.exit_code in (0, 3)  # a server may run there
-        assert done.exit_code == 0 or f"no answer from {host}:50051" in done.stderr
-    done = dynhull("list", "--address", "::1")
-    assert done.exit_code == 0 or "no answer from [::1]:50051" in done.stderr
     done = dynhull("list", "--address", f"https://{served}")
     assert done.exit_code == 3
     assert "does it serve TLS at all" in done.stderr
@@ -124,6 +119,24 @@ def test_addresses_as_people_write_them(served, name):
         assert done.exit_code == 2, address
         assert f"address {address!r}" in done.stderr
         assert "Write HOST or HOST:PORT" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("address", "found"),
+    [
+        ("example.org", ("example.org:50051", False)),
+        ("http://example.org", ("example.org:50051", False)),
+        ("https://example.org/", ("example.org:50051", True)),
+        ("grpcs://example.org:443", ("example.org:443", True)),
+        ("::1", ("[::1]:50051", False)),
+        ("[::1]", ("[::1]:50051", False)),
+        ("http://[fe80::1%eth0]:7", ("[fe80::1%eth0]:7", False)),
+        ("unix:/run/dynhull.sock", ("unix:/run/dynhull.sock", False)),
+        ("dns:///example.org:7", ("dns:///example.org:7", False)),
+    ],
+)
+def test_the_target_of_an_address(address, found):
+    assert target(address) == found
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ def load(
 
     While --replace loads, readers see the hull without points, then with a part of them.
     """
-    _check(file, decimal, replace=replace, resume=resume, again=again)
+    _check(decimal, replace=replace, resume=resume, again=again)
     options = Options(x, y, delimiter, decimal, header, encoding, vertices)
     with open_source(file, format, options) as source, open_bad_rows(bad_rows) as bad_file:
         bad = BadRows(bad_file, max_bad)
@@ -104,6 +104,10 @@ def load(
             _report_reading(name, source, bad, as_json)
             return
         if replace:
+            if source.size is None:
+                raise ValueError(
+                    f"--replace reads its input twice, and {source.name} is a pipe: write it to a file first"
+                )
             _read_through(source, BadRows(None, max_bad))
             source.rewind()
         producer = producer or (None if again else _producer(source))
@@ -132,15 +136,11 @@ def load(
         typer.echo(f"{name}: {loaded:,} points loaded" + ("" if points is None else f", {points:,} in the hull"))
 
 
-def _check(file: str, decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:
+def _check(decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:
     if replace + resume + again > 1:
         raise ValueError("--resume continues a load, --again and --replace begin another: give one of them")
     if decimal not in (None, ".", ","):
         raise ValueError(f"--decimal {decimal!r} is neither . nor ,")
-    if replace and file == STANDARD_INPUT:
-        raise ValueError(
-            "--replace reads its input twice, and standard input can be read once: write it to a file first"
-        )
 
 
 def _read_through(source: Source, bad: BadRows) -> tuple[int, Points]:

@@ -144,7 +144,8 @@ def open_source(name: str, kind: Format | None, options: Options) -> Iterator[So
         else:
             path = Path(name)
             with path.open("rb") as file:
-                yield _source(name, file, path.stat().st_size, kind, options)
+                size = path.stat().st_size if path.is_file() else None
+                yield _source(name, file, size, kind, options)
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise ValueError(f"{name}: the compressed data is damaged: {error}") from None
 
