@@ -6,25 +6,18 @@ from collections.abc import Callable
 from enum import IntEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
 
-import grpc
 import typer
-
-from dynhull_client import (
-    AsyncHullClient,
-    DeadlineError,
-    DynhullError,
-    HullClient,
-    HullNotFoundError,
-    PermissionDeniedError,
-    UnauthenticatedError,
-    UnavailableError,
-)
 
 from .address import target
 
-Client = TypeVar("Client", HullClient, AsyncHullClient)
+if TYPE_CHECKING:
+    import grpc
+
+    from dynhull_client import AsyncHullClient, HullClient
+
+Client = TypeVar("Client", "HullClient", "AsyncHullClient")
 
 
 class Connect(Protocol):
@@ -68,11 +61,14 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object per
 def connected(command: Callable[..., None]) -> Callable[..., None]:
     """A typer command with the options of a connection; `command` receives the client as its first argument.
 
-    An error ends it with a message that says what to do, and with the exit code of its kind.
+    An error ends it with a message that says what to do, and with the exit code of its kind. The SDK is imported when a
+    command runs: its help and shell completion need half the time without.
     """
 
     @wraps(command)
     def with_client(connect: Connect, **given: Any) -> None:
+        from dynhull_client import HullClient
+
         with connect(HullClient) as client:
             command(client, **given)
 
@@ -92,22 +88,24 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         client_key: ClientKey = None,
         **given: Any,
     ) -> None:
+        import dynhull_client as sdk
+
         try:
             address, encrypted = target(address)
             tls = tls or encrypted
             credentials = _credentials(tls, tls_ca, client_cert, client_key)
             command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
-        except (UnavailableError, DeadlineError) as error:
+        except (sdk.UnavailableError, sdk.DeadlineError) as error:
             encryption = "does it serve TLS at all" if tls or tls_ca or client_cert else "does it want TLS (--tls)"
             advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
-        except UnauthenticatedError as error:
+        except sdk.UnauthenticatedError as error:
             fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
-        except PermissionDeniedError as error:
+        except sdk.PermissionDeniedError as error:
             fail(Exit.FORBIDDEN, str(error))
-        except HullNotFoundError as error:
+        except sdk.HullNotFoundError as error:
             fail(Exit.FAILED, f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one.")
-        except DynhullError as error:
+        except sdk.DynhullError as error:
             fail(Exit.FAILED, str(error))
         except OSError as error:
             fail(Exit.UNUSABLE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
@@ -131,11 +129,13 @@ def fail(code: Exit, message: str) -> NoReturn:
 
 def _credentials(
     tls: bool, ca: Path | None, certificate: Path | None, key: Path | None
-) -> grpc.ChannelCredentials | None:
+) -> "grpc.ChannelCredentials | None":
     if (certificate is None) != (key is None):
         raise ValueError("--client-cert and --client-key must be given together")
     if not (tls or ca or certificate):
         return None
+    import grpc
+
     return grpc.ssl_channel_credentials(
         *(None if path is None else path.read_bytes() for path in (ca, key, certificate))
     )

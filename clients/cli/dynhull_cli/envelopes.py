@@ -2,11 +2,12 @@
 
 import math
 from itertools import zip_longest
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynhull_client import HullClient
+if TYPE_CHECKING:
+    from dynhull_client import HullClient
 
 from .connected import AsJson, connected
 from .json_lines import json_line
@@ -16,7 +17,7 @@ from .tab_lines import tab_line
 
 @connected
 def phases(
-    client: HullClient,
+    client: "HullClient",
     name: Annotated[
         str, typer.Argument(metavar="HULL", help="A hull of entries: composition from 0 to 1, and energy.")
     ],
@@ -48,7 +49,7 @@ def phases(
 
 @connected
 def frontier(
-    client: HullClient,
+    client: "HullClient",
     name: Annotated[str, typer.Argument(metavar="HULL", help="A hull of points: risk, which is positive, and return.")],
     points: Annotated[
         list[str] | None,

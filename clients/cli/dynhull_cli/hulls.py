@@ -1,23 +1,24 @@
 """`dynhull list`, `dynhull create` and `dynhull delete`: the hulls of a server."""
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from dynhull_client import HullClient, HullExistsError, HullInfo, HullNotFoundError
-
 from .connected import AsJson, Exit, connected, fail
 from .json_lines import json_line
+
+if TYPE_CHECKING:
+    from dynhull_client import HullClient, HullInfo
 
 Names = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
 
 
 @connected
 def list_hulls(
-    client: HullClient,
+    client: "HullClient",
     prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="List only hulls whose names begin with this.")] = "",
     as_json: AsJson = False,
 ) -> None:
@@ -42,7 +43,7 @@ def list_hulls(
 
 @connected
 def create(
-    client: HullClient,
+    client: "HullClient",
     names: Names,
     exist_ok: Annotated[bool, typer.Option("--exist-ok", help="Accept a hull that exists already.")] = False,
     as_json: AsJson = False,
@@ -51,6 +52,8 @@ def create(
 
     dynhull create fleet/north fleet/south
     """
+    from dynhull_client import HullExistsError
+
     for name in names:
         try:
             client.create_hull(name)
@@ -66,7 +69,7 @@ def create(
 
 @connected
 def delete(
-    client: HullClient,
+    client: "HullClient",
     names: Names,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Delete without asking.")] = False,
     missing_ok: Annotated[bool, typer.Option("--missing-ok", help="Skip a hull that does not exist.")] = False,
@@ -78,6 +81,8 @@ def delete(
 
     On a terminal the command asks first; elsewhere it needs --yes. Where a hull does not exist, none is deleted.
     """
+    from dynhull_client import HullNotFoundError
+
     found = []
     for name in dict.fromkeys(names):
         try:
@@ -96,7 +101,7 @@ def delete(
         )
 
 
-def _confirm(found: list[HullInfo]) -> None:
+def _confirm(found: "list[HullInfo]") -> None:
     what = ", ".join(f"{info.name} ({info.points:,} points)" for info in found)
     if not sys.stdin.isatty():
         fail(Exit.UNUSABLE, f"nothing was deleted: without a terminal to ask on, add --yes to delete {what}")
@@ -104,7 +109,7 @@ def _confirm(found: list[HullInfo]) -> None:
         fail(Exit.FAILED, "nothing was deleted")
 
 
-def _table(hulls: list[HullInfo]) -> Table:
+def _table(hulls: "list[HullInfo]") -> Table:
     table = Table("hull")
     for heading in ("points", "distinct", "revision"):
         table.add_column(heading, justify="right")

@@ -1,11 +1,12 @@
 """`dynhull measure` and `dynhull separate`: the measures of a hull, and the distance between two."""
 
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynhull_client import HullClient
+if TYPE_CHECKING:
+    from dynhull_client import HullClient
 
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
@@ -13,7 +14,7 @@ from .tab_lines import tab_line
 
 
 @connected
-def measure(client: HullClient, name: HullName, as_json: AsJson = False) -> None:
+def measure(client: "HullClient", name: HullName, as_json: AsJson = False) -> None:
     """Measure a hull: one line per measure, its name and its numbers between tabs.
 
         dynhull measure fleet/north --json | jq .diameter
@@ -28,7 +29,7 @@ def measure(client: HullClient, name: HullName, as_json: AsJson = False) -> None
 
 @connected
 def separate(
-    client: HullClient,
+    client: "HullClient",
     name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the first hull.")],
     other: Annotated[str, typer.Argument(metavar="OTHER", help="Name of the second hull.")],
     as_json: AsJson = False,

@@ -1,16 +1,17 @@
 """`dynhull insert` and `dynhull remove`: a few points into a hull or out of it. Files are for `dynhull load`."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-from dynhull_client import Applied, HullClient, PointMissingError
-from dynhull_client.messages import Points
-
 from .connected import AsJson, Exit, HullName, connected, fail
 from .json_lines import json_line
+from .load.chunks import Points
 from .rows import given_or_read, number_rows
+
+if TYPE_CHECKING:
+    from dynhull_client import Applied, HullClient
 
 Rows = Annotated[
     list[str] | None,
@@ -19,7 +20,7 @@ Rows = Annotated[
 
 
 @connected
-def insert(client: HullClient, name: HullName, points: Rows = None, as_json: AsJson = False) -> None:
+def insert(client: "HullClient", name: HullName, points: Rows = None, as_json: AsJson = False) -> None:
     """Insert points into a hull, in one batch: all of them or none.
 
         dynhull insert fleet/north -73.9,40.7 -74.2,40.6
@@ -32,7 +33,7 @@ def insert(client: HullClient, name: HullName, points: Rows = None, as_json: AsJ
 
 @connected
 def remove(
-    client: HullClient,
+    client: "HullClient",
     name: HullName,
     points: Rows = None,
     missing_ok: Annotated[bool, typer.Option("--missing-ok", help="Skip points that are not in the hull.")] = False,
@@ -44,6 +45,8 @@ def remove(
 
     Of a point that is there several times, one is removed for each time it is given.
     """
+    from dynhull_client import PointMissingError
+
     try:
         applied = client.apply(name, delete=_all_rows(points), missing="count" if missing_ok else "raise")
     except PointMissingError as error:
@@ -60,7 +63,7 @@ def _all_rows(points: list[str] | None) -> Points:
     return np.concatenate(rows)
 
 
-def _report(name: str, applied: Applied, what: str, as_json: bool) -> None:
+def _report(name: str, applied: "Applied", what: str, as_json: bool) -> None:
     if as_json:
         counts = {"inserted": applied.inserted, "deleted": applied.deleted, "missing": applied.missing}
         typer.echo(

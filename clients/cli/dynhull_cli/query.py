@@ -1,18 +1,20 @@
 """`dynhull query`: questions about points, answered by a hull."""
 
-from collections.abc import Callable
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-
-from dynhull_client import HullClient
-from dynhull_client.messages import Points
 
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
 from .rows import given_or_read, number_rows
 from .tab_lines import tab_line
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dynhull_client import HullClient
+    from dynhull_client.messages import Points
 
 SIDES = {1: "inside", 0: "boundary", -1: "outside"}
 
@@ -29,7 +31,7 @@ class Question(StrEnum):
     VERTICES = "vertices"
 
 
-ANSWERS: dict[Question, Callable[[HullClient, str, Points], list[Any]]] = {
+ANSWERS: "dict[Question, Callable[[HullClient, str, Points], list[Any]]]" = {
     Question.LOCATE: lambda client, name, xy: [SIDES[each] for each in client.locate(name, xy).sides.tolist()],
     Question.COUNT: lambda client, name, xy: client.count(name, xy).counts.tolist(),
     Question.DISTANCE: lambda client, name, xy: client.distance(name, xy).distances.tolist(),
@@ -41,7 +43,7 @@ ANSWERS: dict[Question, Callable[[HullClient, str, Points], list[Any]]] = {
 
 @connected
 def query(
-    client: HullClient,
+    client: "HullClient",
     name: HullName,
     question: Annotated[
         Question, typer.Argument(metavar="QUESTION", help="One of the questions above.")

@@ -6,9 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from dynhull_client.messages import Points
-
-from .load.chunks import CHUNK_ROWS, cut
+from .load.chunks import CHUNK_ROWS, Points, cut
 
 STANDARD_INPUT = ["-"]
 SHAPES = {2: "X,Y", 4: "X,Y,X,Y"}

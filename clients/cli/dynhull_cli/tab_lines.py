@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 
 def tab_line(*values: Any) -> str:
     """The values, with nested arrays and tuples flattened, between tabs."""
@@ -12,7 +10,7 @@ def tab_line(*values: Any) -> str:
 
 
 def _flat(value: Any) -> Iterator[Any]:
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # of numpy, which a command may not have imported
         value = value.tolist()
     if isinstance(value, list | tuple):
         for each in value:

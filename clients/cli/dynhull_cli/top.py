@@ -4,14 +4,15 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from dynhull_client import HullClient, HullInfo
+if TYPE_CHECKING:
+    from dynhull_client import HullClient, HullInfo
 
 from .connected import AsJson, connected
 from .json_lines import json_line
@@ -21,14 +22,14 @@ from .json_lines import json_line
 class Row:
     """A hull with its rates, each per second: batches applied, and growth in points."""
 
-    info: HullInfo
+    info: "HullInfo"
     batches: float
     growth: float
 
 
 @connected
 def top(
-    client: HullClient,
+    client: "HullClient",
     prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="Show only hulls whose names begin with this.")] = "",
     interval: Annotated[float, typer.Option(min=0.01, help="Seconds between two readings.")] = 1.0,
     looks: Annotated[
@@ -59,7 +60,7 @@ def top(
                 typer.echo("\t".join(_cells(row)))
 
 
-def _readings(client: HullClient, prefix: str, interval: float) -> Iterator[list[Row]]:
+def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[list[Row]]:
     """All hulls after each interval, the busiest first, then the largest."""
     before, then = {info.uid: info for info in client.list_hulls(prefix)}, time.monotonic()
     while True:

@@ -2,11 +2,12 @@
 
 import sys
 from dataclasses import asdict
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynhull_client import HullClient, Verification
+if TYPE_CHECKING:
+    from dynhull_client import HullClient, Verification
 
 from .connected import AsJson, Exit, connected
 from .json_lines import json_line
@@ -14,7 +15,7 @@ from .json_lines import json_line
 
 @connected
 def verify(
-    client: HullClient,
+    client: "HullClient",
     names: Annotated[list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.")] = None,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds that each hull may take.")] = 600.0,
     as_json: AsJson = False,
@@ -34,7 +35,7 @@ def verify(
         sys.exit(Exit.FAILED)
 
 
-def _summary(found: Verification) -> str:
+def _summary(found: "Verification") -> str:
     if not found.equal:
         return f"DIFFERENT at revision {found.revision:,}: {found.difference}"
     rounds = ", ".join(f"{each.guess:,}" for each in found.rounds)

@@ -35,7 +35,6 @@ def dashboard(
 
     dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # of dynhull serve --metrics-port 9464
     """
-
     from .serve import serve  # imports Bokeh, which --help does not need
 
     async def show() -> None:

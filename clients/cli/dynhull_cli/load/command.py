@@ -5,20 +5,21 @@ from contextlib import closing, contextmanager
 from itertools import chain
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from dynhull_client import Applied, DynhullError, HullClient, HullExistsError, HullNotFoundError, Writer
-
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from .bad_rows import BadRows, open_bad_rows
 from .chunks import Points, blocks
 from .source import STANDARD_INPUT, Format, Options, Source, open_source
+
+if TYPE_CHECKING:
+    from dynhull_client import Applied, HullClient, Writer
 
 BATCH_POINTS = 8192  # part of the promise of --resume: the number of a batch says which points are in it
 
@@ -29,7 +30,7 @@ def _input(text: str, *names: str, **more: Any) -> Any:
 
 @connected
 def load(
-    client: HullClient,
+    client: "HullClient",
     name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull; created if there is none.")],
     file: Annotated[
         str,
@@ -183,7 +184,9 @@ def _producer(source: Source) -> str | None:
     return None if digest is None else f"load-{digest[:32]}"
 
 
-def _make(client: HullClient, name: str, *, silent: bool, replace: bool) -> None:
+def _make(client: "HullClient", name: str, *, silent: bool, replace: bool) -> None:
+    from dynhull_client import HullExistsError, HullNotFoundError
+
     if replace:
         try:
             client.delete_hull(name)
@@ -197,8 +200,8 @@ def _make(client: HullClient, name: str, *, silent: bool, replace: bool) -> None
 
 
 def _send(
-    writer: Writer, batches: Iterable[Points], resume: bool, read: Callable[[int], None]
-) -> tuple[int, Applied | None]:
+    writer: "Writer", batches: Iterable[Points], resume: bool, read: Callable[[int], None]
+) -> "tuple[int, Applied | None]":
     """Send each batch that was not applied before; the number of points sent, and what the last batch did."""
     loaded, outcome = 0, None
     with writer:
@@ -224,6 +227,8 @@ class LoadedBeforeError(ValueError):
 @contextmanager
 def _resumable(option: str, producer: str | None) -> Iterator[None]:
     """Where a load with a name is interrupted, say how to continue it."""
+    from dynhull_client import DynhullError
+
     try:
         yield
     except LoadedBeforeError:
