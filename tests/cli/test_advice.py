@@ -144,7 +144,7 @@ def test_an_interrupted_load_says_how_to_go_on(tmp_path, served, name):
 
 def test_an_interrupted_replacement_says_how_to_go_on(tmp_path, served, name):
     file = tmp_path / "points.csv"
-    file.write_text("x,y\n" + "".join(f"{i},{i % 97}\n" for i in range(400_000)))
+    file.write_text("x,y\n" + "".join(f"{i},{i % 97}\n" for i in range(250_000)))
     command = [COMMAND, "load", name, file, "--replace"]
     with HullClient(served) as client, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as loading:
         wait_until(lambda: any(info.revision >= 1 for info in client.list_hulls(name)))
@@ -154,7 +154,7 @@ def test_an_interrupted_replacement_says_how_to_go_on(tmp_path, served, name):
         assert "The same command with --resume in place of --replace loads the rest" in said
         done = dynhull("load", name, file, "--resume")
         assert done.exit_code == 0, done.stderr
-        assert client.get_hull(name).info.points == 400_000
+        assert client.get_hull(name).info.points == 250_000
 
 
 def test_all_advice_is_known_here():

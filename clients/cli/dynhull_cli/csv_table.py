@@ -3,7 +3,7 @@
 import codecs
 import csv
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
@@ -55,6 +55,7 @@ class CsvTable:
         delimiter: the character between columns.
         first_line: the line of the first row.
         rows: the rows, without the header.
+        next_line: returns the line of the row that `rows` gives next, once it has given one.
         notes: what was found out and may surprise.
     """
 
@@ -64,6 +65,7 @@ class CsvTable:
     delimiter: str
     first_line: int
     rows: Iterator[list[str]]
+    next_line: Callable[[], int]
     notes: list[str]
 
 
@@ -104,9 +106,13 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
         raise UnclearTableError(
             f"{name} has a single column, {first[0]!r}", "give the character between its columns with --delimiter"
         )
+
+    def next_line() -> int:
+        return skipped + int(reader.line_num) + 1
+
     if _is_header(first, given):
         x, y = coordinate_columns(name, first, given.x, given.y)
-        return CsvTable(first, x, y, delimiter, skipped + reader.line_num + 1, reader, notes)
+        return CsvTable(first, x, y, delimiter, next_line(), reader, next_line, notes)
     numbers = [str(number) for number in range(1, len(first) + 1)]
     if given.x is not None or given.y is not None:
         x, y = coordinate_columns(name, numbers, given.x, given.y)
@@ -119,7 +125,7 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
             "if the first row names the columns, add --header",
         )
     notes.append(f"{name} has no header: x is column {x + 1}, y is column {y + 1}")
-    return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], reader), notes)
+    return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], reader), next_line, notes)
 
 
 def _encoding(name: str, file: IO[bytes], given: str | None, notes: list[str]) -> str:

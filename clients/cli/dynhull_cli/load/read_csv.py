@@ -28,17 +28,19 @@ def _chunks(table: CsvTable, decimal: str | None) -> Chunks:
             texts = (row[place] for row in rows for place in (table.x, table.y) if place < len(row))
             decimal = decimal_mark(texts, table.delimiter)
         yield _chunk(rows, line, table, decimal)
-        line += sum(1 + sum(field.count("\n") for field in row) for row in rows)
+        line = table.next_line()
 
 
 def _chunk(rows: list[list[str]], line: int, table: CsvTable, decimal: str) -> Chunk:
-    """The points of rows, the first of which is on that line."""
+    """The points of rows that begin on that line."""
     places = table.x, table.y
     try:
         texts = [[row[place] for row in rows] for place in places]
         # One check for all: a number with _ or with the other decimal mark is looked at below, row by row.
         plain("".join(map("".join, texts)), decimal)
-        points = np.array([[float(text.replace(decimal, ".")) for text in column] for column in texts]).T
+        if decimal != ".":
+            texts = [[text.replace(decimal, ".") for text in column] for column in texts]
+        points = np.array([[float(text) for text in column] for column in texts]).T
     except (ValueError, IndexError):
         points = np.full((1, 2), np.nan)
     if np.isfinite(points).all():
