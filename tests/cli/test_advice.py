@@ -110,7 +110,7 @@ def test_following_the_advice_works(served, name, failing, advice, following):
         return dynhull(*words, input=COMMA if "-" in words else "")
 
     done = run(failing.replace(" ;", " ';'"))
-    assert done.exit_code != 0 or "bad rows" in done.stderr
+    assert done.exit_code != 0 or "bad row" in done.stderr
     assert advice in done.stderr
     for command in following.split("; "):
         done = run(command)

@@ -101,7 +101,7 @@ def test_the_same_triangle(tmp_path, served, name, file, content, options):
         ("x;y\n1,5;2\n1.5;2\n", ["--decimal", ","], 1, "line 3: x is '1.5', not a number"),
         ("x;y\n1.234,5;2\n7;2\n", [], 1, "line 2: x is '1.234,5', not a number"),
         ('x,y\n"1\n",2\n' + "1,2\n" * 9000 + "1,two\n", [], 9001, "line 9004: y is 'two', not a number"),
-        ("1,2\n" * 9000 + "1,two\n", [], 9000, "line 9001: y is 'two', not a number"),
+        ("1,2\n" * 9000 + "1,two\n", [], 9000, "line 9001: column 2 is 'two', not a number"),
         ('\n\nx,y\n"1\n",2\n\n3,four\n', [], 1, "line 7: y is 'four', not a number"),
     ],
     ids=count(),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from .columns import column_index, coordinate, decimal_mark
 from .csv_table import CsvFormat, CsvTable, csv_table, numbered
+from .plural import plural
 
 SHOWN_BAD_ROWS = 5
 
@@ -41,7 +42,7 @@ def read_points(
     left_out = bad_rows_left_out(bad[:SHOWN_BAD_ROWS], len(bad))
     if not rows:
         raise ValueError("\n".join([f"{path} has no points", *left_out]))
-    return rows, [*table.notes, f"{path}: {len(rows):,} points from {columns}", *left_out]
+    return rows, [*table.notes, f"{path}: {plural(len(rows), 'point')} from {columns}", *left_out]
 
 
 def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
@@ -49,7 +50,7 @@ def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
     if not count:
         return []
     more = [f"  ... and {count - len(first):,} more"] if count > len(first) else []
-    return [f"{count:,} bad rows left out:", *(f"  {each}" for each in first), *more]
+    return [f"{plural(count, 'bad row')} left out:", *(f"  {each}" for each in first), *more]
 
 
 def _read(table: CsvTable, time: int | None, identity: int | None) -> tuple[list[Row], list[str]]:

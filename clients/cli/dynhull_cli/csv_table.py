@@ -49,7 +49,7 @@ class CsvTable:
     """An open CSV file.
 
     Attributes:
-        names: the names of the columns; their numbers, from 1, where there is no header.
+        names: the names of the columns; column 1 and so on where there is no header.
         x: the index of the column of x.
         y: the index of the column of y.
         delimiter: the character between columns.
@@ -113,7 +113,7 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
     if _is_header(first, given):
         x, y = coordinate_columns(name, first, given.x, given.y)
         return CsvTable(first, x, y, delimiter, next_line(), reader, next_line, notes)
-    numbers = [str(number) for number in range(1, len(first) + 1)]
+    numbers = [f"column {number}" for number in range(1, len(first) + 1)]
     if given.x is not None or given.y is not None:
         x, y = coordinate_columns(name, numbers, given.x, given.y)
     elif len(first) == 2:

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from .connected import AsJson, Exit, connected, fail
 from .json_lines import json_line
+from .plural import plural
 
 if TYPE_CHECKING:
     from dynhull_client import HullClient, HullInfo
@@ -97,12 +98,12 @@ def delete(
         typer.echo(
             json_line(name=info.name, points=info.points)
             if as_json
-            else f"{info.name}: deleted, {info.points:,} points"
+            else f"{info.name}: deleted, {plural(info.points, 'point')}"
         )
 
 
 def _confirm(found: "list[HullInfo]") -> None:
-    what = ", ".join(f"{info.name} ({info.points:,} points)" for info in found)
+    what = ", ".join(f"{info.name} ({plural(info.points, 'point')})" for info in found)
     if not sys.stdin.isatty():
         fail(Exit.UNUSABLE, f"nothing was deleted: without a terminal to ask on, add --yes to delete {what}")
     if not typer.confirm(f"Delete {what}?", err=True):

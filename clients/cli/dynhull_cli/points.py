@@ -8,6 +8,7 @@ import typer
 from .connected import AsJson, Exit, HullName, connected, fail
 from .json_lines import json_line
 from .load.chunks import Points
+from .plural import plural
 from .rows import given_or_read, number_rows
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def insert(client: "HullClient", name: HullName, points: Rows = None, as_json: A
     A point that is inserted twice is there twice. Use `dynhull load` for files and for more than fits into one batch.
     """
     applied = client.apply(name, insert=_all_rows(points))
-    _report(name, applied, f"{applied.inserted:,} points inserted", as_json)
+    _report(name, applied, f"{plural(applied.inserted, 'point')} inserted", as_json)
 
 
 @connected
@@ -52,8 +53,8 @@ def remove(
     except PointMissingError as error:
         which = "a point" if error.row is None else f"point {error.row + 1}, {error.value},"
         fail(Exit.FAILED, f"{which} is not in the hull; nothing was removed. --missing-ok skips such points")
-    skipped = f", {applied.missing:,} were not there" if applied.missing else ""
-    _report(name, applied, f"{applied.deleted:,} points removed{skipped}", as_json)
+    skipped = f", {applied.missing:,} not there" if applied.missing else ""
+    _report(name, applied, f"{plural(applied.deleted, 'point')} removed{skipped}", as_json)
 
 
 def _all_rows(points: list[str] | None) -> Points:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
+from ..plural import plural
 from .chunks import BadRow, Chunk, Points
 
 
@@ -37,7 +38,7 @@ class BadRows:
         if self._writer is not None:
             self._writer.writerows((each.place, each.reason, each.text) for each in rows)
         if self._most is not None and self.count > self._most:
-            raise ValueError("\n".join([f"more than {self._most:,} bad rows (--max-bad)", *self.report()]))
+            raise ValueError("\n".join([f"more than {plural(self._most, 'bad row')} (--max-bad)", *self.report()]))
 
 
 def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:

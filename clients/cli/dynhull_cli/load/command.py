@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..connected import AsJson, connected
 from ..json_lines import json_line
+from ..plural import plural
 from .bad_rows import BadRows, open_bad_rows
 from .chunks import Points, blocks
 from .source import STANDARD_INPUT, Format, Options, Source, open_source
@@ -134,7 +135,9 @@ def load(
     if as_json:
         typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points))
     else:
-        typer.echo(f"{name}: {loaded:,} points loaded" + ("" if points is None else f", {points:,} in the hull"))
+        typer.echo(
+            f"{name}: {plural(loaded, 'point')} loaded" + ("" if points is None else f", {points:,} in the hull")
+        )
 
 
 def _check(decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:
@@ -167,7 +170,7 @@ def _report_reading(name: str, source: Source, bad: BadRows, as_json: bool) -> N
     else:
         (left, bottom), (right, top) = corners.tolist()
         where = f"x from {left} to {right}, y from {bottom} to {top}"
-        typer.echo(f"{name}: {count:,} points would be loaded, {where}; nothing was changed")
+        typer.echo(f"{name}: {plural(count, 'point')} would be loaded, {where}; nothing was changed")
 
 
 def _no_points(source: Source, bad: BadRows) -> str:
