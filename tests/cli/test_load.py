@@ -1,5 +1,6 @@
 """`dynhull load`: what is in the file is in the hull, once, whatever was in the way."""
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -187,6 +188,16 @@ def test_a_file_is_loaded_once_unless_told_otherwise(tmp_path, served, name):
         with HullClient(served) as client:
             assert client.get_hull(name).info.points == points
     assert "adding to it" in done.stderr
+
+
+def test_a_load_keeps_the_name_that_earlier_versions_gave_it(tmp_path, served, name):
+    """Otherwise a file that was loaded then could be loaded twice now."""
+    file = tmp_path / "points.csv"
+    file.write_text("x,y\n1,2\n")
+    assert dynhull("load", name, file).exit_code == 0
+    digest = hashlib.sha256(b"x,y\n1,2\n" + b"csv None None").hexdigest()
+    with HullClient(served) as client:
+        assert client.last_sequence(name, f"load-{digest[:32]}") == 1
 
 
 def test_resume_after_the_command_was_killed(tmp_path, served, name):

@@ -3,6 +3,8 @@
 import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -18,12 +20,20 @@ class _Output(io.FileIO):
             raise SystemExit(0) from None
 
 
-def end_with_success_on_closed_pipe() -> None:
-    """Replace sys.stdout. Reporting success inside click would be too late: rich and click exit with code 1 first."""
+@contextmanager
+def success_on_closed_pipe() -> Iterator[None]:
+    """Replace sys.stdout, if there is one. Inside click it would be too late: rich and click exit with code 1 first."""
     old = sys.stdout
+    if old is None:
+        yield
+        return
     sys.stdout = io.TextIOWrapper(
         io.BufferedWriter(_Output(old.fileno(), "w", closefd=False)),
         encoding=old.encoding,
         errors=old.errors,
         line_buffering=bool(old.line_buffering),
     )
+    try:
+        yield
+    finally:
+        sys.stdout.flush()

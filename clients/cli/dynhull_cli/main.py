@@ -2,7 +2,7 @@
 
 import sys
 
-from .closed_pipe import end_with_success_on_closed_pipe
+from .closed_pipe import success_on_closed_pipe
 
 
 def main() -> None:
@@ -13,8 +13,5 @@ def main() -> None:
         if error.name not in ("typer", "click", "rich"):
             raise
         sys.exit("The command line is not installed. Install it with: pip install 'dynhull[cli]'")
-    end_with_success_on_closed_pipe()
-    try:
+    with success_on_closed_pipe():
         app()
-    finally:
-        sys.stdout.flush()
