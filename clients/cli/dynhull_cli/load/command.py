@@ -53,7 +53,9 @@ def load(
     ] = None,
     decimal: Annotated[
         str | None,
-        _input("Decimal mark of CSV. Default: a point, or a comma if the columns end otherwise and all have it."),
+        _input(
+            "Decimal mark of CSV. Default: a point; a comma if the numbers have one and no comma separates columns."
+        ),
     ] = None,
     header: Annotated[
         bool | None,
