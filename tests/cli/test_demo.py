@@ -42,7 +42,7 @@ def test_points_of_ones_own(tmp_path):
     options = ["--x", "east", "--y", "north", "--id", "truck", "--time", "minute", "--out", picture]
     done = demo("--points", file, *options)
     assert done.returncode == 0, done.stderr
-    assert "1 bad rows left out:" in done.stdout
+    assert "1 bad row left out:" in done.stdout
     assert "line 302: east is 'oops', not a number" in done.stdout
     assert done.stdout.splitlines()[-1] == "VERIFIED 20/20"
     assert is_picture(picture)

@@ -1,5 +1,6 @@
 """`dynhull load`: what is in the file is in the hull, once, whatever was in the way."""
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -106,7 +107,7 @@ BAD_LINES_REASONS = [
     ("line 3", "Expecting ',' delimiter: line 2 column 1 (char 8)"),
     ("line 4", "neither an object nor an array"),
     ("line 5", "x is missing"),
-    ("line 6", "its geometry is Polygon, not a Point"),
+    ("line 6", "its geometry is Polygon, not a Point (--vertices takes the vertices of every geometry)"),
     ("line 7", "y is nan, not finite"),
 ]
 
@@ -143,15 +144,15 @@ def test_bad_rows_of_parquet(tmp_path, name):
 @pytest.mark.parametrize(
     ("file", "content", "options", "message"),
     [
-        ("a.csv", "", [], "a.csv is empty: it needs a header line"),
+        ("a.csv", "", [], "a.csv is empty"),
         ("a.csv", "x,y\n", [], "a.csv has no points"),
         ("a.csv", "x,y\na,b\n", [], "line 2: x is 'a', not a number"),
         ("a.csv", "a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
         ("a.csv", "a,b\n1,2\n", ["--x", "a", "--y", "c"], "has no column 'c' (--y); it has a, b"),
         ("a.geojson", '{"type": "FeatureCollection", "features": []}', [], "has no points"),
-        ("a.geojson", '{"features": [', [], "a.geojson is no GeoJSON"),
-        ("a.parquet", "x,y\n1,2\n", [], "a.parquet is no Parquet file"),
-        ("a.xls", "", [], "the name must end in .csv, .parquet, .geojson, .ndjson, .jsonl"),
+        ("a.geojson", '{"features": [', [], "a.geojson is not valid JSON"),
+        ("a.parquet", "x,y\n1,2\n", [], "a.parquet is not a Parquet file"),
+        ("a.xls", "", [], "the name must end in .csv, .tsv, .parquet, .json, .geojson, .ndjson, .txt, .jsonl"),
         ("a.csv", "x,y\n1,2\n", ["--resume", "--again"], "give one"),
     ],
 )
@@ -187,6 +188,16 @@ def test_a_file_is_loaded_once_unless_told_otherwise(tmp_path, served, name):
         with HullClient(served) as client:
             assert client.get_hull(name).info.points == points
     assert "adding to it" in done.stderr
+
+
+def test_a_load_keeps_the_name_that_earlier_versions_gave_it(tmp_path, served, name):
+    """Otherwise a file that was loaded then could be loaded twice now."""
+    file = tmp_path / "points.csv"
+    file.write_text("x,y\n1,2\n")
+    assert dynhull("load", name, file).exit_code == 0
+    digest = hashlib.sha256(b"x,y\n1,2\n" + b"csv None None").hexdigest()
+    with HullClient(served) as client:
+        assert client.last_sequence(name, f"load-{digest[:32]}") == 1
 
 
 def test_resume_after_the_command_was_killed(tmp_path, served, name):

@@ -72,7 +72,7 @@ def test_bad_rows_are_counted_and_shown(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("", {}, "is empty: it needs a header line"),
+        ("", {}, "is empty"),
         ("a,b\n1,2\n", {}, "name its x column with --x; it has a, b"),
         ("a,b\n1,2\n", {"x": "a"}, "name its y column with --y; it has a, b"),
         ("a,b\n1,2\n", {"x": "a", "y": "c"}, r"has no column 'c' \(--y\); it has a, b"),

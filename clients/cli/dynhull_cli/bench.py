@@ -1,4 +1,4 @@
-"""`dynhull bench`: how fast a server is, as one client sees it."""
+"""`dynhull bench`: the speed of a server, measured by one client."""
 
 from functools import partial
 from time import perf_counter
@@ -10,7 +10,7 @@ import typer
 
 from dynhull_client import HullClient
 
-from .connected import connected
+from .connected import AsJson, connected
 from .json_lines import json_line
 
 Milliseconds = list[float]
@@ -19,18 +19,19 @@ Milliseconds = list[float]
 @connected
 def bench(
     client: HullClient,
-    seconds: Annotated[float, typer.Option(min=0.1, help="How long to write, and how long to read.")] = 5.0,
-    points: Annotated[int, typer.Option(min=1, help="Points there are all the time.")] = 100_000,
-    batch: Annotated[int, typer.Option(min=1, help="Points moved by a batch.")] = 1000,
-    in_flight: Annotated[int, typer.Option(min=1, help="Batches under way at a time.")] = 32,
-    as_json: Annotated[bool, typer.Option("--json", help="One line of JSON.")] = False,
+    seconds: Annotated[float, typer.Option(min=0.1, help="Seconds of writing, and seconds of reading.")] = 5.0,
+    points: Annotated[int, typer.Option(min=1, help="Points in the hull.")] = 100_000,
+    batch: Annotated[int, typer.Option(min=1, help="Points that each batch moves.")] = 1000,
+    in_flight: Annotated[int, typer.Option(min=1, help="Batches under way at the same time.")] = 32,
+    as_json: AsJson = False,
 ) -> None:
-    """Drive a server with a hull of its own, which is removed afterwards.
+    """Measure the speed of a server with a hull that the command creates and deletes.
 
         dynhull bench --batch 1 --in-flight 256
 
-    Points of a normal distribution move, some in each batch, oldest first; a move is two updates. The delay of a batch
-    is from handing it over to its acknowledgement, with others under way before it. Then single points are located.
+    First it writes: points from a normal distribution move, the oldest first; a move counts as two updates. The delay
+    of a batch lasts from its sending to its acknowledgement, while other batches are under way. Then it reads: single
+    points are located, one after the other.
     """
     name = f"bench-{uuid4().hex}"
     client.create_hull(name)
@@ -41,10 +42,10 @@ def bench(
     if as_json:
         typer.echo(json_line(points=points, batch=batch, in_flight=in_flight, **figures))
         return
-    typer.echo(f"{figures['updates_per_second']:,.0f} updates a second")
+    typer.echo(f"{figures['updates_per_second']:,.0f} updates per second")
     for what in ("acknowledgement", "locate"):
         median, tail = figures[f"{what}_ms_median"], figures[f"{what}_ms_p99"]
-        typer.echo(f"{what}: median {median:.2f} ms, 99 of 100 within {tail:.2f} ms")
+        typer.echo(f"{what}: median {median:.2f} ms, 99th percentile {tail:.2f} ms")
 
 
 def _write(client: HullClient, name: str, seconds: float, points: int, batch: int, in_flight: int) -> dict[str, float]:

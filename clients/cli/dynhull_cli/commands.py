@@ -1,29 +1,76 @@
-"""Commands come from the entry points in the group "dynhull.commands", each loaded when it is wanted."""
+"""The commands: entry points in the group "dynhull.commands", each imported when it runs.
 
+A package brings its own commands, so that no client has to import the server to offer `dynhull serve`.
+"""
+
+import ast
 from collections.abc import Callable
-from functools import wraps
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from functools import cache, wraps
+from importlib.metadata import EntryPoint, entry_points, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 GROUP = "dynhull.commands"
+PANELS = {
+    "Hulls and their points": ("list", "create", "delete", "insert", "remove", "load", "import"),
+    "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
+    "Server": ("serve", "config", "token", "dashboard", "bench"),
+    "Data folders": ("backup", "restore", "check", "export"),
+    "Getting to know dynhull": ("demo", "explain"),
+}
+OTHERS = "More"
 
 
 class InstalledCommands(TyperGroup):
     """A group whose commands are the installed entry points."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
-        """The commands' names, sorted."""
-        return sorted(entry_points(group=GROUP).names)
+        """The names of the commands, in the order of the help."""
+        known = [name for names in PANELS.values() for name in names if name in _installed()]
+        return known + sorted(_installed().keys() - set(known))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
-        """The command of that name; None where there is none."""
-        return next((_command(entry) for entry in entry_points(group=GROUP, name=cmd_name)), None)
+        """The command of that name, or None."""
+        return Deferred(_installed()[cmd_name]) if cmd_name in _installed() else None
 
 
-def _command(entry: EntryPoint) -> Any:
+class Deferred(TyperCommand):
+    """A command that is imported when it runs or shows its own help.
+
+    The list of commands and shell completion need only its name and its docstring, which is read from the source:
+    importing every command takes seconds.
+    """
+
+    def __init__(self, entry: EntryPoint) -> None:
+        panel = next((panel for panel, names in PANELS.items() if entry.name in names), OTHERS)
+        super().__init__(entry.name, help=_docstring(entry), rich_help_panel=panel)
+        self._entry = entry
+
+    def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """The context of the imported command."""
+        return _imported(self._entry).make_context(info_name, args, parent, **extra)
+
+
+@cache
+def _installed() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _docstring(entry: EntryPoint) -> str | None:
+    spec = find_spec(entry.module)
+    if spec is None or spec.origin is None:
+        return None
+    for statement in ast.parse(Path(spec.origin).read_bytes()).body:
+        if isinstance(statement, ast.FunctionDef) and statement.name == entry.attr:
+            return ast.get_docstring(statement)
+    return None
+
+
+def _imported(entry: EntryPoint) -> Any:
     command = typer.Typer(add_completion=False, rich_markup_mode="markdown")
     try:
         function = entry.load()
@@ -36,7 +83,7 @@ def _command(entry: EntryPoint) -> Any:
 
 
 def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..., None]:
-    """The command, which says what to install where something that it loads late is missing."""
+    """The command; where a module that it imports late is missing, it says what to install."""
 
     @wraps(function)
     def run(*arguments: Any, **options: Any) -> None:
@@ -49,12 +96,12 @@ def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..
 
 
 def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[], None]:
-    """A command that says what to install; `--help` of the group lists it like the others."""
+    """A command that only says what to install."""
     extras = ",".join(entry.extras)
 
     def explain() -> None:
         typer.echo(
-            f"dynhull {entry.name} needs {error.name}, which is not installed. "
+            f"error: dynhull {entry.name} needs {error.name}, which is not installed. "
             f"Install it with: pip install 'dynhull[{extras}]'",
             err=True,
         )
@@ -64,18 +111,28 @@ def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[]
     return explain
 
 
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"dynhull {version('dynhull')}")
+        raise typer.Exit
+
+
 app = typer.Typer(
     cls=InstalledCommands, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode="markdown"
 )
 
 
-@app.callback()
-def options() -> None:
+@app.callback(context_settings={"help_option_names": ["-h", "--help"]})
+def options(
+    _: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_show_version)
+    ] = False,
+) -> None:
     """Exact convex hulls of points that come and go.
 
-    Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, a token from --token or
-    DYNHULL_TOKEN.
+    Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
+    DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
 
-    Exit codes: 0 all is well, 1 something is not (a hull differs, a request was refused), 2 the command or its input
-    cannot be used, 3 the server does not answer, 4 it wants another token, 130 interrupted.
+    Exit codes: 0 success, 1 a hull differs or the server refused a request, 2 the command or its input is unusable,
+    3 the server does not answer, 4 the server wants another token, 130 interrupted.
     """

@@ -1,4 +1,4 @@
-"""What the commands that talk to a server share: how to reach it, and how they end."""
+"""What the commands that talk to a server share: the options of the connection, the client, and how errors end them."""
 
 import inspect
 import sys
@@ -6,26 +6,22 @@ from collections.abc import Callable
 from enum import IntEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
 
-import grpc
 import typer
 
-from dynhull_client import (
-    AsyncHullClient,
-    DeadlineError,
-    DynhullError,
-    HullClient,
-    PermissionDeniedError,
-    UnauthenticatedError,
-    UnavailableError,
-)
+from .address import target
 
-Client = TypeVar("Client", HullClient, AsyncHullClient)
+if TYPE_CHECKING:
+    import grpc
+
+    from dynhull_client import AsyncHullClient, HullClient
+
+Client = TypeVar("Client", "HullClient", "AsyncHullClient")
 
 
 class Connect(Protocol):
-    """Makes a client of a kind; `more` as for `Connection`."""
+    """Makes a client of the given class; `more` are further arguments of `Connection`."""
 
     def __call__(self, kind: type[Client], /, **more: Any) -> Client:
         """The client."""
@@ -33,7 +29,7 @@ class Connect(Protocol):
 
 
 class Exit(IntEnum):
-    """How a command ends, for scripts; 0 is success, 130 an interruption."""
+    """Exit codes for scripts; 0 is success, 130 an interruption."""
 
     FAILED = 1
     UNUSABLE = 2
@@ -49,22 +45,30 @@ def _pem(variable: str, text: str) -> Any:
     return _option(variable, f"PEM file: {text}", exists=True, dir_okay=False)
 
 
-Address = Annotated[str, _option("ADDRESS", "HOST:PORT.")]
-Token = Annotated[str | None, _option("TOKEN", "Bearer token to show.")]
-Tls = Annotated[bool, _option("TLS", "Encrypt, and trust what this machine trusts.")]
+Address = Annotated[
+    str, _option("ADDRESS", "HOST or HOST:PORT; the port is 50051 unless given. https://HOST asks for TLS.")
+]
+Token = Annotated[str | None, _option("TOKEN", "Bearer token.")]
+Tls = Annotated[bool, _option("TLS", "Encrypt, and trust the certificates that this machine trusts.")]
 TlsCa = Annotated[Path | None, _pem("TLS_CA", "encrypt, and trust these certificates.")]
-ClientCert = Annotated[Path | None, _pem("CLIENT_CERT", "certificate to show.")]
-ClientKey = Annotated[Path | None, _pem("CLIENT_KEY", "its private key.")]
+ClientCert = Annotated[Path | None, _pem("CLIENT_CERT", "certificate of this client.")]
+ClientKey = Annotated[Path | None, _pem("CLIENT_KEY", "private key of that certificate.")]
+
+HullName = Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")]
 
 
 def connected(command: Callable[..., None]) -> Callable[..., None]:
-    """A typer command with the options of a connection; `command` gets the client as its first argument.
+    """A typer command with the options of a connection; `command` receives the client as its first argument.
 
-    What goes wrong ends it with a message that says what to do, and with the exit code for that.
+    An error ends it with a message that says what to do, and with the exit code of its kind. The SDK is imported when a
+    command runs: its help and shell completion need half the time without.
     """
 
     @wraps(command)
     def with_client(connect: Connect, **given: Any) -> None:
+        from dynhull_client import HullClient
+
         with connect(HullClient) as client:
             command(client, **given)
 
@@ -72,7 +76,7 @@ def connected(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def connecting(command: Callable[..., None]) -> Callable[..., None]:
-    """As `connected`, but the first argument is a function that makes a client of either kind."""
+    """As `connected`, but the first argument is a function that makes a client, synchronous or asyncio."""
 
     def run(
         *,
@@ -84,20 +88,25 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         client_key: ClientKey = None,
         **given: Any,
     ) -> None:
+        import dynhull_client as sdk
+
         try:
+            address, encrypted = target(address)
+            tls = tls or encrypted
             credentials = _credentials(tls, tls_ca, client_cert, client_key)
             command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
-        except (UnavailableError, DeadlineError) as error:
-            advice = "Is it running (dynhull serve), is the address right (--address), does it want TLS (--tls)?"
+        except (sdk.UnavailableError, sdk.DeadlineError) as error:
+            encryption = "does it serve TLS at all" if tls or tls_ca or client_cert else "does it want TLS (--tls)"
+            advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
-        except UnauthenticatedError as error:
+        except sdk.UnauthenticatedError as error:
             fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
-        except PermissionDeniedError as error:
+        except sdk.PermissionDeniedError as error:
             fail(Exit.FORBIDDEN, str(error))
-        except DynhullError as error:
+        except sdk.HullNotFoundError as error:
+            fail(Exit.FAILED, f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one.")
+        except sdk.DynhullError as error:
             fail(Exit.FAILED, str(error))
-        except BrokenPipeError:  # whoever reads has enough: the command line ends in silence
-            raise
         except OSError as error:
             fail(Exit.UNUSABLE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
         except (ValueError, TypeError) as error:
@@ -112,19 +121,21 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def fail(code: Exit, message: str) -> None:
-    """End the command."""
+def fail(code: Exit, message: str) -> NoReturn:
+    """Print an error and end the command."""
     typer.echo(f"error: {message}", err=True)
     sys.exit(code)
 
 
 def _credentials(
     tls: bool, ca: Path | None, certificate: Path | None, key: Path | None
-) -> grpc.ChannelCredentials | None:
+) -> "grpc.ChannelCredentials | None":
     if (certificate is None) != (key is None):
-        raise ValueError("--client-cert and --client-key go together")
+        raise ValueError("--client-cert and --client-key must be given together")
     if not (tls or ca or certificate):
         return None
+    import grpc
+
     return grpc.ssl_channel_credentials(
         *(None if path is None else path.read_bytes() for path in (ca, key, certificate))
     )

@@ -1,45 +1,46 @@
-"""`dynhull phases` and `dynhull frontier`: what the lower and the upper side of a hull mean."""
+"""`dynhull phases` and `dynhull frontier`: the lower and the upper side of a hull, with a meaning."""
 
 import math
 from itertools import zip_longest
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynhull_client import HullClient
+if TYPE_CHECKING:
+    from dynhull_client import HullClient
 
-from .asked import asked_rows
-from .connected import connected
+from .connected import AsJson, connected
 from .json_lines import json_line
+from .rows import number_rows
 from .tab_lines import tab_line
 
 
 @connected
 def phases(
-    client: HullClient,
-    name: Annotated[str, typer.Argument(help="A hull of entries: composition from 0 to 1, and energy.")],
+    client: "HullClient",
+    name: Annotated[
+        str, typer.Argument(metavar="HULL", help="A hull of entries: composition from 0 to 1, and energy.")
+    ],
     entries: Annotated[
-        list[str] | None, typer.Argument(help="COMPOSITION,ENERGY each; - for lines of standard input.")
+        list[str] | None,
+        typer.Argument(metavar="COMPOSITION,ENERGY", help="Entries to look up; - for lines of standard input."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="A line of JSON for each.")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Read a hull as a phase diagram: the stable entries, or what others fall into.
+    """Read a hull as a phase diagram: the stable entries, or what other entries decompose into.
 
         dynhull phases iron-aluminium 0.25,-0.1 0.6,-0.2
 
-    Without entries, a line for each stable one, from left to right. With, a line for each: itself, how far it lies
-    above the hull, the stable entries to its left and right, and how much of it falls into each; nan beyond the
-    outermost.
+    Without entries: one line per stable entry, from left to right. With entries: one line each, with the entry, its
+    energy above the hull, the stable entries to its left and right, and the share of each; nan beyond the outermost.
     """
     if not entries:
         for entry in client.phase_diagram(name).stable.tolist():
             typer.echo(json_line(stable=entry) if as_json else tab_line(entry))
         return
-    for asked in asked_rows(entries):
-        found = client.phase_diagram(name, asked)
-        for entry, above, both, shares in zip(
-            asked, found.energies_above_hull, found.phases, found.shares, strict=True
-        ):
+    for rows in number_rows(entries):
+        found = client.phase_diagram(name, rows)
+        for entry, above, both, shares in zip(rows, found.energies_above_hull, found.phases, found.shares, strict=True):
             if as_json:
                 typer.echo(json_line(asked=entry, energy_above_hull=above, phases=both, shares=shares))
             else:
@@ -48,29 +49,32 @@ def phases(
 
 @connected
 def frontier(
-    client: HullClient,
-    name: Annotated[str, typer.Argument(help="A hull of points: risk, positive, and return.")],
-    points: Annotated[list[str] | None, typer.Argument(help="RISK,RETURN each; - for lines of standard input.")] = None,
-    rates: Annotated[
-        list[float] | None, typer.Option("--rate", help="A risk-free rate, to tell the best point for. Repeatable.")
+    client: "HullClient",
+    name: Annotated[str, typer.Argument(metavar="HULL", help="A hull of points: risk, which is positive, and return.")],
+    points: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="RISK,RETURN", help="Points to look up; - for lines of standard input."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="A line of JSON for each.")] = False,
+    rates: Annotated[
+        list[float] | None, typer.Option("--rate", help="A risk-free rate, to find the best point for. Repeatable.")
+    ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Read a hull as an efficient frontier: its corners, which points it dominates, the best ones for risk-free rates.
 
         dynhull frontier shares 0.2,0.05 0.3,0.12 --rate 0.01
 
-    Without points and rates, a line for each corner, from least risk to most return: itself, and the rate at which the
-    next one becomes the best. With points, a line for each: itself, and whether something better is offered. With
-    rates, a line for each: itself, the best point (the tangency: most excess return per risk), and that ratio
-    (Sharpe's).
+    Without points and rates: one line per corner, from least risk to most return, with the corner and the rate at which
+    the next one becomes the best. With points: one line each, with the point and whether the frontier dominates it.
+    With rates: one line each, with the rate, the best point (the tangency: the most excess return per risk), and that
+    ratio (Sharpe's).
     """
     if not points and not rates:
         found = client.frontier(name)
         for corner, rate in zip_longest(found.efficient, found.turning_rates, fillvalue=math.nan):
             typer.echo(json_line(efficient=corner, turning_rate=rate) if as_json else tab_line(corner, rate))
-    for asked in asked_rows(points or []):
-        for point, dominated in zip(asked, client.frontier(name, asked).dominated.tolist(), strict=True):
+    for rows in number_rows(points or []):
+        for point, dominated in zip(rows, client.frontier(name, rows).dominated.tolist(), strict=True):
             if as_json:
                 typer.echo(json_line(asked=point, dominated=dominated))
             else:

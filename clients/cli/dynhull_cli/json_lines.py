@@ -4,16 +4,14 @@ import json
 import math
 from typing import Any
 
-import numpy as np
-
 
 def json_line(**members: Any) -> str:
-    """An object on one line. What JSON has no number for, NaN and the infinities, is null."""
+    """An object on one line. NaN and the infinities, which JSON cannot write, become null."""
     return json.dumps(_plain(members), allow_nan=False)
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # of numpy, which a command may not have imported
         value = value.tolist()
     if isinstance(value, float):
         return value if math.isfinite(value) else None

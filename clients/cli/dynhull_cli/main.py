@@ -1,6 +1,8 @@
-"""The `dynhull` command. Needs only the standard library, to be able to say what is not installed."""
+"""The `dynhull` command. Starts with the standard library alone, to be able to say what is not installed."""
 
 import sys
+
+from .closed_pipe import success_on_closed_pipe
 
 
 def main() -> None:
@@ -11,4 +13,5 @@ def main() -> None:
         if error.name not in ("typer", "click", "rich"):
             raise
         sys.exit("The command line is not installed. Install it with: pip install 'dynhull[cli]'")
-    app()
+    with success_on_closed_pipe():
+        app()

@@ -1,24 +1,26 @@
-"""`dynhull query`: where points lie, and what lies where."""
+"""`dynhull query`: questions about points, answered by a hull."""
 
-from collections.abc import Callable
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynhull_client import HullClient
-from dynhull_client.messages import Points
-
-from .asked import STANDARD_INPUT, asked_rows
-from .connected import connected
+from .connected import AsJson, HullName, connected
 from .json_lines import json_line
+from .rows import given_or_read, number_rows
 from .tab_lines import tab_line
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dynhull_client import HullClient
+    from dynhull_client.messages import Points
 
 SIDES = {1: "inside", 0: "boundary", -1: "outside"}
 
 
 class Question(StrEnum):
-    """What can be asked."""
+    """The questions."""
 
     LOCATE = "locate"
     COUNT = "count"
@@ -29,7 +31,7 @@ class Question(StrEnum):
     VERTICES = "vertices"
 
 
-ANSWERS: dict[Question, Callable[[HullClient, str, Points], list[Any]]] = {
+ANSWERS: "dict[Question, Callable[[HullClient, str, Points], list[Any]]]" = {
     Question.LOCATE: lambda client, name, xy: [SIDES[each] for each in client.locate(name, xy).sides.tolist()],
     Question.COUNT: lambda client, name, xy: client.count(name, xy).counts.tolist(),
     Question.DISTANCE: lambda client, name, xy: client.distance(name, xy).distances.tolist(),
@@ -41,33 +43,38 @@ ANSWERS: dict[Question, Callable[[HullClient, str, Points], list[Any]]] = {
 
 @connected
 def query(
-    client: HullClient,
-    name: Annotated[str, typer.Argument(help="The hull.")],
-    question: Annotated[Question, typer.Argument(help="What to ask.")] = Question.VERTICES,
+    client: "HullClient",
+    name: HullName,
+    question: Annotated[
+        Question, typer.Argument(metavar="QUESTION", help="One of the questions above.")
+    ] = Question.VERTICES,
     points: Annotated[
-        list[str] | None, typer.Argument(help="X,Y each; of a line X,Y,X,Y. Default: lines of standard input.")
+        list[str] | None,
+        typer.Argument(metavar="X,Y", help="The points; X,Y,X,Y for a line. Default, or -: lines of standard input."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="A line of JSON for each.")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Ask a hull about points, exactly: a line for each, with its coordinates and the answer between tabs.
+    """Ask a hull about points: one line per point, with its coordinates and the exact answer between tabs.
 
         dynhull query fleet/north locate -73.9,40.7 -74.2,40.6
 
     * locate: inside, boundary or outside
-    * count: how many times the point is there
-    * distance: how far it is from the hull, 0 inside
-    * support: the vertex farthest in the direction X,Y
+    * count: how many copies of the point the hull holds
+    * distance: how far the point is from the hull; 0 inside
+    * support: the vertex that is farthest in the direction X,Y
     * tangents: the left and the right tangent point
     * lines: where the line through two points enters and leaves the hull
-    * vertices: takes no points; the hull itself, counter-clockwise
+    * vertices (without points): the vertices of the hull, counter-clockwise
     """
     if question is Question.VERTICES:
+        if points:
+            raise ValueError(f"vertices takes no points, but {points[0]!r} was given")
         for vertex in client.get_hull(name).vertices.tolist():
             typer.echo(json_line(vertex=vertex) if as_json else tab_line(vertex))
         return
     columns = 4 if question is Question.LINES else 2
-    for asked in asked_rows(points or STANDARD_INPUT, columns):
-        for row, answer in zip(asked.tolist(), ANSWERS[question](client, name, asked), strict=True):
+    for rows in number_rows(given_or_read(points), columns):
+        for row, answer in zip(rows.tolist(), ANSWERS[question](client, name, rows), strict=True):
             typer.echo(json_line(asked=row, answer=answer) if as_json else tab_line(row, answer))
 
 

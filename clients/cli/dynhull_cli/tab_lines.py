@@ -3,16 +3,14 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 
 def tab_line(*values: Any) -> str:
-    """Everything in some values, however deep in arrays and tuples, between tabs."""
+    """The values, with nested arrays and tuples flattened, between tabs."""
     return "\t".join(map(str, _flat(values)))
 
 
 def _flat(value: Any) -> Iterator[Any]:
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # of numpy, which a command may not have imported
         value = value.tolist()
     if isinstance(value, list | tuple):
         for each in value:

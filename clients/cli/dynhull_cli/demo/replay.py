@@ -1,4 +1,4 @@
-"""Replaying a scene through a server, and comparing three hulls after every frame."""
+"""Replays a scene through a server and compares three hulls after every frame."""
 
 import threading
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ from dynhull_client import HullClient, HullCopy
 
 from .scene import Frame, Points, Scene
 
-PATIENCE = 30.0  # seconds to wait for the watcher before it counts as different
+PATIENCE = 30.0  # seconds to wait for the watcher; later, its copy counts as different
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one frame showed.
+    """The outcome of one frame.
 
     Attributes:
         frame: the frame.
@@ -32,7 +32,7 @@ class Step:
 
 
 class Watcher:
-    """A subscriber's own copy of a hull, kept up to date by a thread of its own."""
+    """A copy of a hull that a thread keeps up to date from a watch."""
 
     def __init__(self, client: HullClient, name: str) -> None:
         self._moved = threading.Condition()
@@ -48,13 +48,13 @@ class Watcher:
                 with self._moved:
                     self._copy.update(event)
                     self._moved.notify_all()
-        except Exception as failure:  # handed to whoever waits for the copy
+        except Exception as failure:  # raised in the thread that waits for the copy
             with self._moved:
                 self._failure = failure
                 self._moved.notify_all()
 
     def vertices_at(self, revision: int) -> Points | None:
-        """The copy once it has reached a revision; None where it does not, or passes it by."""
+        """The copy at a revision; None if it does not get there in time, or skips it."""
         deadline = monotonic() + PATIENCE
         with self._moved:
             while self._copy.revision < revision:
@@ -71,10 +71,10 @@ class Watcher:
 
 
 def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
-    """Send every frame as one batch over one open stream, and look at the hull after each from three sides.
+    """Send every frame as one batch over one open stream, and check the hull after each in three ways.
 
-    The live hull must equal Chan's recomputation from the points the server holds, these must be as many as were sent,
-    and the watcher's copy must equal the live hull.
+    The live hull must equal Chan's recomputation from the points in the server, the number of these points must be the
+    number sent, and the watcher's copy must equal the live hull.
     """
     name = scene.hull_name
     client.create_hull(name)
@@ -92,7 +92,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
                 elif verified.points != len(frame.positions):
                     difference = f"the server holds {verified.points} points, {len(frame.positions)} were sent"
                 elif copy is None:
-                    difference = f"the watcher did not get to revision {revision}"
+                    difference = f"the watcher did not reach revision {revision}"
                 elif not np.array_equal(copy, live.vertices):
                     difference = f"the watcher's copy differs: {copy.tolist()} instead of {live.vertices.tolist()}"
                 yield Step(frame, live.vertices, live.measures.area, difference)

@@ -1,4 +1,4 @@
-"""What a demo replays: points that come, move and go, frame by frame."""
+"""The input of a demo: points that appear, move and disappear, frame by frame."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ Points = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One batch of changes, and what is there after it.
+    """One batch of changes, and all points after it.
 
     Attributes:
-        clock: the frame's time, or whatever orders the frames, as text.
+        clock: the time of the frame, or other text that orders the frames.
         delete: (k, 2) points to delete.
         insert: (m, 2) points to insert.
         positions: (n, 2) all points after the batch.
@@ -40,17 +40,17 @@ class Frame:
 
 
 class Scene(Protocol):
-    """Frames, and the words to speak of them.
+    """Frames, and the words for them.
 
     Attributes:
-        title: what it is, for the heading and the picture.
+        title: the heading, also of the picture.
         hull_name: the hull's name on the server.
         counted: what the points are, in the plural.
         step: what a frame is, in the plural.
         length_unit: the unit of coordinates, as an adjective of an axis.
         area_unit: the unit of an area.
-        length: how many frames there are.
-        notes: what was left out of the input, and why; printed first.
+        length: the number of frames.
+        notes: lines about the input, such as what was left out; printed first.
         background: (m, 2) points that never move, drawn faintly.
     """
 

@@ -1,4 +1,4 @@
-"""A server process of the demo's own."""
+"""The server process of the demo."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ STOP_SECONDS = 10
 
 @contextmanager
 def server_process() -> Iterator[str]:
-    """Start `dynhull serve` on a free port; yields its address, stops it in the end."""
+    """Start `dynhull serve` on a free port, yield its address, and stop it at the end."""
     command = [sys.executable, "-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:  # noqa: S603  (our own module)
         try:

@@ -1,4 +1,4 @@
-"""Anybody's points: a CSV file with a header, columns chosen by name."""
+"""The points of a CSV file, as a scene."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,9 +16,9 @@ MILESTONES = 24
 class Table:
     """Rows of a CSV file, in batches.
 
-    With a time column, one batch for each of its values, in their order (as numbers where all of them are, otherwise as
-    text); without, the file is cut into `batches` equal parts. With an id column, a row whose id was seen before moves
-    that point; without, every row adds a point. Rows that have no finite coordinates are counted and shown.
+    With a time column, there is one batch for each value, in order: as numbers if all are numbers, otherwise as text.
+    Without, the file is cut into `batches` equal parts. With an id column, a row whose id was seen before moves that
+    point; without, every row adds a point. Rows without finite coordinates are counted and shown.
     """
 
     counted = "points"
@@ -38,7 +38,7 @@ class Table:
         self.background = np.empty((0, 2))
 
     def frames(self) -> Iterator[Frame]:
-        """A frame a batch."""
+        """One frame per batch."""
         there: dict[str, tuple[float, float]] = {}
         every = max(1, math.ceil(self.length / MILESTONES))
         for i, (clock, rows) in enumerate(self._batches):

@@ -1,4 +1,4 @@
-"""Rows that are no points: counted, the first ones shown, all of them written to a file where wanted."""
+"""Rows that cannot be read as points: counted, the first ones shown, all of them written to a file if wanted."""
 
 import csv
 from collections.abc import Iterable, Iterator
@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TextIO
 
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
+from ..plural import plural
 from .chunks import BadRow, Chunk, Points
 
 
 class BadRows:
-    """The bad rows of a load; ValueError as soon as there are more than `most`."""
+    """The bad rows of a load, written to `file` if there is one; ValueError as soon as there are more than `most`."""
 
     def __init__(self, file: TextIO | None, most: int | None) -> None:
         self.count = 0
@@ -28,7 +29,7 @@ class BadRows:
             yield chunk.points
 
     def report(self) -> list[str]:
-        """Lines about them."""
+        """Lines for the user: how many there are, and the first ones."""
         return bad_rows_left_out([f"{each.place}: {each.reason}" for each in self._first], self.count)
 
     def _add(self, rows: list[BadRow]) -> None:
@@ -37,9 +38,9 @@ class BadRows:
         if self._writer is not None:
             self._writer.writerows((each.place, each.reason, each.text) for each in rows)
         if self._most is not None and self.count > self._most:
-            raise ValueError("\n".join([f"more than {self._most:,} bad rows (--max-bad)", *self.report()]))
+            raise ValueError("\n".join([f"more than {plural(self._most, 'bad row')} (--max-bad)", *self.report()]))
 
 
 def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:
-    """The file to write them to."""
+    """The file for the bad rows, if one is wanted."""
     return nullcontext() if path is None else path.open("w", encoding="utf-8", newline="")

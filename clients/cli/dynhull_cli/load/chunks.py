@@ -1,6 +1,6 @@
 """Points as they are read: a chunk of good rows at a time, and what is wrong with the bad ones."""
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import TypeVar
@@ -11,12 +11,13 @@ import numpy.typing as npt
 CHUNK_ROWS = 8192
 
 Points = npt.NDArray[np.float64]
+Position = tuple[float, float]
 Row = TypeVar("Row")
 
 
 @dataclass(frozen=True, slots=True)
 class BadRow:
-    """A row that is no point: where it is, why, and what it looks like."""
+    """A row that cannot be read as points: where it is, why, and its text."""
 
     place: str
     reason: str
@@ -25,7 +26,7 @@ class BadRow:
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """(n, 2) finite points in the order of the file, and the rows between them that are none."""
+    """(n, 2) finite points in the order of the file, and the bad rows between them."""
 
     points: Points
     bad: list[BadRow] = field(default_factory=list)
@@ -35,13 +36,17 @@ Chunks = Generator[Chunk, None, None]
 
 
 def picked(
-    rows: Iterable[tuple[str, Row]], position: Callable[[Row], tuple[float, float]], text: Callable[[Row], str] = str
+    rows: Iterable[tuple[str, Row]], positions: Callable[[Row], Sequence[Position]], text: Callable[[Row], str] = str
 ) -> Chunk:
-    """A chunk of rows, each with its place. `position` raises ValueError where one is no point; `text` shows it."""
-    points, bad = [], []
+    """A chunk from rows with their places.
+
+    `positions` returns the points of a row and raises ValueError where it has none; `text` shows the row.
+    """
+    points: list[Position] = []
+    bad = []
     for place, row in rows:
         try:
-            points.append(position(row))
+            points.extend(positions(row))
         except ValueError as reason:
             bad.append(BadRow(place, str(reason), text(row)))
     return Chunk(np.array(points, np.float64).reshape(-1, 2), bad)

@@ -1,50 +1,53 @@
-"""Points of a CSV file with a header."""
-
-import csv
-import io
-from itertools import accumulate
-from typing import IO
+"""Points of a CSV file."""
 
 import numpy as np
 
-from ..csv_points import coordinate, coordinate_columns
-from .chunks import CHUNK_ROWS, Chunk, Chunks, cut, picked
+from ..columns import coordinate, decimal_mark, plain
+from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbered
+from .chunks import CHUNK_ROWS, Chunk, Chunks, Position, cut, picked
+from .source import Format, Source
 
 
-def read_csv(name: str, file: IO[bytes], x: str | None, y: str | None) -> Chunks:
-    """Chunks of points from the columns of x and y; ValueError where the header does not have them."""
-    text = io.TextIOWrapper(file, "utf-8-sig", errors="replace", newline="")
-    reader = csv.reader(text)
+def read_csv(source: Source) -> Chunks:
+    """Chunks of points from the columns of x and y."""
+    options = source.options
+    delimiter = "tab" if source.format is Format.TSV else options.delimiter
+    given = CsvFormat(options.x, options.y, delimiter, options.header, options.encoding)
     try:
-        header = next(reader, [])
-        if not header:
-            raise ValueError(f"{name} is empty: it needs a header line with the names of its columns")
-        columns = coordinate_columns(name, header, x, y)
-        places = header.index(columns[0]), header.index(columns[1])
-        line = reader.line_num + 1
-        for rows in cut(reader, CHUNK_ROWS):
-            yield _chunk(rows, line, places, columns)
-            line = reader.line_num + 1
-    except csv.Error as error:
-        raise ValueError(f"{name}, line {reader.line_num}: {error}") from None
-    finally:
-        text.detach()
+        with csv_table(source.name, source.file, given) as table:
+            source.notes.extend(table.notes)
+            yield from _chunks(table, options.decimal)
+    except UnclearTableError as error:
+        raise ValueError(f"{error}; {error.advice}") from None
 
 
-def _chunk(rows: list[list[str]], line: int, places: tuple[int, int], columns: tuple[str, str]) -> Chunk:
-    """The points of rows, the first of which is on that line."""
+def _chunks(table: CsvTable, decimal: str | None) -> Chunks:
+    line = table.first_line
+    for rows in cut(table.rows, CHUNK_ROWS):
+        if decimal is None:
+            texts = (row[place] for row in rows for place in (table.x, table.y) if place < len(row))
+            decimal = decimal_mark(texts, table.delimiter)
+        yield _chunk(rows, line, table, decimal)
+        line = table.next_line()
+
+
+def _chunk(rows: list[list[str]], line: int, table: CsvTable, decimal: str) -> Chunk:
+    """The points of rows that begin on that line."""
+    places = table.x, table.y
     try:
-        points = np.array([[float(row[place]) for row in rows] for place in places]).T
+        texts = [[row[place] for row in rows] for place in places]
+        # One check for all: a number with _ or with the other decimal mark is looked at below, row by row.
+        plain("".join(map("".join, texts)), decimal)
+        if decimal != ".":
+            texts = [[text.replace(decimal, ".") for text in column] for column in texts]
+        points = np.array([[float(text) for text in column] for column in texts]).T
     except (ValueError, IndexError):
         points = np.full((1, 2), np.nan)
     if np.isfinite(points).all():
         return Chunk(points + 0.0)
 
-    def position(row: list[str]) -> tuple[float, float]:
-        texts = (row[place] if place < len(row) else None for place in places)
-        x, y = map(coordinate, texts, columns)
-        return x, y
+    def positions(row: list[str]) -> list[Position]:
+        x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
+        return [(x, y)]
 
-    # One by one takes several times as long. A row may go over several lines, and one without columns is none.
-    lines = accumulate((1 + sum(text.count("\n") for text in row) for row in rows), initial=line)
-    return picked(((f"line {first}", row) for first, row in zip(lines, rows, strict=False) if row), position, ",".join)
+    return picked(((f"line {at}", row) for at, row in numbered(rows, line)), positions, ",".join)

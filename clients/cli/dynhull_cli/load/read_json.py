@@ -1,72 +1,96 @@
-"""Points of GeoJSON, and of JSON line by line."""
+"""Points of JSON: GeoJSON, an array of rows, or one row per line."""
 
+import codecs
 import json
-import math
+from collections.abc import Callable, Iterable
 from typing import IO, Any
 
 import ijson
 
-from ..csv_points import coordinate_columns
-from .chunks import CHUNK_ROWS, Chunks, cut, picked
+from ..columns import coordinate_columns
+from ..peek import peek
+from .chunks import CHUNK_ROWS, Chunks, Position, cut, picked
+from .geometry import json_text, number, position, positions
+from .source import Source
 
-LONGEST_TEXT = 200
+LOOKED_AT = 4096  # bytes, to tell the kinds of JSON apart
 
 
-def read_geojson(name: str, file: IO[bytes], _x: str | None, _y: str | None) -> Chunks:
-    """Chunks of the Point features of a FeatureCollection, which is never in memory as a whole."""
-    features = enumerate(ijson.items(file, "features.item", use_float=True), start=1)
+def read_json(source: Source) -> Chunks:
+    """Chunks of points of any of the three kinds."""
+    start = _skip_byte_order_mark(source.file).lstrip()
+    if start.startswith(b"["):
+        return _read_items(source, "item", "item", _row_reader(source))
+    first, ended, _ = start.partition(b"\n")
+    return read_ndjson(source) if ended and _is_row(first) else read_geojson(source)
+
+
+def read_geojson(source: Source) -> Chunks:
+    """Chunks of points of the features of a FeatureCollection, which is never in memory as a whole."""
+    _skip_byte_order_mark(source.file)
+    return _read_items(source, "features.item", "feature", lambda value: _of_feature(value, source.options.vertices))
+
+
+def read_ndjson(source: Source) -> Chunks:
+    """Chunks of points, one row per line."""
+    _skip_byte_order_mark(source.file)
+    read = _row_reader(source)
+    lines = ((f"line {i}", line) for i, line in enumerate(source.file, start=1) if not line.isspace())
+    for rows in cut(lines, CHUNK_ROWS):
+        yield picked(rows, lambda line: read(json.loads(line)), lambda line: line.decode(errors="replace").strip())
+
+
+def _read_items(source: Source, path: str, place: str, read: Callable[[Any], list[Position]]) -> Chunks:
+    items: Iterable[tuple[int, Any]] = enumerate(ijson.items(source.file, path, use_float=True), start=1)
     try:
-        for rows in cut(((f"feature {i}", feature) for i, feature in features), CHUNK_ROWS):
-            yield picked(rows, _of_feature, _text)
+        for rows in cut(((f"{place} {i}", item) for i, item in items), CHUNK_ROWS):
+            yield picked(rows, read, json_text)
     except ijson.JSONError as error:
-        raise ValueError(f"{name} is no GeoJSON: {error}") from None
+        raise ValueError(f"{source.name} is not valid JSON: {error}") from None
 
 
-def read_ndjson(name: str, file: IO[bytes], x: str | None, y: str | None) -> Chunks:
-    """Chunks of points, one a line: an object with members x and y, an array of two, or a GeoJSON feature."""
-    columns = None if x is None or y is None else (x, y)
+def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
+    """Reads a row: an object with members of x and y, an array of two numbers, or a GeoJSON feature or geometry.
 
-    def position(line: bytes) -> tuple[float, float]:
-        nonlocal columns
-        value = json.loads(line)
+    The first object decides which members these are.
+    """
+    x, y = source.options.x, source.options.y
+    members = None if x is None or y is None else (x, y)
+
+    def read(value: Any) -> list[Position]:
+        nonlocal members
         if isinstance(value, list):
-            return _of_array(value)
+            return [position(value)]
         if not isinstance(value, dict):
             raise ValueError("neither an object nor an array")
         if value.get("type") == "Feature":
-            return _of_feature(value)
-        if columns is None:
-            columns = coordinate_columns(name, list(value), x, y)
-        return _number(value.get(columns[0]), columns[0]), _number(value.get(columns[1]), columns[1])
+            return _of_feature(value, source.options.vertices)
+        if "coordinates" in value or "geometries" in value:
+            return positions(value, source.options.vertices)
+        if members is None:
+            names = list(value)
+            i, j = coordinate_columns(source.name, names, x, y)
+            members = names[i], names[j]
+        return [(number(value.get(members[0]), members[0]), number(value.get(members[1]), members[1]))]
 
-    lines = ((f"line {i}", line) for i, line in enumerate(file, start=1) if not line.isspace())
-    for rows in cut(lines, CHUNK_ROWS):
-        yield picked(rows, position, lambda line: line.decode(errors="replace").strip())
-
-
-def _of_feature(feature: Any) -> tuple[float, float]:
-    geometry = (feature.get("geometry") if isinstance(feature, dict) else None) or {}
-    if geometry.get("type") != "Point":
-        raise ValueError(f"its geometry is {geometry.get('type', 'nothing')}, not a Point")
-    return _of_array(geometry.get("coordinates"))
+    return read
 
 
-def _of_array(value: Any) -> tuple[float, float]:
-    if not isinstance(value, list) or len(value) < 2:
-        raise ValueError("not two coordinates")
-    return _number(value[0], "x"), _number(value[1], "y")
+def _of_feature(feature: Any, every_vertex: bool) -> list[Position]:
+    return positions(feature.get("geometry") if isinstance(feature, dict) else None, every_vertex)
 
 
-def _number(value: Any, column: str) -> float:
-    if value is None:
-        raise ValueError(f"{column} is missing")
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{column} is {_text(value)}, not a number")
-    if not math.isfinite(value):
-        raise ValueError(f"{column} is {value}, not finite")
-    return value + 0.0
+def _is_row(line: bytes) -> bool:
+    """Whether a line is a JSON value by itself, and not a whole FeatureCollection."""
+    try:
+        value = json.loads(line)
+    except ValueError:
+        return False
+    return not (isinstance(value, dict) and value.get("type") == "FeatureCollection")
 
 
-def _text(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
+def _skip_byte_order_mark(file: IO[bytes]) -> bytes:
+    """Skip the mark; the first bytes after it, which remain to be read."""
+    if peek(file, LOOKED_AT).startswith(codecs.BOM_UTF8):
+        file.read(len(codecs.BOM_UTF8))
+    return peek(file, LOOKED_AT)

@@ -1,45 +1,106 @@
-"""Points of a Parquet file."""
+"""Points of a Parquet or GeoParquet file."""
 
-from typing import IO, Any
+import json
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..csv_points import coordinate, coordinate_columns
-from .chunks import CHUNK_ROWS, Chunk, Chunks, picked
+from ..columns import coordinate, coordinate_columns
+from .chunks import CHUNK_ROWS, Chunk, Chunks, Position, picked
+from .geometry import positions
+from .source import Source
+from .wkb import decode
 
 BUFFER_BYTES = 2**20  # without one, and with pre_buffer, whole row groups are in memory
+GEO_KEY = b"geo"  # of the schema's metadata, by the GeoParquet specification
+WKB_POINTS = np.dtype([("order", "u1"), ("type", "<u4"), ("xy", "<f8", (2,))])
+LITTLE_ENDIAN, POINT = 1, 1
 
 
-def read_parquet(name: str, file: IO[bytes], x: str | None, y: str | None) -> Chunks:
-    """Chunks of points from the columns of x and y, read a few rows at a time."""
-    if not file.seekable():
-        raise ValueError(f"{name} is a pipe, and Parquet is read from its end: write it to a file first")
+def read_parquet(source: Source) -> Chunks:
+    """Chunks of points, a few rows at a time, from the columns of x and y or from GeoParquet's geometry column."""
+    if not source.file.seekable():
+        raise ValueError(f"{source.name} is a pipe, and Parquet is read from its end: write it to a file first")
     try:
-        parquet = pq.ParquetFile(file, pre_buffer=False, buffer_size=BUFFER_BYTES)
+        parquet = pq.ParquetFile(source.file, pre_buffer=False, buffer_size=BUFFER_BYTES)
     except pa.ArrowInvalid as error:
-        raise ValueError(f"{name} is no Parquet file: {error}") from None
+        raise ValueError(f"{source.name} is not a Parquet file: {error}") from None
+    geometry = None if source.options.x or source.options.y else _geometry_column(source.name, parquet.schema_arrow)
+    if geometry is None:
+        yield from _of_columns(source, parquet)
+    else:
+        source.notes.append(f"{source.name}: points from the geometry column {geometry}")
+        yield from _of_geometries(parquet, geometry, source.options.vertices)
+
+
+def _of_columns(source: Source, parquet: Any) -> Chunks:
     schema = parquet.schema_arrow
-    columns = coordinate_columns(name, schema.names, x, y)
-    for column in columns:
-        kind = schema.field(column).type
+    names = [schema.names[i] for i in coordinate_columns(source.name, schema.names, source.options.x, source.options.y)]
+    for name in names:
+        kind = schema.field(name).type
         if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
-            raise ValueError(f"{name}: column {column} holds {kind}, not numbers")
+            raise ValueError(f"{source.name}: column {name} holds {kind}, not numbers")
     first = 1
-    for batch in parquet.iter_batches(CHUNK_ROWS, columns=list(columns)):
-        yield _chunk([batch[column] for column in columns], columns, first)
+    for batch in parquet.iter_batches(CHUNK_ROWS, columns=names):
+        yield _chunk([batch[name] for name in names], names, first)
         first += len(batch)
 
 
-def _chunk(arrays: list[Any], columns: tuple[str, str], first: int) -> Chunk:
+def _chunk(arrays: list[Any], names: list[str], first: int) -> Chunk:
     points = np.stack([each.cast(pa.float64()).to_numpy(zero_copy_only=False) for each in arrays], axis=1)
     if np.isfinite(points).all():
         return Chunk(points + 0.0)
 
-    def position(row: tuple[Any, ...]) -> tuple[float, float]:
-        x, y = map(coordinate, (None if value is None else str(value) for value in row), columns)
-        return x, y
+    def position(row: tuple[Any, ...]) -> list[Position]:
+        x, y = map(coordinate, (None if value is None else str(value) for value in row), names)
+        return [(x, y)]
 
     rows = zip(*(each.to_pylist() for each in arrays), strict=True)
     return picked(((f"row {i}", row) for i, row in enumerate(rows, start=first)), position)
+
+
+def _geometry_column(name: str, schema: Any) -> str | None:
+    """The primary geometry column of GeoParquet, None of other files; ValueError for an encoding that is not read."""
+    if GEO_KEY not in (schema.metadata or {}):
+        return None
+    geo = json.loads(schema.metadata[GEO_KEY])
+    column = str(geo["primary_column"])
+    encoding = geo["columns"][column]["encoding"]
+    if encoding not in ("WKB", "point"):
+        raise ValueError(f"{name}: the geometry column {column} is encoded as {encoding}; WKB and point can be read")
+    return column
+
+
+def _of_geometries(parquet: Any, column: str, every_vertex: bool) -> Chunks:
+    def of_binary(data: bytes | None) -> list[Position]:
+        return positions(None if data is None else decode(data), every_vertex)
+
+    first = 1
+    for batch in parquet.iter_batches(CHUNK_ROWS, columns=[column]):
+        array = batch[column]
+        if pa.types.is_struct(array.type):
+            yield _chunk([pc.struct_field(array, axis) for axis in ("x", "y")], ["x", "y"], first)
+        else:
+            rows = array.to_pylist()
+            points = _wkb_points(rows)
+            if points is None:
+                yield picked(((f"row {i}", row) for i, row in enumerate(rows, start=first)), of_binary, _hex)
+            else:
+                yield Chunk(points)
+        first += len(batch)
+
+
+def _wkb_points(rows: list[bytes | None]) -> Any:
+    """The points where all rows are plain little-endian ones, which is the usual case; otherwise None."""
+    if any(row is None or len(row) != WKB_POINTS.itemsize for row in rows):
+        return None
+    found = np.frombuffer(b"".join(filter(None, rows)), WKB_POINTS)
+    usual = (found["order"] == LITTLE_ENDIAN).all() and (found["type"] == POINT).all()
+    return found["xy"] + 0.0 if usual and np.isfinite(found["xy"]).all() else None
+
+
+def _hex(data: bytes | None) -> str:
+    return "" if data is None else data.hex()

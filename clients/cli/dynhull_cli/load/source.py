@@ -1,86 +1,185 @@
-"""Where points come from: a file or standard input, in one of four formats."""
+"""The input of a load: a file or standard input, compressed or not, in one of several formats."""
 
+import gzip
 import hashlib
+import io
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
-from typing import IO
+from typing import IO, Any, cast
 
+from ..csv_table import UTF16_MARKS
+from ..peek import peek
 from .chunks import Chunks
 
 STANDARD_INPUT = "-"
 DIGESTED_BYTES = 2**20
+GZIP_MARK = b"\x1f\x8b"
 
 
 class Format(StrEnum):
-    """What a file can be."""
+    """The formats."""
 
     CSV = "csv"
+    TSV = "tsv"
     PARQUET = "parquet"
+    JSON = "json"
     GEOJSON = "geojson"
     NDJSON = "ndjson"
 
 
-Reader = Callable[[str, IO[bytes], str | None, str | None], Chunks]
-SUFFIXES = {f".{each}": each for each in Format} | {".jsonl": Format.NDJSON}
+SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How to read the input; None for what is to be found out. The fields are the options of the command.
+
+    Attributes:
+        x: the column or member of x.
+        y: the column or member of y.
+        delimiter: the character between columns of CSV.
+        decimal: the decimal mark of CSV.
+        header: whether the first row of CSV names the columns.
+        encoding: the encoding of CSV.
+        vertices: whether to take the vertices of geometries that are no single points.
+    """
+
+    x: str | None = None
+    y: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    header: bool | None = None
+    encoding: str | None = None
+    vertices: bool = False
+
+
+TABLES = {Format.CSV, Format.TSV}
+APPLIES_TO = {
+    "x": set(Format) - {Format.GEOJSON},
+    "y": set(Format) - {Format.GEOJSON},
+    "delimiter": {Format.CSV},
+    "decimal": TABLES,
+    "header": TABLES,
+    "encoding": TABLES,
+    "vertices": set(Format) - TABLES,
+}
 
 
 @dataclass(frozen=True)
 class Source:
-    """A file or a pipe that points are read from, once, with columns of x and y where its format has columns.
+    """An input that is read once.
 
-    `size` is in bytes, None for a pipe.
+    Attributes:
+        name: what messages call it.
+        file: its bytes, decompressed; it can be peeked into.
+        compressed: the bytes as they are stored.
+        size: how many these are; None for a pipe.
+        format: its format.
+        options: how to read it.
+        notes: lines about what was found out while reading and may surprise.
     """
 
     name: str
     file: IO[bytes]
+    compressed: IO[bytes]
     size: int | None
     format: Format
-    x: str | None
-    y: str | None
+    options: Options
+    notes: list[str] = field(default_factory=list)
 
     def chunks(self) -> Chunks:
-        """The points; ValueError where the file is not what it should be."""
-        return _reader(self.format)(self.name, self.file, self.x, self.y)
+        """The points; ValueError where the input cannot be read as this format."""
+        return _reader(self.format)(self)
+
+    def rewind(self) -> None:
+        """Begin anew; not of a pipe."""
+        self.file.seek(0)
+        self.notes.clear()
 
     def done(self) -> int:
-        """Bytes read so far."""
-        return 0 if self.size is None else self.file.tell()
+        """Bytes read so far, of `size`."""
+        return 0 if self.size is None else self.compressed.tell()
 
     def digest(self) -> str | None:
-        """Tells the points of this file from those of any other; None for a pipe, which can be read only once."""
+        """A name for the points of this file, the same at each load; None for a pipe, which can be read only once."""
         if self.size is None:
             return None
         digest = hashlib.sha256()
         while part := self.file.read(DIGESTED_BYTES):
             digest.update(part)
         self.file.seek(0)
-        digest.update(f"{self.format} {self.x} {self.y}".encode())
+        # Only what differs from the default, so that a file has the name that earlier versions gave it.
+        more = [f" {name}={value}" for name, value in _given(self.options).items() if name not in ("x", "y")]
+        digest.update(f"{self.format} {self.options.x} {self.options.y}{''.join(more)}".encode())
         return digest.hexdigest()
 
 
+Reader = Callable[[Source], Chunks]
+
+
 @contextmanager
-def open_source(name: str, kind: Format | None, x: str | None, y: str | None) -> Iterator[Source]:
-    """Open a file, or standard input for "-". Without a `kind`, the name's end tells; standard input is CSV."""
+def open_source(name: str, kind: Format | None, options: Options) -> Iterator[Source]:
+    """Open a file, or standard input for "-". Without a `kind`, the end of the name says it; standard input is CSV.
+
+    ValueError where the format is not known, an option is not for it, or the compressed data is damaged.
+    """
+    kind = kind or _format_of(name)
+    for option in _given(options):
+        if kind not in APPLIES_TO[option]:
+            formats = ", ".join(each for each in Format if each in APPLIES_TO[option])
+            raise ValueError(f"--{option} is for {formats}, not for {kind}")
+    try:
+        if name == STANDARD_INPUT:
+            raw: Any = getattr(sys.stdin.buffer, "raw", sys.stdin.buffer)
+            stdin = io.BufferedReader(raw)
+            try:
+                yield _source("standard input", stdin, None, kind, options)
+            finally:
+                stdin.detach()
+        else:
+            path = Path(name)
+            with path.open("rb") as file:
+                size = path.stat().st_size if path.is_file() else None
+                yield _source(name, file, size, kind, options)
+    except (gzip.BadGzipFile, zlib.error, EOFError) as error:
+        raise ValueError(f"{name}: the compressed data is damaged: {error}") from None
+
+
+def _format_of(name: str) -> Format:
     if name == STANDARD_INPUT:
-        yield Source("standard input", sys.stdin.buffer, None, kind or Format.CSV, x, y)
-        return
-    path = Path(name)
-    if kind is None:
-        if path.suffix not in SUFFIXES:
-            raise ValueError(f"{name}: the name must end in {', '.join(SUFFIXES)}, or say what it is with --format")
-        kind = SUFFIXES[path.suffix]
-    with path.open("rb") as file:
-        yield Source(name, file, path.stat().st_size, kind, x, y)
+        return Format.CSV
+    suffix = Path(name.lower().removesuffix(".gz")).suffix
+    if suffix not in SUFFIXES:
+        raise ValueError(f"{name}: the name must end in {', '.join(SUFFIXES)}; otherwise give the format with --format")
+    return SUFFIXES[suffix]
+
+
+def _source(name: str, stored: IO[bytes], size: int | None, kind: Format, options: Options) -> Source:
+    file = stored
+    if peek(stored, len(GZIP_MARK)) == GZIP_MARK:
+        if kind is Format.PARQUET:
+            raise ValueError(f"{name} is compressed, and Parquet is read from its end: decompress it with gunzip")
+        file = cast("IO[bytes]", gzip.GzipFile(fileobj=stored))
+    if kind not in TABLES and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
+        raise ValueError(f"{name} is UTF-16, and JSON is UTF-8: convert it with iconv -f UTF-16 -t UTF-8")
+    return Source(name, file, stored, size, kind, options)
+
+
+def _given(options: Options) -> dict[str, object]:
+    """The options that differ from their defaults."""
+    given = asdict(options)
+    return {each.name: given[each.name] for each in fields(Options) if given[each.name] != each.default}
 
 
 def _reader(kind: Format) -> Reader:
-    """Each is loaded where it is wanted: some take long, and not everybody has pyarrow and ijson."""
+    """The reader of a format, imported here: some take long to import, and pyarrow and ijson may not be installed."""
     match kind:
-        case Format.CSV:
+        case Format.CSV | Format.TSV:
             from .read_csv import read_csv
 
             return read_csv
@@ -88,6 +187,10 @@ def _reader(kind: Format) -> Reader:
             from .read_parquet import read_parquet
 
             return read_parquet
+        case Format.JSON:
+            from .read_json import read_json
+
+            return read_json
         case Format.GEOJSON:
             from .read_json import read_geojson
 

@@ -1,0 +1,41 @@
+"""Addresses of servers, as people write them."""
+
+import re
+from ipaddress import AddressValueError, IPv6Address
+
+DEFAULT_PORT = 50051
+MAX_PORT = 65535
+TLS_BY_SCHEME = {"": False, "http": False, "https": True, "grpc": False, "grpcs": True}
+RESOLVERS = ("dns", "ipv4", "ipv6", "unix", "unix-abstract", "vsock", "xds")  # gRPC's own names, passed through
+
+PLACE = re.compile(r"(?P<host>\[[\w:.%]+\]|[^:\[\]/\s]+)(?::(?P<port>\d+))?")
+EXAMPLE = f"Write HOST or HOST:PORT, for example 127.0.0.1:{DEFAULT_PORT}"
+
+
+def target(address: str) -> tuple[str, bool]:
+    """The target for gRPC, and whether the address asks for TLS.
+
+    The port is 50051 unless given. http:// and grpc:// add nothing to HOST:PORT; https:// and grpcs:// ask for TLS.
+    A bare IPv6 address needs no brackets. ValueError where the address cannot be understood.
+    """
+    if address.split(":", 1)[0] in RESOLVERS:
+        return address, False
+    before, mark, after = address.partition("://")
+    scheme, place = (before.lower(), after.removesuffix("/")) if mark else ("", address)
+    if scheme not in TLS_BY_SCHEME:
+        raise ValueError(f"address {address!r}: a server is not reached by {scheme}://. {EXAMPLE}")
+    found = PLACE.fullmatch(f"[{place}]" if _is_ipv6(place) else place)
+    if found is None:
+        raise ValueError(f"address {address!r} is not a host and a port. {EXAMPLE}")
+    port = int(found["port"] or DEFAULT_PORT)
+    if not 0 < port <= MAX_PORT:
+        raise ValueError(f"address {address!r}: port {port} is not from 1 to {MAX_PORT}. {EXAMPLE}")
+    return f"{found['host']}:{port}", TLS_BY_SCHEME[scheme]
+
+
+def _is_ipv6(text: str) -> bool:
+    try:
+        IPv6Address(text)
+    except AddressValueError:
+        return False
+    return True

@@ -1,0 +1,39 @@
+"""A reader that closes the pipe early, as `head` does, has what it wants: the command ends with success."""
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+class _Output(io.FileIO):
+    """Standard output; a write to a closed pipe ends the process with exit code 0 and without a message."""
+
+    def write(self, data: Any, /) -> int:
+        try:
+            return super().write(data) or 0
+        except BrokenPipeError:
+            # Whatever is still buffered goes nowhere, so that it cannot fail again on the way out.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            raise SystemExit(0) from None
+
+
+@contextmanager
+def success_on_closed_pipe() -> Iterator[None]:
+    """Replace sys.stdout, if there is one. Inside click it would be too late: rich and click exit with code 1 first."""
+    old = sys.stdout
+    if old is None:
+        yield
+        return
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(_Output(old.fileno(), "w", closefd=False)),
+        encoding=old.encoding,
+        errors=old.errors,
+        line_buffering=bool(old.line_buffering),
+    )
+    try:
+        yield
+    finally:
+        sys.stdout.flush()

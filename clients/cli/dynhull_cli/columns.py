@@ -1,0 +1,85 @@
+"""Columns of coordinates by name, and the numbers in them."""
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+PAIRS = [
+    ("x", "y"),
+    ("lon", "lat"),
+    ("lng", "lat"),
+    ("long", "lat"),
+    ("longitude", "latitude"),
+    ("easting", "northing"),
+]
+
+
+def has_pair(columns: Sequence[str]) -> bool:
+    """Whether a pair of known names is among the columns."""
+    return _pair(columns) is not None
+
+
+def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, y: str | None) -> tuple[int, int]:
+    """The indices of the columns of x and y: those given, or the first known pair.
+
+    ValueError where a column is not there; the message says which ones are.
+    """
+    pair = _pair(columns)
+    if x is None and y is None and pair is not None:
+        return pair
+    found = []
+    for option, column in (("--x", x), ("--y", y)):
+        if column is None:
+            raise ValueError(f"{path}: name its {option[2:]} column with {option}; it has {', '.join(columns)}")
+        found.append(column_index(path, columns, option, column))
+    return found[0], found[1]
+
+
+def column_index(path: Path | str, columns: Sequence[str], option: str, column: str) -> int:
+    """The index of a column, given by its name or, where none has that name, by its number from 1."""
+    if column in columns:
+        return columns.index(column)
+    if column.isdecimal() and 1 <= int(column) <= len(columns):
+        return int(column) - 1
+    raise ValueError(f"{path} has no column {column!r} ({option}); it has {', '.join(columns)}")
+
+
+def decimal_mark(texts: Iterable[str], delimiter: str) -> str:
+    """A comma where columns do not end at commas, some number has one and none has a point; otherwise a point."""
+    numbers = [text for text in texts if is_number(text)] if delimiter != "," else []
+    return "," if any("," in each for each in numbers) and not any("." in each for each in numbers) else "."
+
+
+def coordinate(text: str | None, column: str, decimal: str = ".") -> float:
+    """A finite number with that decimal mark; the ValueError of anything else says what is wrong."""
+    if not text:
+        raise ValueError(f"{column} is missing")
+    try:
+        value = float(plain(text, decimal))
+    except ValueError:
+        mark = f" with the decimal mark {decimal!r}" if "," in text else ""
+        raise ValueError(f"{column} is {text!r}, not a number{mark}") from None
+    if not math.isfinite(value):
+        raise ValueError(f"{column} is {text!r}, not finite")
+    return value + 0.0
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number, with either decimal mark; NaN and the infinities count."""
+    try:
+        float(plain(text, "," if "," in text else "."))
+    except ValueError:
+        return False
+    return True
+
+
+def plain(text: str, decimal: str) -> str:
+    """The number as Python reads it; ValueError for what only Python reads as a number, such as 1_000."""
+    if "_" in text or (decimal == "," and "." in text):
+        raise ValueError
+    return text.replace(decimal, ".")
+
+
+def _pair(columns: Sequence[str]) -> tuple[int, int] | None:
+    lowered = [column.strip().lower() for column in columns]
+    return next(((lowered.index(x), lowered.index(y)) for x, y in PAIRS if x in lowered and y in lowered), None)

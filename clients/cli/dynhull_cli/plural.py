@@ -1,0 +1,6 @@
+"""Numbers of things in messages."""
+
+
+def plural(count: int, noun: str) -> str:
+    """The number and the noun: 1 point, 2,000 points."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
