@@ -64,6 +64,40 @@ def test_a_hull_from_birth_to_death(client: HullClient, name: str) -> None:
         client.get_hull(name)
 
 
+def test_a_hull_may_exist_already(client: HullClient, name: str) -> None:
+    assert client.create_hull(name, exist_ok=True).revision == 0
+    client.apply(name, insert=SQUARE)
+    info = client.create_hull(name, exist_ok=True)
+    assert (info.name, info.revision, info.points) == (name, 1, 8)
+    with pytest.raises(HullExistsError):
+        client.create_hull(name)
+    with pytest.raises(InvalidRequestError):
+        client.create_hull("a b", exist_ok=True)
+
+
+def test_waiting_for_a_hull(address: str, connect: type[HullClient], name: str) -> None:
+    with proxy(address) as way, connect(way.address) as waiting, HullClient(address) as client:
+        with pytest.raises(DeadlineError, match=f"not within 0.2 s: .*{name}"):
+            waiting.wait_for_hull(name, timeout=0.2)
+        way.server = "127.0.0.1:1"
+        way.cut()
+        found = []
+        thread = threading.Thread(target=lambda: found.append(waiting.wait_for_hull(name, min_revision=2)))
+        thread.start()
+        way.server = address
+        client.create_hull(name)
+        client.apply(name, insert=SQUARE)
+        client.apply(name, delete=SQUARE[:1])
+        thread.join()
+        assert [(info.revision, info.points) for info in found] == [(2, 7)]
+
+
+def test_points_without_a_name_are_an_error_that_says_what_to_write(client: HullClient, hull: str) -> None:
+    with pytest.raises(TypeError, match=rf"write apply\('{hull}', insert=points\) or apply\('{hull}', delete=points\)"):
+        client.apply(hull, SQUARE)
+    assert client.get_hull(hull).revision == 0
+
+
 def test_moves_and_counted_deletes(client: HullClient, hull: str) -> None:
     client.apply(hull, insert=SQUARE)
     move = (np.array([[5, 2]]), np.array([[7, 2]], np.float32))

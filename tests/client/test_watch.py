@@ -14,6 +14,7 @@ from server_process import server_process
 from dynhull_client import (
     AsyncHullClient,
     Change,
+    Deleted,
     HullClient,
     HullCopy,
     HullNotFoundError,
@@ -127,6 +128,62 @@ def test_what_it_does_not_wait_for(connect: type[HullClient], address: str, name
             next(watch)
         with pytest.raises(ValueError, match="not both"):
             client.watch(name, copy=HullCopy(), resume=HullCopy())
+
+
+def test_following_a_hull_that_is_deleted_and_created_again(address: str, connect: type[HullClient], name: str) -> None:
+    copy = HullCopy()
+    with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
+        watch = watching.watch(name, copy=copy, follow=True)
+        creating = threading.Timer(0.1, client.create_hull, (name,))
+        creating.start()
+        assert next(watch).revision == 0  # waited for the hull to come
+        client.apply(name, insert=[[1, 2], [3, 4]])
+        assert isinstance(next(watch), Change)
+        first = copy.uid
+        client.delete_hull(name)
+        assert next(watch) == Deleted(1)
+        assert (copy.uid, copy.revision, copy.points, len(copy.vertices)) == ("", 0, 0, 0)
+        client.create_hull(name)
+        client.apply(name, insert=[[5, 6]])
+        snapshot = next(watch)
+        assert isinstance(snapshot, Snapshot)
+        while copy.revision < 1:
+            next(watch)
+        assert copy.vertices.tolist() == [[5, 6]]
+        assert watch.lost is None
+        assert snapshot.uid not in ("", first)
+
+        way.server = "127.0.0.1:1"
+        way.cut()
+        client.delete_hull(name)
+        client.create_hull(name)
+        way.server = address
+        assert isinstance(next(watch), Deleted)
+        assert isinstance(next(watch), Snapshot)
+        assert (copy.revision, copy.points) == (0, 0)
+        watch.close()
+
+
+def test_following_from_a_copy_of_an_earlier_hull(address: str, connect: type[HullClient], name: str) -> None:
+    copy = HullCopy()
+    with connect(address) as client:
+        client.create_hull(name)
+        client.apply(name, insert=[[1, 2]])
+        with client.watch(name, copy=copy) as watch:
+            next(watch)
+        client.delete_hull(name)
+        client.create_hull(name)
+        with client.watch(name, copy=copy, follow=True) as watch:
+            assert next(watch) == Deleted(1)
+            assert next(watch).revision == copy.revision == 0
+
+
+def test_closing_ends_the_wait_for_a_hull(address: str, connect: type[HullClient], name: str) -> None:
+    with connect(address) as client:
+        watch = client.watch(name, follow=True)
+        closing = threading.Timer(0.2, watch.close)
+        closing.start()
+        assert list(watch) == []
 
 
 def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:

@@ -185,7 +185,7 @@ def test_another_writer_goes_on_where_one_was_acknowledged(client: HullClient, n
     assert client.get_hull(name).revision == 2
 
 
-def test_two_writers_of_one_name_are_told(client: HullClient, name: str) -> None:
+def test_two_writers_of_one_name_are_an_error(client: HullClient, name: str) -> None:
     first, second = (client.writer(name, producer="p") for _ in range(2))
     with first, pytest.raises(ProducerInUseError, match="'p'"), second:  # noqa: PT012  # leaving may raise it too
         first.put(insert=POINTS[0])
@@ -220,16 +220,35 @@ def test_what_a_writer_cannot_do(client: HullClient, name: str) -> None:
     with pytest.raises(ValueError, match="batch_points must be at least 1, got 0"):
         client.writer(name, batch_points=0)
     writer = client.writer(name)
-    with pytest.raises(RuntimeError, match="context"):
-        writer.put(insert=[[1, 2]])
+    with pytest.raises(RuntimeError, match="has not started"):
+        _ = writer.sequence
     with writer:
         with pytest.raises(ValueError, match="insert row 0"):
             writer.put(insert=[[np.nan, 2]])
         writer.put(insert=[[1, 2]])
-    with pytest.raises(RuntimeError, match="left"):
+    with pytest.raises(RuntimeError, match="closed"):
         writer.put(insert=[[1, 2]])
-    with pytest.raises(RuntimeError, match="once"), writer:
+    with pytest.raises(RuntimeError, match="closed"), writer:
         pass
+
+
+def test_a_writer_without_a_context(client: HullClient, name: str) -> None:
+    writer = client.writer(name, linger=60)
+    outcome = writer.put(insert=[[1, 2]])
+    writer.close()
+    assert outcome.result().revision == writer.sequence == 1
+    writer.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        writer.put(insert=[[1, 2]])
+    unused = client.writer(name)
+    unused.flush()
+    unused.close()
+    refused = client.writer(name, batch_points=1)
+    refused.put(delete=[[9, 9]])
+    with pytest.raises(PointMissingError):
+        refused.close()
+    refused.close()
+    assert client.get_hull(name).info.points == 1
 
 
 def test_an_error_of_ones_own_waits_for_nothing(client: HullClient, name: str) -> None:

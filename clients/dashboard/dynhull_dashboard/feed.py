@@ -7,7 +7,7 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from dynhull_client import AsyncHullClient, AsyncWatch, DynhullError, Event, HullCopy, Progress, Verification
+from dynhull_client import AsyncHullClient, AsyncWatch, Deleted, DynhullError, Event, HullCopy, Progress, Verification
 
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
@@ -113,7 +113,7 @@ class HullFeed:
     def _take(self, event: Event, copy: HullCopy) -> None:
         self._failure = None
         self.revision, self.points = event.revision, event.points
-        if isinstance(event, Progress):
+        if isinstance(event, Progress | Deleted):
             return
         assert event.measures is not None  # asked for
         self.vertices = len(copy.vertices)

@@ -18,6 +18,7 @@ from .errors import (
     HullEmptyError,
     HullExistsError,
     HullNotFoundError,
+    HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
@@ -38,6 +39,7 @@ from .messages import (
     ChanRound,
     Counted,
     Crossings,
+    Deleted,
     Difference,
     Distances,
     Event,
@@ -69,6 +71,7 @@ __all__ = [
     "Counted",
     "Crossings",
     "DeadlineError",
+    "Deleted",
     "Difference",
     "Distances",
     "DynhullError",
@@ -81,6 +84,7 @@ __all__ = [
     "HullExistsError",
     "HullInfo",
     "HullNotFoundError",
+    "HullReplacedError",
     "HullUnsuitableError",
     "Ingest",
     "Ingested",
@@ -108,4 +112,15 @@ __all__ = [
     "Verification",
     "Watch",
     "Writer",
+    "__version__",
 ]
+
+__version__: str
+
+
+def __getattr__(name: str) -> str:
+    if name == "__version__":
+        import dynhull
+
+        return dynhull.__version__
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

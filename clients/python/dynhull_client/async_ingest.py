@@ -1,31 +1,35 @@
 """Many batches in one call, with asyncio."""
 
+from __future__ import annotations
+
 import asyncio
-from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-import numpy.typing as npt
-
-from .calls import Ingesting
-from .connection import Connection
 from .ingest import Ingest
-from .messages import Ingested
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    import numpy.typing as npt
+
+    from .calls import Ingesting
+    from .connection import AsyncConnection
+    from .messages import Ingested
 
 
 class AsyncIngest:
-    """`Ingest` for asyncio: an async context manager for one use, whose `apply` is awaited.
+    """`Ingest` for asyncio: an async context manager for one use. Await `apply`."""
 
-    It is an Ingest in threads, with a connection of its own: where the server refuses a batch while another is being
-    sent, grpc.aio may report an internal error instead of the refusal.
-    """
+    # An Ingest in threads with its own connection: when the server refuses a batch while another one is being sent,
+    # grpc.aio may report an internal error instead of the refusal.
 
-    def __init__(self, connection: Connection, ingesting: Ingesting) -> None:
+    def __init__(self, connection: AsyncConnection, ingesting: Ingesting) -> None:
         self._connection = connection.blocking()
         self._ingest = Ingest(self._connection, ingesting)
 
     @property
     def summary(self) -> Ingested | None:
-        """What was done, once the context has been left without an error."""
+        """The effect of all batches; None until the context was left without an error."""
         return self._ingest.summary
 
     async def apply(
@@ -34,8 +38,11 @@ class AsyncIngest:
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     ) -> None:
-        """Send a batch; arguments and errors as of `Ingest.apply`."""
+        """Send a batch; arguments and errors as for `Ingest.apply`."""
         await asyncio.to_thread(self._ingest.apply, insert, delete, move)
+
+    def __repr__(self) -> str:
+        return f"<AsyncIngest to {self._ingest.name!r}>"
 
     async def __aenter__(self) -> Self:
         await asyncio.to_thread(self._ingest.__enter__)
@@ -47,4 +54,4 @@ class AsyncIngest:
         try:
             await asyncio.to_thread(self._ingest.__exit__, kind, error, traceback)
         finally:
-            self._connection.channel.close()
+            self._connection.close()

@@ -1,19 +1,15 @@
 """The synchronous client."""
 
-import time
 from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Concatenate, ParamSpec, Self, TypeVar
 
-import grpc
-
 from . import calls, uses
 from .calls import Call
-from .connection import Connection
-from .errors import error_of
+from .connection import BlockingConnection
 from .ingest import Ingest
 from .messages import HullInfo
-from .methods import documented, opening
+from .methods import Client, answer_of, documented, opening
 from .watch import Watch
 from .writer import Writer
 
@@ -25,19 +21,35 @@ def _answering(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["Hul
     """The method that makes a call and returns its answer."""
 
     def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Result:
-        return self._answer(describe(*arguments, **options))
+        return self._connection.answer(describe(*arguments, **options))
 
-    documented(method, describe)
+    documented(method, describe, answer_of(describe))
     return method
 
 
-class HullClient(Connection):
-    """A connection to a dynhull server; arguments and errors as of `Connection`.
+class HullClient(Client[BlockingConnection]):
+    """A client of a dynhull server. Threads may share it. A context manager, which closes it.
 
-    Safe to share between threads. A context manager, closed on leaving.
+    Every method raises a `DynhullError` if it fails: `UnavailableError` if no server answers, `DeadlineError` after the
+    timeout, `HullNotFoundError` if there is no such hull, `InvalidRequestError` if the server refuses a value. Arrays
+    that are not finite points raise ValueError or TypeError, as in `dynhull`, and nothing is sent.
+
+    Args:
+        address: host:port.
+        timeout: seconds a call may take unless the call has its own timeout; None for no limit. Ingests, writers and
+            watches have no limit by default.
+        wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.
+        token: the bearer token to send; only over an encrypted connection or to this machine.
+        tls: how to encrypt; None for no encryption. `grpc.ssl_channel_credentials()` trusts the certificate authorities
+            of this machine; it also takes a root certificate, and a client's key and certificate.
+        retries: how often a call that reached no server is repeated, after a growing pause. Only calls that are safe to
+            repeat are: reads, and batches with a producer and a sequence number.
     """
 
+    _connect = BlockingConnection
+
     create_hull = _answering(calls.create_hull)
+    wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)
     last_sequence = _answering(calls.last_sequence)
@@ -59,17 +71,16 @@ class HullClient(Connection):
     writer = opening(Writer, calls.writer)
 
     def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[HullInfo]:
-        """The hulls whose names begin with `prefix`, in the order of their names, fetched as they are wanted."""
+        """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
         following: str | None = ""
         while following is not None:
-            hulls, token = self._answer(calls.list_page(prefix, following, timeout))
+            hulls, token = self._connection.answer(calls.list_page(prefix, following, timeout))
             yield from hulls
             following = token or None
 
     def close(self) -> None:
-        """Close the connection; calls under way end."""
-        self._closed = True
-        self.channel.close()
+        """Close the connection and end the calls on it."""
+        self._connection.close()
 
     def __enter__(self) -> Self:
         return self
@@ -78,12 +89,3 @@ class HullClient(Connection):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
-
-    def _answer(self, call: Call[Result]) -> Result:
-        attempts = self.attempts(call)
-        while True:
-            try:
-                return call.decode(self.begin(getattr(self.stub, call.method), call.request, attempts.timeout()))
-            except grpc.RpcError as failure:
-                pause = attempts.pause_after(error_of(failure))
-            time.sleep(pause)

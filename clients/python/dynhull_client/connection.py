@@ -1,15 +1,17 @@
-"""A channel to a server, and how calls begin on it."""
+"""A channel to a server, and calls on it."""
 
+import asyncio
+import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import grpc
 
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 from .calls import Call
-from .errors import DynhullError
+from .errors import DynhullError, error_of
 from .retry import Attempts
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
@@ -18,52 +20,41 @@ DEFAULT_RETRIES = 3
 MAX_MESSAGE_BYTES = 2**31 - 1
 
 OPTIONS = [
-    # The server's limits are the ones that count.
+    # Only the server's limits apply.
     ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
     ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
-    # A server that was restarted is found within a second; by default gRPC may take two minutes.
+    # Finds a restarted server within a second; by default gRPC may take two minutes.
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
 ]
 
+Result = TypeVar("Result")
+
 
 class Connection:
-    """What `HullClient` and `AsyncHullClient` have in common.
-
-    Every method raises a `DynhullError`: `UnavailableError` where there is no server, `DeadlineError` after the
-    timeout, `HullNotFoundError` where there is no such hull, `InvalidRequestError` where the server refuses a value.
-    Arrays that are no finite points raise ValueError or TypeError, as in `dynhull`, and nothing is sent.
-
-    Args:
-        address: host:port.
-        timeout: seconds a call may take unless the call says otherwise; None for no limit. Ingests, writers and watches
-            have none of themselves.
-        wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.
-        token: the bearer token to show. Over an encrypted connection only, or on this machine.
-        tls: TLS with the server; None for none. `grpc.ssl_channel_credentials()` trusts what the machine trusts; it
-            also takes a root certificate, and a client's key and certificate.
-        retries: how often a call is made again that found no server, after a growing pause. Only calls that may be
-            repeated: reads, and batches with a producer and a sequence.
+    """A channel with what every call on it needs. Arguments as for `HullClient`.
 
     Attributes:
-        blocking: makes another connection with the same arguments, for threads.
+        address: host:port.
+        stub: the generated stub.
+        blocking: makes a BlockingConnection with the same arguments, for use in threads.
     """
 
-    _grpc: ClassVar[Any] = grpc
+    _grpc: ClassVar[Any]
 
     def __init__(
         self,
-        address: str = DEFAULT_ADDRESS,
+        address: str,
         *,
-        timeout: float | None = DEFAULT_TIMEOUT,
-        wait_for_ready: bool = False,
-        token: str | None = None,
-        tls: grpc.ChannelCredentials | None = None,
-        retries: int = DEFAULT_RETRIES,
+        timeout: float | None,
+        wait_for_ready: bool,
+        token: str | None,
+        tls: grpc.ChannelCredentials | None,
+        retries: int,
     ) -> None:
         self.address = address
         self.blocking = partial(
-            Connection,
+            BlockingConnection,
             address,
             timeout=timeout,
             wait_for_ready=wait_for_ready,
@@ -75,13 +66,13 @@ class Connection:
         self._retries = retries
         self._wait_for_ready = wait_for_ready
         self._closed = False
-        # Call credentials would do the same, but gRPC sends them over TLS only, and a local server needs none of that.
+        # Call credentials would do the same, but gRPC sends them over TLS only, which a local server does not need.
         self._metadata = () if token is None else (("authorization", f"Bearer {token}"),)
         if tls is None:
-            self.channel = self._grpc.insecure_channel(address, OPTIONS)
+            self._channel = self._grpc.insecure_channel(address, OPTIONS)
         else:
-            self.channel = self._grpc.secure_channel(address, tls, OPTIONS)
-        self.stub: Any = HullServiceStub(self.channel)
+            self._channel = self._grpc.secure_channel(address, tls, OPTIONS)
+        self.stub: Any = HullServiceStub(self._channel)
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call: a method of the stub with a message, or with an iterator of messages."""
@@ -89,7 +80,50 @@ class Connection:
             raise DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
         return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
 
-    def attempts(self, call: Call[Any]) -> Attempts:
-        """The attempts that a call may have."""
-        timeout = self._timeout if call.timeout is None else call.timeout
-        return Attempts(timeout, self._retries if call.repeatable else 0)
+    def _begin(self, call: Call[Any], attempts: Attempts) -> Any:
+        return self.begin(getattr(self.stub, call.method), call.request, attempts.timeout())
+
+    def _attempts(self, call: Call[Any]) -> Attempts:
+        return Attempts(call, self._timeout if call.timeout is None else call.timeout, self._retries)
+
+
+class BlockingConnection(Connection):
+    """A connection whose calls block the thread. Threads may share it."""
+
+    _grpc: ClassVar[Any] = grpc
+
+    def answer(self, call: Call[Result]) -> Result:
+        """Make a call, again if it may be repeated, and return its answer."""
+        attempts = self._attempts(call)
+        while True:
+            try:
+                return call.decode(self._begin(call, attempts))
+            except grpc.RpcError as failure:
+                call, pause = attempts.after(call, error_of(failure))
+            time.sleep(pause)
+
+    def close(self) -> None:
+        """End the connection and the calls on it."""
+        self._closed = True
+        self._channel.close()
+
+
+class AsyncConnection(Connection):
+    """A connection of one event loop."""
+
+    _grpc: ClassVar[Any] = grpc.aio
+
+    async def answer(self, call: Call[Result]) -> Result:
+        """Make a call, again if it may be repeated, and return its answer."""
+        attempts = self._attempts(call)
+        while True:
+            try:
+                return call.decode(await self._begin(call, attempts))
+            except grpc.RpcError as failure:
+                call, pause = attempts.after(call, error_of(failure))
+            await asyncio.sleep(pause)
+
+    async def close(self) -> None:
+        """End the connection and the calls on it."""
+        self._closed = True
+        await self._channel.close()

@@ -1,21 +1,24 @@
-"""What the server answers, as values with numpy arrays. Points are (n, 2) arrays of float64."""
+"""The server's answers, as values with read-only numpy arrays. Points are (n, 2) arrays of float64."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from html import escape
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from dynhull._shown import geometry, svg
+from dynhull._value import Value
+from dynhull.arrays import Points as Points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
-
-Points = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class HullInfo:
-    """A hull and how much it holds; `points` with multiplicity, `distinct` without.
+    """A hull and its size: `points` counts duplicates, `distinct` does not.
 
-    `uid` tells it from an earlier or later hull of the same name.
+    `uid` differs from that of an earlier or later hull of the same name.
     """
 
     name: str
@@ -26,11 +29,11 @@ class HullInfo:
     uid: str
 
 
-@dataclass(frozen=True, slots=True)
-class Measures:
-    """Measures of a hull in the unit of its coordinates; NaN where a hull without points has none.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Measures(Value):
+    """Measures of a hull in the unit of its coordinates; `centroid` and `bounds` are NaN without points.
 
-    `bounds` are least x, least y, greatest x, greatest y.
+    `bounds` are the least x, least y, greatest x and greatest y.
     """
 
     area: float
@@ -39,9 +42,9 @@ class Measures:
     bounds: tuple[float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Hull:
-    """A hull at one revision: vertices counter-clockwise from the lexicographically smallest, and their measures."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Hull(Value):
+    """A hull at one revision: (h, 2) vertices, counter-clockwise from the lexicographically smallest, and measures."""
 
     info: HullInfo
     vertices: Points
@@ -52,13 +55,37 @@ class Hull:
         """The revision."""
         return self.info.revision
 
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """A GeoJSON Feature with the name, revision, number of points, area and perimeter as properties."""
+        return {
+            "type": "Feature",
+            "id": self.info.name,
+            "geometry": geometry(self.vertices),
+            "properties": {
+                "name": self.info.name,
+                "revision": self.info.revision,
+                "points": self.info.points,
+                "area": self.measures.area,
+                "perimeter": self.measures.perimeter,
+            },
+        }
+
+    def _repr_html_(self) -> str:
+        info, measures = self.info, self.measures
+        caption = f"{info.points} points, {len(self.vertices)} vertices, area {measures.area:.6g}"
+        return (
+            f"<figure>{svg(self.vertices, info.name)}<figcaption><b>{escape(info.name)}</b> at revision "
+            f"{info.revision}: {caption}</figcaption></figure>"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """What a batch did, and the number of points after it. A move counts as one deleted and one inserted.
+    """The effect of a batch, and the number of points after it. A move counts as one deleted and one inserted.
 
-    `missing` is the number of deletes passed over because the point was not there. A `duplicate` had been applied
-    before; its counts are 0, and the revision is one that has it.
+    `missing` counts the deletes that were skipped because the hull did not hold the point. A `duplicate` had been
+    applied before: its counts are 0, and the revision is one that includes it.
     """
 
     revision: int
@@ -72,9 +99,9 @@ class Applied:
 
 @dataclass(frozen=True, slots=True)
 class Ingested:
-    """What an ingest did in all its `batches`, and the hull's revision and number of points after the last.
+    """The effect of all `batches` of an ingest, and the hull's revision and number of points after the last one.
 
-    `duplicates` are batches that had been applied before, by an earlier call of the same producer.
+    `duplicates` counts the batches that an earlier call of the same producer had applied before.
     """
 
     batches: int
@@ -86,65 +113,65 @@ class Ingested:
     duplicates: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Located:
-    """Where points are: `sides` as int8, +1 inside, 0 on the boundary, -1 outside."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Located(Value):
+    """The side of each point, (n,) int8: +1 inside, 0 on the boundary, -1 outside."""
 
     revision: int
     sides: npt.NDArray[np.int8]
 
 
-@dataclass(frozen=True, slots=True)
-class Counted:
-    """How many times points are there, an integer each."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Counted(Value):
+    """The multiplicity of each point, (n,) int64; 0 for a point that the hull does not hold."""
 
     revision: int
     counts: npt.NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True)
-class Supported:
-    """The extreme vertices, (n, 2), one for each direction."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Supported(Value):
+    """The extreme vertex in each direction, (n, 2)."""
 
     revision: int
     vertices: Points
 
 
-@dataclass(frozen=True, slots=True)
-class Distances:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Distances(Value):
     """Distances of points to the hull, (n,): 0 inside and on the boundary, infinite from an empty hull."""
 
     revision: int
     distances: npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Sampled:
-    """Some of the points, (n, 2), in lexicographic order."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sampled(Value):
+    """A sample of the points, (n, 2), in lexicographic order."""
 
     revision: int
     points: Points
 
 
-@dataclass(frozen=True, slots=True)
-class Crossings:
-    """(n, 2, 2) where lines enter and leave the hull, as of `DynamicHull.intersect_lines`."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Crossings(Value):
+    """The points where each line enters and leaves the hull, (n, 2, 2), as in `DynamicHull.intersect_lines`."""
 
     revision: int
     crossings: npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Tangents:
-    """(n, 2, 2) left and right tangent points, as of `DynamicHull.tangents`."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Tangents(Value):
+    """The left and right tangent points, (n, 2, 2), as in `DynamicHull.tangents`."""
 
     revision: int
     tangents: npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Snapshot:
-    """The whole hull; `uid` is the hull's, for resuming."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Snapshot(Value):
+    """The whole hull. `uid` identifies it when a watch resumes."""
 
     revision: int
     points: int
@@ -152,13 +179,21 @@ class Snapshot:
     measures: Measures | None
     uid: str = ""
 
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The hull as a GeoJSON geometry."""
+        return geometry(self.vertices)
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """What to do to the vertices at the event before; see `HullCopy`.
+    def _repr_svg_(self) -> str:
+        return svg(self.vertices, f"revision {self.revision}: {self.points} points, {len(self.vertices)} vertices")
 
-    Strike the rows `removed_rows`, move the first `rotation` of the rest to the end, put in `added` so that they stand
-    at `added_rows` of the result.
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Change(Value):
+    """The difference to the vertices of the previous event, which `HullCopy` applies.
+
+    Remove the rows `removed_rows`, move the first `rotation` of the remaining rows to the end, and insert `added` so
+    that they become rows `added_rows` of the result.
     """
 
     revision: int
@@ -171,9 +206,9 @@ class Change:
     measures: Measures | None
 
 
-@dataclass(frozen=True, slots=True)
-class Sketch:
-    """The extreme vertices in the directions asked for, one each; none where the hull has no points."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sketch(Value):
+    """The extreme vertex in each requested direction, (k, 2); (0, 2) if the hull has no points."""
 
     revision: int
     points: int
@@ -183,21 +218,32 @@ class Sketch:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The hull at this revision is the one of the event before."""
+    """The hull at this revision is the same as at the previous event."""
 
     revision: int
     points: int
 
 
-Event = Snapshot | Change | Sketch | Progress
+@dataclass(frozen=True, slots=True)
+class Deleted:
+    """The watched hull was deleted after this revision; a new one of the same name begins with a Snapshot.
+
+    Only a watch with `follow=True` reports this. `points` is 0.
+    """
+
+    revision: int
+    points: int = 0
+
+
+Event = Snapshot | Change | Sketch | Progress | Deleted
 
 
 @dataclass(frozen=True, slots=True)
 class ChanRound:
     """One round of Chan's algorithm.
 
-    Groups of at most `guess` points, `steps` vertices found, the estimated `cost` n log2(guess), and whether the hull
-    closed.
+    It had `groups` groups of at most `guess` points, found `steps` vertices at an estimated `cost` of n log2(guess),
+    and `closed` says whether the hull was complete.
     """
 
     guess: int
@@ -209,7 +255,7 @@ class ChanRound:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first row in which two lists of vertices differ; None where a list has ended."""
+    """The first row in which two lists of vertices differ; None for a list that has fewer rows."""
 
     row: int
     live: tuple[float, float] | None
@@ -218,7 +264,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The live hull against the hull of the stored points computed anew; no `difference` where `equal`."""
+    """The live hull compared with a hull computed anew from the stored points; `difference` is None if `equal`."""
 
     revision: int
     equal: bool
@@ -229,17 +275,17 @@ class Verification:
 
 
 def encode_points(xy: Points) -> points_pb2.Points:
-    """Points as sent."""
+    """Points in the form of a message."""
     return points_pb2.Points(packed=np.asarray(xy, "<f8").tobytes())
 
 
 def decode_points(message: points_pb2.Points) -> Points:
-    """Points as received: the client asks for packed ones."""
-    return np.frombuffer(message.packed, "<f8").reshape(-1, 2).astype(np.float64)
+    """Points as received, packed, which is what the client requests."""
+    return np.frombuffer(message.packed, "<f8").reshape(-1, 2).astype(np.float64, copy=False)
 
 
 def decode_info(message: hull_pb2.Hull) -> HullInfo:
-    """A hull's counts."""
+    """A hull and its size."""
     created = message.create_time.ToDatetime(UTC)
     return HullInfo(
         message.name, message.revision, message.point_count, message.distinct_point_count, created, message.uid
@@ -247,7 +293,7 @@ def decode_info(message: hull_pb2.Hull) -> HullInfo:
 
 
 def decode_measures(message: hull_pb2.Measures) -> Measures:
-    """A hull's measures."""
+    """Measures of a hull."""
     return Measures(
         message.area,
         message.perimeter,
@@ -257,12 +303,12 @@ def decode_measures(message: hull_pb2.Measures) -> Measures:
 
 
 def decode_hull(message: hull_service_pb2.GetHullResponse) -> Hull:
-    """A hull."""
+    """A hull with vertices and measures."""
     return Hull(decode_info(message.hull), decode_points(message.vertices), decode_measures(message.measures))
 
 
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:
-    """What a batch did."""
+    """The effect of a batch."""
     return Applied(
         message.revision,
         message.inserted,
@@ -275,7 +321,7 @@ def decode_applied(message: batch_pb2.BatchResult) -> Applied:
 
 
 def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
-    """What an ingest did."""
+    """The effect of an ingest."""
     return Ingested(
         message.batches,
         message.revision,
@@ -287,8 +333,8 @@ def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
     )
 
 
-def decode_event(message: hull_service_pb2.WatchResponse) -> Event:
-    """What a watcher is told."""
+def decode_event(message: hull_service_pb2.WatchResponse) -> Event | None:
+    """An event of a watch; None if this version of the client does not know its kind."""
     measures = decode_measures(message.measures) if message.HasField("measures") else None
     if message.HasField("snapshot"):
         snapshot = message.snapshot
@@ -307,11 +353,13 @@ def decode_event(message: hull_service_pb2.WatchResponse) -> Event:
             change.rotation,
             measures,
         )
-    return Progress(message.revision, message.point_count)
+    if message.HasField("progress"):
+        return Progress(message.revision, message.point_count)
+    return None
 
 
 def decode_verification(message: hull_service_pb2.VerifyResponse) -> Verification:
-    """The outcome of a verification."""
+    """The result of a verification."""
     difference = None
     if message.HasField("first_difference"):
         first = message.first_difference

@@ -8,7 +8,7 @@ from typing import Any, Self
 import grpc
 
 from .calls import Watching
-from .connection import Connection
+from .connection import BlockingConnection
 from .errors import DynhullError, error_of
 from .messages import Event
 from .place import Place
@@ -17,38 +17,46 @@ from .place import Place
 class Watch(Iterator[Event]):
     """The events of a watched hull: a `Snapshot`, then `Change` and `Progress`. Iterates until closed.
 
-    Iterating waits for the next event, however often the connection is lost on the way, and raises DynhullError where
-    the watch cannot go on. A context manager, closed on leaving; `close` may also be called by another thread, and ends
-    the iteration.
+    Iterating blocks until the next event, reconnects as often as necessary, and raises DynhullError if the watch cannot
+    continue. A context manager, which closes it; `close` may also be called by another thread, and ends the iteration.
     """
 
-    def __init__(self, connection: Connection, watching: Watching) -> None:
+    def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
         self._connection = connection
         self._place = Place(watching)
         self._closed = threading.Event()
-        self._call = self._begin()
+        self._call: Any = None
+        self._begin()
 
     @property
     def lost(self) -> DynhullError | None:
-        """What the connection was lost with; None while there is one. For other threads to look at."""
+        """Why no events can arrive: the lost connection or, with `follow`, the missing hull. None while they can.
+
+        Other threads may read it.
+        """
         return self._place.lost
 
     def __next__(self) -> Event:
         event = None
         while event is None:
+            if self._call is None:
+                self._closed.wait(self._place.pause)
+                self._begin()
             try:
                 event = self._place.take(next(self._call))
             except grpc.RpcError as failure:
                 if self._closed.is_set():
                     raise StopIteration from None
-                self._closed.wait(self._place.pause_after(error_of(failure)))
-                self._call = self._begin()
+                self._call = None
+                event = self._place.end(error_of(failure))
         return event
 
     def close(self) -> None:
         """End the watch."""
         self._closed.set()
-        self._call.cancel()
+        call = self._call
+        if call is not None:
+            call.cancel()
 
     def __enter__(self) -> Self:
         return self
@@ -58,8 +66,10 @@ class Watch(Iterator[Event]):
     ) -> None:
         self.close()
 
-    def _begin(self) -> Any:
-        call = self._connection.begin(self._connection.stub.Watch, self._place.request, self._place.timeout())
+    def __repr__(self) -> str:
+        return f"<Watch of {self._place.request.name!r}>"
+
+    def _begin(self) -> None:
+        self._call = self._connection.begin(self._connection.stub.Watch, self._place.request, self._place.timeout())
         if self._closed.is_set():
-            call.cancel()
-        return call
+            self._call.cancel()

@@ -21,7 +21,7 @@ from .errors import (
     UnauthenticatedError,
 )
 from .messages import Applied, decode_applied
-from .retry import PASSING, pauses
+from .retry import passes, pauses
 
 if TYPE_CHECKING:
     from asyncio import Future as TaskFuture
@@ -150,12 +150,12 @@ class Window(Generic[Future]):
         self._on_this_connection = 0
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
             return self._end(error), None
-        if error.reason and not isinstance(error, PASSING):
+        if error.reason and not passes(error):
             return self._refuse(error)
         if error.code == grpc.StatusCode.RESOURCE_EXHAUSTED and alone:  # gRPC's own limit on messages
             return self._refuse(error)
         # Where nobody says which batch it was, or whether it was applied, sending one at a time will tell.
-        self._one_at_a_time = not isinstance(error, PASSING)
+        self._one_at_a_time = not passes(error)
         if self.empty or self._lost_since is None:
             self._lost_since = now
         if now - self._lost_since > self._writing.patience:

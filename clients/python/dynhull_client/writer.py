@@ -1,82 +1,95 @@
-"""Points to a hull in numbered batches, each applied exactly once."""
+"""Sends points to a hull in numbered batches, each applied exactly once."""
+
+from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from concurrent.futures import Future
 from time import monotonic
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import grpc
-import numpy.typing as npt
-
-from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from .batch import encode_batch
-from .calls import Writing
+from .calls import Writing, last_sequence
 from .errors import DynhullError, error_of
 from .window import Window, settle
 
 if TYPE_CHECKING:
-    from .client import HullClient
+    from collections.abc import Iterator
+    from types import TracebackType
+
+    import numpy.typing as npt
+
+    from dynhull_proto.v1 import hull_service_pb2 as pb
+
+    from .connection import BlockingConnection
     from .messages import Applied
 
 
+CLOSED = "the writer is closed: open a new one"
+
+
 class Writer:
-    """Gathers points into batches, sends several ahead, and sends them again where the connection or the server broke.
+    """Gathers points into batches, sends several ahead, and sends them again after the connection or the server failed.
 
-    A context manager for one use. Entering it asks the server which batch of the producer was the last. Leaving it
-    waits until everything is acknowledged; leaving it with an exception of one's own waits for nothing.
+    A context manager for one use: leaving it closes the writer; leaving it with an exception drops what is not
+    acknowledged. Outside a with statement, call `close`. The first `put`, or entering the context, asks the server for
+    the producer's last batch.
 
-    A batch that the server refuses reports its error where it is asked for: the futures of all points in it. The first
-    such error is also raised by the next `flush`, or on leaving. Safe to share between threads.
+    The futures of all points of a refused batch carry its error. The next `flush` or `close` also raises the first such
+    error. Threads may share a writer.
     """
 
-    def __init__(self, client: "HullClient", writing: Writing) -> None:
-        self._client = client
+    def __init__(self, connection: BlockingConnection, writing: Writing) -> None:
+        self._connection = connection
         self._writing = writing
+        self._opening = threading.Lock()
         self._turn = threading.Condition()
         self._connections = 0
         self._closed = False
         self._call: Any = None
         self._window: Window[Future[Applied]] | None = None
-        self._thread = threading.Thread(target=self._run, name=f"writer to {writing.name}", daemon=True)
+        self._thread: threading.Thread | None = None
 
     @property
     def sequence(self) -> int:
-        """The number of the producer's last batch that was acknowledged."""
-        return self._opened().sequence
+        """The number of the producer's last acknowledged batch. RuntimeError before the writer has started."""
+        if self._window is None:
+            raise RuntimeError("the writer has not started: put points, or use it in a with statement")
+        return self._window.sequence
 
     def put(
         self,
         insert: npt.ArrayLike | None = None,
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
-    ) -> "Future[Applied]":
-        """Add points to the next batch, all to the same one; waits where too many are under way.
+    ) -> Future[Applied]:
+        """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
 
         Returns:
-            What the batch did, once it is acknowledged, or the error that it was refused with. Several calls may share
-            a batch: the rows in it, and in its error, are those of all of them. A callback must not put.
+            The effect of the batch once it is acknowledged, or the error of a refused batch. Several calls may share a
+            batch: its counts, and the row in its error, refer to all of them. A callback must not put.
 
         Raises:
-            ValueError, TypeError: an argument is no array of finite points; nothing was added.
+            ValueError, TypeError: an argument is not an array of finite points; nothing was added.
             DynhullError: the writer has ended: nothing after its error was applied.
-            RuntimeError: the context has not been entered, or has been left.
+            RuntimeError: the writer is closed.
         """
         batch = encode_batch(insert, delete, move, self._writing.missing)
-        window = self._opened()
+        window = self._open()
         with self._turn:
             self._turn.wait_for(lambda: not window.full or window.failure or self._closed)
             if self._closed:
-                raise RuntimeError("the writer's context has been left")
+                raise RuntimeError(CLOSED)
             outcome = window.put(batch, monotonic())
             self._turn.notify_all()
         return outcome
 
     def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
-        window = self._opened()
+        window = self._window
+        if window is None:
+            return
         with self._turn:
             window.hurry(monotonic())
             self._turn.notify_all()
@@ -84,43 +97,56 @@ class Writer:
             self._turn.wait_for(lambda: window.settled >= begun or window.failure or self._closed)
             window.raise_refusal()
 
+    def close(self) -> None:
+        """Wait like `flush`, then end the writer. A second call does nothing."""
+        if self._closed:
+            return
+        try:
+            self.flush()
+        finally:
+            self._end()
+
     def __enter__(self) -> Self:
-        if self._window is not None:
-            raise RuntimeError("a writer is used once")
-        begin = self._client.last_sequence(self._writing.name, self._writing.producer)
-        self._window = Window(self._writing, begin, _new_outcome)
-        self._thread.start()
+        self._open()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        try:
-            if error is None:
-                self.flush()
-        finally:
-            self._close()
+        if error is None:
+            self.close()
+        else:
+            self._end()
 
-    def _opened(self) -> Window["Future[Applied]"]:
-        if self._window is None:
-            raise RuntimeError("use a writer as a context manager")
-        return self._window
+    def __repr__(self) -> str:
+        return f"<Writer to {self._writing.name!r} as producer {self._writing.producer!r}>"
 
-    def _close(self) -> None:
-        window = self._opened()
-        with self._turn:
+    def _open(self) -> Window[Future[Applied]]:
+        with self._opening:
+            if self._closed:
+                raise RuntimeError(CLOSED)
+            if self._window is None:
+                begin = self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
+                self._window = Window(self._writing, begin, _new_outcome)
+                name = f"writer to {self._writing.name}"
+                self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
+                self._thread.start()
+            return self._window
+
+    def _end(self) -> None:
+        with self._opening, self._turn:
             self._closed = True
-            left = window.abandon()
+            left = [] if self._window is None else self._window.abandon()
             self._turn.notify_all()
             if self._call is not None:
                 self._call.cancel()
         for outcome in left:
             outcome.cancel()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
 
-    def _run(self) -> None:
+    def _run(self, window: Window[Future[Applied]]) -> None:
         """One connection after another, until the writer is closed or has failed."""
-        window = self._opened()
         while True:
             lost = self._connect(window)
             with self._turn:
@@ -136,12 +162,12 @@ class Writer:
                 if self._turn.wait_for(lambda: self._closed, pause):
                     return
 
-    def _connect(self, window: Window["Future[Applied]"]) -> DynhullError:
-        """Send batches and read acknowledgements; returns what ended the connection."""
+    def _connect(self, window: Window[Future[Applied]]) -> DynhullError:
+        """Send batches and read acknowledgements; returns the error that ended the connection."""
         requests = self._requests(window, self._connections)
         try:
             with self._turn:
-                self._call = call = self._client.begin(self._client.stub.Stream, requests, None)
+                self._call = call = self._connection.begin(self._connection.stub.Stream, requests, None)
                 if self._closed:
                     call.cancel()
             for response in call:
@@ -155,10 +181,10 @@ class Writer:
             return error
         except grpc.RpcError as failure:
             return error_of(failure)
-        return DynhullError("the server has ended the stream", call.code(), "", {})
+        return DynhullError("the server ended the stream", call.code(), "", {})
 
-    def _requests(self, window: Window["Future[Applied]"], connection: int) -> Iterator[pb.StreamRequest]:
-        """What is to be sent on a connection; runs in a thread of gRPC's."""
+    def _requests(self, window: Window[Future[Applied]], connection: int) -> Iterator[pb.StreamRequest]:
+        """The messages to send on a connection; runs in a thread of gRPC."""
         yield window.first()
         while True:
             with self._turn:
@@ -173,5 +199,5 @@ class Writer:
             yield request
 
 
-def _new_outcome() -> "Future[Applied]":
+def _new_outcome() -> Future[Applied]:
     return Future()
