@@ -1,5 +1,6 @@
 """A hull for other programs: as GeoJSON, which geometry libraries read, and as a picture, which notebooks show."""
 
+from collections.abc import Callable
 from html import escape
 from typing import Any
 
@@ -46,19 +47,19 @@ def svg(vertices: Points, title: str, points: Points | None = None) -> str:
     )
 
 
-def _fitted(vertices: Points) -> Any:
-    """From coordinates to places in the picture. Halved first: the extent of two doubles may be no double."""
+def _fitted(vertices: Points) -> Callable[[Points], Points]:
+    """From coordinates to places in the picture, for doubles of any size."""
     if not len(vertices):
         return lambda points: points
-    halves = vertices / 2
-    low, high = halves.min(axis=0), halves.max(axis=0)
-    room = np.array([WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN])
-    extent = high - low
-    unit = float((extent / room).max())
-    middle = low + extent / 2
+    # Scaled to about 1, the extent neither overflows nor vanishes.
+    exponent = int(np.frexp(np.abs(vertices).max())[1]) + 1
+    scaled = np.ldexp(vertices, -exponent)
+    low, high = scaled.min(axis=0), scaled.max(axis=0)
+    unit = float(((high - low) / [WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN]).max())
 
     def place(points: Points) -> Points:
-        away = (points / 2 - middle) / unit if unit > 0 else np.zeros_like(points)
-        return np.array([WIDTH / 2, HEIGHT / 2]) + away * [1, -1]
+        away: Points = np.ldexp(points, -exponent) - (low + high) / 2
+        away = away / unit if unit > 0 else np.zeros_like(away)
+        return away * [1, -1] + [WIDTH / 2, HEIGHT / 2]
 
     return place

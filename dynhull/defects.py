@@ -5,14 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ._value import Value
 from .arrays import as_points
 from .exact import Integers, root
 from .measure.calipers import Indices, least, squared_height
 from .static import convex_hull
 
 
-@dataclass(frozen=True, eq=False)
-class Defects:
+@dataclass(frozen=True, eq=False, repr=False)
+class Defects(Value):
     """One row for each edge of the hull that the contour leaves, in the order of the contour.
 
     Attributes:

@@ -7,12 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
+from ._shown import geometry, svg
 from .arrays import Points, as_coordinate, as_directions, as_operations, as_pairs, as_points
 from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
 
 T = TypeVar("T")
+
+MOST_POINTS_DRAWN = 2000
 
 
 class MissingPointError(KeyError):
@@ -37,10 +40,11 @@ class DynamicHull:
     """The convex hull of a multiset of points in the plane, under inserts and deletes. Exact for every finite double.
 
     Args:
-        points: (n, 2) array-like of finite numbers, none to begin with when left out. O(n log n).
+        points: (n, 2) array-like of finite numbers; by default none. O(n log n).
 
-    Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
-    numeric, or that no double can hold, names the first bad row, and changes nothing.
+    Every method that takes points also takes geometries (shapely, geopandas, GeoJSON) and frames with columns such as
+    x and y, or lon and lat. It raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
+    numeric, or not exactly a double; the message names the first bad row, and nothing is changed.
 
     Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
     query.
@@ -316,6 +320,18 @@ class DynamicHull:
 
     def __repr__(self) -> str:
         return f"<DynamicHull of {len(self)} points, {len(self.vertices())} vertices>"
+
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The hull as a GeoJSON geometry, which shapely, geopandas and other libraries read. O(h log n).
+
+        Polygon, LineString for two vertices, Point for one; without points an empty Polygon.
+        """
+        return geometry(self.vertices())
+
+    def _repr_svg_(self) -> str:
+        points = self.points() if len(self) <= MOST_POINTS_DRAWN else None
+        return svg(self.vertices(), repr(self), points)
 
     def check(self) -> None:
         """Raise AssertionError where an invariant of the tree is broken. O(n log n); for tests and bug reports."""

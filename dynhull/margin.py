@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ._value import Value
 from .arrays import Points, as_rows
 from .convex import Cloud, Convex
 from .gjk import contact
 
 
-@dataclass(frozen=True)
-class Margin:
+@dataclass(frozen=True, eq=False, repr=False)
+class Margin(Value):
     """How two sets can be told apart by a line (in space: a plane).
 
     Attributes:

@@ -7,14 +7,15 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from .._value import Value
 from ..arrays import Points, as_coordinate, as_points, as_tuples
 from ..exact import rounded
 from ..hull import DynamicHull
 from ..predicates import Point, orient2d
 
 
-@dataclass(frozen=True, eq=False)
-class Tangencies:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tangencies(Value):
     """The tangency point for every risk-free rate.
 
     Attributes:

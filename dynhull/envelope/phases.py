@@ -8,14 +8,15 @@ from math import nan
 import numpy as np
 import numpy.typing as npt
 
+from .._value import Value
 from ..arrays import Points, as_array, as_points, as_tuples
 from ..exact import rounded
 from ..hull import DynamicHull
 from ..predicates import Point
 
 
-@dataclass(frozen=True, eq=False)
-class Decomposition:
+@dataclass(frozen=True, eq=False, repr=False)
+class Decomposition(Value):
     """What entries of given compositions fall into: a mixture of two stable neighbours each.
 
     Attributes:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from .._value import Value
 from ..arrays import Points
 from ..convex import Cloud, Convex
 from ..hull import DynamicHull
@@ -25,8 +26,8 @@ from .vectors import scale, unit
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Contact:
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Value):
     """How two convex sets lie to each other.
 
     Attributes:
