@@ -8,7 +8,7 @@ import numpy as np
 
 from .arrays import Points
 
-WIDTH, HEIGHT = 320.0, 240.0
+WIDTH, MOST_HEIGHT = 320.0, 240.0
 MARGIN = 12.0
 COLOUR = "#3b6fb6"
 
@@ -31,7 +31,7 @@ def geometry(vertices: Points) -> dict[str, Any]:
 
 def svg(vertices: Points, title: str, points: Points | None = None) -> str:
     """A drawing of (h, 2) vertices and, if given, the (n, 2) points inside, with the same unit on both axes."""
-    place = _fitted(vertices)
+    place, height = _fitted(vertices)
     corners = " ".join(f"{x:.2f},{y:.2f}" for x, y in place(vertices))
     dots = "".join(
         f'<circle cx="{x:.2f}" cy="{y:.2f}" r="{radius}" fill="{COLOUR}"/>'
@@ -40,26 +40,26 @@ def svg(vertices: Points, title: str, points: Points | None = None) -> str:
         for x, y in place(some)
     )
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
-        f'width="{WIDTH:g}" height="{HEIGHT:g}" role="img"><title>{escape(title)}</title>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {height:g}" '
+        f'width="{WIDTH:g}" height="{height:g}" role="img"><title>{escape(title)}</title>'
         f'<polygon points="{corners}" fill="{COLOUR}" fill-opacity="0.15" stroke="{COLOUR}" stroke-width="1.5" '
         f'stroke-linejoin="round"/>{dots}</svg>'
     )
 
 
-def _fitted(vertices: Points) -> Callable[[Points], Points]:
-    """From coordinates to places in the picture, for doubles of any size."""
+def _fitted(vertices: Points) -> tuple[Callable[[Points], Points], float]:
+    """From coordinates, doubles of any size, to places in the picture, and its height."""
     if not len(vertices):
-        return lambda points: points
+        return (lambda points: points), 2 * MARGIN
     # Scaled to about 1, the extent neither overflows nor vanishes.
     exponent = int(np.frexp(np.abs(vertices).max())[1]) + 1
     scaled = np.ldexp(vertices, -exponent)
     low, high = scaled.min(axis=0), scaled.max(axis=0)
-    unit = float(((high - low) / [WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN]).max())
+    unit = float(((high - low) / [WIDTH - 2 * MARGIN, MOST_HEIGHT - 2 * MARGIN]).max()) or 1.0
+    height = round(float(high[1] - low[1]) / unit + 2 * MARGIN)
 
     def place(points: Points) -> Points:
-        away: Points = np.ldexp(points, -exponent) - (low + high) / 2
-        away = away / unit if unit > 0 else np.zeros_like(away)
-        return away * [1, -1] + [WIDTH / 2, HEIGHT / 2]
+        away: Points = (np.ldexp(points, -exponent) - (low + high) / 2) / unit
+        return away * [1, -1] + [WIDTH / 2, height / 2]
 
-    return place
+    return place, height

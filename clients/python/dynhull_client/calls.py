@@ -126,7 +126,7 @@ def list_page(prefix: str, page_token: str, timeout: float | None) -> Call[tuple
     return Call("ListHulls", pb.ListHullsRequest(prefix=prefix, page_token=page_token), decode, timeout)
 
 
-def apply(
+def apply(  # noqa: D417  # unnamed takes nothing
     name: str,
     *unnamed: Never,
     insert: npt.ArrayLike | None = None,
@@ -141,7 +141,6 @@ def apply(
 
     Args:
         name: the hull.
-        *unnamed: none: points need the name of what to do with them.
         insert: (n, 2) points to insert.
         delete: (n, 2) points to delete.
         move: origins and destinations, (n, 2) each: row by row a delete and an insert.
