@@ -4,9 +4,13 @@ import inspect
 import pydoc
 from collections.abc import Iterator
 from importlib.metadata import version
+from xml.etree import ElementTree
 
+import geopandas
 import numpy as np
+import pandas as pd
 import pytest
+from shapely.geometry import shape
 
 import dynhull
 import dynhull_client
@@ -82,3 +86,22 @@ def test_answers_print_on_a_line(client: HullClient, name: str, address: str) ->
     assert repr(copy) == f"<HullCopy at revision 2: 105 points, {len(copy.vertices)} vertices>"
     assert repr(HullClient(address)) == f"HullClient('{address}')"
     assert name in repr(HullClient(address).writer(name))
+
+
+def test_hulls_are_features_and_pictures(client: HullClient, name: str) -> None:
+    client.apply(
+        name, insert=geopandas.GeoSeries.from_xy([5], [2]), delete=pd.DataFrame({"y": [1], "x": [1], "id": [7]})
+    )
+    hull = client.get_hull(name)
+    (row,) = geopandas.GeoDataFrame.from_features([hull]).itertuples()
+    assert (row.name, row.revision, row.points, row.area) == (name, 2, 5, 18.0)
+    copy = HullCopy()
+    with client.watch(name, copy=copy) as watch:
+        snapshot = next(watch)
+    for each in (hull, copy, snapshot):
+        assert shape(each).equals(row.geometry)
+        assert client.locate(name, each).sides.tolist() == [0] * 5
+    assert snapshot._repr_svg_().count("<circle") == copy._repr_svg_().count("<circle") == 5
+    figure = hull._repr_html_()
+    assert "5 points, 5 vertices, area 18" in figure
+    assert ElementTree.fromstring(figure).find(".//{*}polygon") is not None
