@@ -17,6 +17,60 @@ import dynhull_client
 from dynhull_client import AsyncHullClient, HullClient, HullCopy, Located, Measures, Snapshot, Tangents
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [1, 1]]
+EXPORTED = [
+    "Applied",
+    "AsyncHullClient",
+    "AsyncIngest",
+    "AsyncWatch",
+    "AsyncWriter",
+    "ChanRound",
+    "Change",
+    "Counted",
+    "Crossings",
+    "DeadlineError",
+    "Deleted",
+    "Difference",
+    "Distances",
+    "DynhullError",
+    "Efficient",
+    "Event",
+    "Hull",
+    "HullClient",
+    "HullCopy",
+    "HullEmptyError",
+    "HullExistsError",
+    "HullInfo",
+    "HullNotFoundError",
+    "HullReplacedError",
+    "HullUnsuitableError",
+    "Ingest",
+    "Ingested",
+    "InvalidRequestError",
+    "LimitExceededError",
+    "Located",
+    "Measured",
+    "Measures",
+    "OutcomeUnknownError",
+    "PermissionDeniedError",
+    "Phases",
+    "PointMissingError",
+    "Points",
+    "ProducerInUseError",
+    "Progress",
+    "RevisionForgottenError",
+    "Sampled",
+    "Separation",
+    "SequenceGapError",
+    "Sketch",
+    "Snapshot",
+    "Supported",
+    "Tangents",
+    "UnauthenticatedError",
+    "UnavailableError",
+    "Verification",
+    "Watch",
+    "Writer",
+]
 METHODS = [name for name in dir(HullClient) if not name.startswith("_") and callable(getattr(HullClient, name))]
 
 
@@ -29,6 +83,10 @@ def client(address: str, connect: type[HullClient], name: str) -> Iterator[HullC
 
 
 def test_completion_offers_what_is_documented() -> None:
+    assert {name for name in dir(dynhull_client) if not name.startswith("_")} == set(EXPORTED)
+    assert set(dynhull_client.__all__) == {*EXPORTED, "__version__"}
+    classes = [value for value in vars(dynhull_client).values() if isinstance(value, type)]
+    assert {kind.__module__ for kind in classes} == {"dynhull_client"}
     assert {name for name in dir(HullClient("127.0.0.1:1")) if not name.startswith("_")} == {*METHODS, "address"}
     assert set(METHODS) == {name for name in dir(AsyncHullClient) if not name.startswith("_")} - {"address"}
     assert all(inspect.getdoc(getattr(HullClient, name)) for name in METHODS)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dynhull_client.messages import Points
+from dynhull_client import Points
 
 from .load.chunks import CHUNK_ROWS, cut
 

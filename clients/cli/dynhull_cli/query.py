@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dynhull_client import HullClient
-from dynhull_client.messages import Points
+from dynhull_client import HullClient, Points
 
 from .asked import STANDARD_INPUT, asked_rows
 from .connected import connected

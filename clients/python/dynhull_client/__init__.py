@@ -7,12 +7,12 @@
 ...     print(client.get_hull("fleet").vertices)
 """
 
-from .async_client import AsyncHullClient
-from .async_ingest import AsyncIngest
-from .async_watch import AsyncWatch
-from .async_writer import AsyncWriter
-from .client import HullClient
-from .errors import (
+from ._async_client import AsyncHullClient
+from ._async_ingest import AsyncIngest
+from ._async_watch import AsyncWatch
+from ._async_writer import AsyncWriter
+from ._client import HullClient
+from ._errors import (
     DeadlineError,
     DynhullError,
     HullEmptyError,
@@ -31,9 +31,9 @@ from .errors import (
     UnauthenticatedError,
     UnavailableError,
 )
-from .hull_copy import HullCopy
-from .ingest import Ingest
-from .messages import (
+from ._hull_copy import HullCopy
+from ._ingest import Ingest
+from ._messages import (
     Applied,
     Change,
     ChanRound,
@@ -48,6 +48,7 @@ from .messages import (
     Ingested,
     Located,
     Measures,
+    Points,
     Progress,
     Sampled,
     Sketch,
@@ -56,9 +57,9 @@ from .messages import (
     Tangents,
     Verification,
 )
-from .uses import Efficient, Measured, Phases, Separation
-from .watch import Watch
-from .writer import Writer
+from ._uses import Efficient, Measured, Phases, Separation
+from ._watch import Watch
+from ._writer import Writer
 
 __all__ = [
     "Applied",
@@ -97,6 +98,7 @@ __all__ = [
     "PermissionDeniedError",
     "Phases",
     "PointMissingError",
+    "Points",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -116,6 +118,11 @@ __all__ = [
 ]
 
 __version__: str
+
+# Tracebacks and help show where to import a name from, not the private module that defines it.
+for _name in __all__:
+    if isinstance(_exported := globals().get(_name), type):
+        _exported.__module__ = __name__
 
 
 def __getattr__(name: str) -> str:

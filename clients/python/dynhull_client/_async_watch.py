@@ -8,11 +8,11 @@ from typing import Any, Self
 
 import grpc
 
-from .calls import Watching
-from .connection import AsyncConnection
-from .errors import DynhullError, error_of
-from .messages import Event
-from .place import Place
+from ._calls import Watching
+from ._connection import AsyncConnection
+from ._errors import DynhullError, error_of
+from ._messages import Event
+from ._place import Place
 
 
 class AsyncWatch(AsyncIterator[Event]):

@@ -4,14 +4,15 @@ from collections.abc import AsyncIterator, Callable, Coroutine
 from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-from . import calls, uses
-from .async_ingest import AsyncIngest
-from .async_watch import AsyncWatch
-from .async_writer import AsyncWriter
-from .calls import Call
-from .connection import AsyncConnection
-from .messages import HullInfo
-from .methods import Client, answer_of, documented, opening
+from . import _calls as calls
+from . import _uses as uses
+from ._async_ingest import AsyncIngest
+from ._async_watch import AsyncWatch
+from ._async_writer import AsyncWriter
+from ._calls import Call
+from ._connection import AsyncConnection
+from ._messages import HullInfo
+from ._methods import Client, answer_of, documented, opening
 
 P = ParamSpec("P")
 Result = TypeVar("Result")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
-from .errors import error_of
-from .messages import Ingested, decode_ingested
+from ._errors import error_of
+from ._messages import Ingested, decode_ingested
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
-    from .calls import Ingesting
-    from .connection import BlockingConnection
+    from ._calls import Ingesting
+    from ._connection import BlockingConnection
 
 # Batches that wait to be sent. A longer queue is no faster, and a stalled server must not fill the memory.
 LONGEST_QUEUE = 16

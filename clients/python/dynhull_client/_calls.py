@@ -17,10 +17,10 @@ from dynhull.arrays import as_points
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
-from . import messages
-from .batch import encode_batch
-from .errors import DynhullError, HullExistsError, HullNotFoundError
-from .messages import (
+from . import _messages as messages
+from ._batch import encode_batch
+from ._errors import DynhullError, HullExistsError, HullNotFoundError
+from ._messages import (
     Applied,
     Counted,
     Crossings,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from google.protobuf.message import Message
 
-    from .hull_copy import HullCopy
+    from ._hull_copy import HullCopy
 
 Answer = TypeVar("Answer")
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Self
 
 import grpc
 
-from .batch import encode_batch
-from .calls import Writing, last_sequence
-from .errors import DynhullError, error_of
-from .window import Window, settle
-from .writer import CLOSED
+from ._batch import encode_batch
+from ._calls import Writing, last_sequence
+from ._errors import DynhullError, error_of
+from ._window import Window, settle
+from ._writer import CLOSED
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
-    from .connection import AsyncConnection
-    from .messages import Applied
+    from ._connection import AsyncConnection
+    from ._messages import Applied
 
 
 class AsyncWriter:

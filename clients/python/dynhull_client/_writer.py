@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
-from .batch import encode_batch
-from .calls import Writing, last_sequence
-from .errors import DynhullError, error_of
-from .window import Window, settle
+from ._batch import encode_batch
+from ._calls import Writing, last_sequence
+from ._errors import DynhullError, error_of
+from ._window import Window, settle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
-    from .connection import BlockingConnection
-    from .messages import Applied
+    from ._connection import BlockingConnection
+    from ._messages import Applied
 
 
 CLOSED = "the writer is closed: open a new one"

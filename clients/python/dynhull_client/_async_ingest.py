@@ -5,16 +5,16 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Self
 
-from .ingest import Ingest
+from ._ingest import Ingest
 
 if TYPE_CHECKING:
     from types import TracebackType
 
     import numpy.typing as npt
 
-    from .calls import Ingesting
-    from .connection import AsyncConnection
-    from .messages import Ingested
+    from ._calls import Ingesting
+    from ._connection import AsyncConnection
+    from ._messages import Ingested
 
 
 class AsyncIngest:

@@ -6,7 +6,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 import grpc
 
-from .connection import DEFAULT_ADDRESS, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
+from ._connection import DEFAULT_ADDRESS, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
 
 P = ParamSpec("P")
 Description = TypeVar("Description")

@@ -10,9 +10,9 @@ import grpc
 
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-from .calls import Call
-from .errors import DynhullError, error_of
-from .retry import Attempts
+from ._calls import Call
+from ._errors import DynhullError, error_of
+from ._retry import Attempts
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 DEFAULT_TIMEOUT = 30.0

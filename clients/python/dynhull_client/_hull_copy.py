@@ -8,7 +8,7 @@ import numpy as np
 from dynhull._shown import geometry, svg
 from dynhull.arrays import Points
 
-from .messages import Change, Deleted, Event, Snapshot
+from ._messages import Change, Deleted, Event, Snapshot
 
 
 class HullCopy:

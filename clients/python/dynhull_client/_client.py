@@ -4,14 +4,15 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Concatenate, ParamSpec, Self, TypeVar
 
-from . import calls, uses
-from .calls import Call
-from .connection import BlockingConnection
-from .ingest import Ingest
-from .messages import HullInfo
-from .methods import Client, answer_of, documented, opening
-from .watch import Watch
-from .writer import Writer
+from . import _calls as calls
+from . import _uses as uses
+from ._calls import Call
+from ._connection import BlockingConnection
+from ._ingest import Ingest
+from ._messages import HullInfo
+from ._methods import Client, answer_of, documented, opening
+from ._watch import Watch
+from ._writer import Writer
 
 P = ParamSpec("P")
 Result = TypeVar("Result")

@@ -9,10 +9,10 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from .calls import Watching
-from .errors import DynhullError, HullNotFoundError, HullReplacedError, RevisionForgottenError
-from .messages import Deleted, Event, Progress, Snapshot, decode_event
-from .retry import LONGEST_PAUSE, LONGEST_PAUSE_FOR_A_HULL, pauses, seconds_until
+from ._calls import Watching
+from ._errors import DynhullError, HullNotFoundError, HullReplacedError, RevisionForgottenError
+from ._messages import Deleted, Event, Progress, Snapshot, decode_event
+from ._retry import LONGEST_PAUSE, LONGEST_PAUSE_FOR_A_HULL, pauses, seconds_until
 
 log = logging.getLogger("dynhull_client")
 

@@ -12,8 +12,8 @@ from dynhull._value import Value
 from dynhull.arrays import as_coordinate
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from .calls import Call, encoded
-from .messages import Measures, Points, decode_measures, decode_points
+from ._calls import Call, encoded
+from ._messages import Measures, Points, decode_measures, decode_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import grpc
 
-from .calls import Call
-from .errors import DeadlineError, DynhullError, HullNotFoundError, OutcomeUnknownError
+from ._calls import Call
+from ._errors import DeadlineError, DynhullError, HullNotFoundError, OutcomeUnknownError
 
 FIRST_PAUSE = 0.1
 LONGEST_PAUSE = 5.0

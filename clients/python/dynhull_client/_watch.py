@@ -7,11 +7,11 @@ from typing import Any, Self
 
 import grpc
 
-from .calls import Watching
-from .connection import BlockingConnection
-from .errors import DynhullError, error_of
-from .messages import Event
-from .place import Place
+from ._calls import Watching
+from ._connection import BlockingConnection
+from ._errors import DynhullError, error_of
+from ._messages import Event
+from ._place import Place
 
 
 class Watch(Iterator[Event]):
