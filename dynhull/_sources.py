@@ -30,7 +30,7 @@ def coordinates_of(source: Any, name: str) -> Any:
     Raises:
         ValueError: a geometry is missing or empty, or a frame has no or several such pairs of columns.
     """
-    if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.dtype == np.object_):
+    if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.ndim):
         return _of_geometries(source, name) if len(source) and _is_geometry(source[0]) else source
     series: Any = getattr(source, "geometry", None)
     if hasattr(series, "to_numpy"):  # of a GeoSeries or a GeoDataFrame

@@ -32,7 +32,7 @@ def convex_pieces(contour: npt.ArrayLike) -> list[Points]:
     """
     corners = _without_straight_corners(as_points(contour, "contour"))
     if not len(corners):
-        raise ValueError("contour has no corners: it must have at least one")
+        raise ValueError("contour is empty: it needs at least one corner")
     if len(corners) < 3:
         return [corners]
     _check_simple(corners)

@@ -42,7 +42,7 @@ def hull(client: HullClient, name: str) -> str:
     return name
 
 
-def test_a_hull_from_birth_to_death(client: HullClient, name: str) -> None:
+def test_a_hull_from_creation_to_deletion(client: HullClient, name: str) -> None:
     info = client.create_hull(name)
     assert (info.name, info.revision, info.points, info.distinct) == (name, 0, 0, 0)
     assert client.apply(name, insert=SQUARE) == Applied(1, 8, 0, 0, True, 8)
@@ -132,7 +132,7 @@ def test_an_ingest_of_nothing_changes_nothing(client: HullClient, hull: str) -> 
     assert (stream.summary.batches, stream.summary.revision) == (0, 0)
 
 
-def test_the_servers_error_comes_out_of_apply_when_there_is_another(client: HullClient, hull: str) -> None:
+def test_the_next_apply_raises_the_servers_error(client: HullClient, hull: str) -> None:
     def apply_for_ever() -> None:
         with client.ingest(hull) as stream:
             stream.apply(insert=SQUARE)
@@ -147,7 +147,7 @@ def test_the_servers_error_comes_out_of_apply_when_there_is_another(client: Hull
     assert client.get_hull(hull).revision == 1
 
 
-def test_the_servers_error_comes_at_the_end_otherwise(client: HullClient, hull: str) -> None:
+def test_leaving_an_ingest_raises_the_servers_error(client: HullClient, hull: str) -> None:
     stream = client.ingest(hull)
     with pytest.raises(PointMissingError), stream:
         stream.apply(delete=[[8, 8]])
@@ -156,7 +156,7 @@ def test_the_servers_error_comes_at_the_end_otherwise(client: HullClient, hull: 
         pass
 
 
-def test_an_error_of_ones_own_cancels_an_ingest(client: HullClient, hull: str) -> None:
+def test_leaving_with_an_exception_cancels_an_ingest(client: HullClient, hull: str) -> None:
     stream = client.ingest(hull)
 
     def fail_half_way() -> None:

@@ -1,4 +1,4 @@
-"""A watch that goes on by itself: the copy it keeps is exact whatever happened to the connection and the server."""
+"""A watch that reconnects by itself: its copy is exact after any failure of the connection or the server."""
 
 import asyncio
 import threading
@@ -52,7 +52,7 @@ class Follower:
         return sum(isinstance(event, Snapshot) for event in self.events)
 
 
-def test_it_goes_on_after_lost_connections(address: str, connect: type[HullClient], name: str) -> None:
+def test_it_continues_after_lost_connections(address: str, connect: type[HullClient], name: str) -> None:
     copy = HullCopy()
     with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
         client.create_hull(name)
@@ -88,7 +88,7 @@ def test_it_outlives_its_server(tmp_path: Path, connect: type[HullClient]) -> No
     assert copy.vertices.tolist() == [[1, 2], [3, 4]]
 
 
-def test_it_begins_anew_where_the_server_has_forgotten(connect: type[HullClient]) -> None:
+def test_it_starts_again_if_the_server_has_forgotten(connect: type[HullClient]) -> None:
     with server_process("--history-bytes", "0") as server, connect(server.address) as client:
         client.create_hull("a")
         copy = HullCopy()
@@ -104,7 +104,7 @@ def test_it_begins_anew_where_the_server_has_forgotten(connect: type[HullClient]
         assert (copy.revision, copy.points, len(copy.vertices)) == (0, 0, 0)
 
 
-def test_a_sketch_goes_on_too(address: str, connect: type[HullClient], name: str) -> None:
+def test_a_sketch_continues_too(address: str, connect: type[HullClient], name: str) -> None:
     with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
         client.create_hull(name)
         with watching.watch(name, directions=[[1, 0]]) as watch:
@@ -197,7 +197,7 @@ def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:
         assert list(watch) == []
 
 
-def test_a_wait_given_up_does_not_end_the_watch(address: str, name: str) -> None:
+def test_a_cancelled_wait_does_not_end_the_watch(address: str, name: str) -> None:
     async def follow() -> HullCopy:
         copy = HullCopy()
         async with AsyncHullClient(address) as client:

@@ -1,4 +1,4 @@
-"""The writer: every batch exactly once, whatever happens to the connection and the server."""
+"""The writer: every batch exactly once, after any failure of the connection or the server."""
 
 import signal
 import threading
@@ -47,7 +47,7 @@ def test_points_are_gathered_into_batches(client: HullClient, name: str) -> None
     assert client.get_hull(name).vertices.tolist() == expected.vertices().tolist()
 
 
-def test_what_waits_is_sent_after_the_linger_time(client: HullClient, name: str) -> None:
+def test_points_are_sent_after_the_linger_time(client: HullClient, name: str) -> None:
     with client.writer(name, linger=0.05) as writer:
         began = time.monotonic()
         first = writer.put(insert=[[1, 1]])
@@ -66,11 +66,11 @@ def test_a_refused_batch_is_the_only_one_that_fails(client: HullClient, name: st
         failed = [i for i, outcome in enumerate(outcomes) if outcome.exception() is not None]
         assert failed == [0, 10, 20, 30, 40]
         assert outcomes[20].exception().value == "(-1.0, 20.0)"
-        writer.flush()  # told once
+        writer.flush()  # reported once
     assert (client.get_hull(name).revision, writer.sequence) == (45, 45)
 
 
-def test_or_ends_the_writer(client: HullClient, name: str) -> None:
+def test_a_refused_batch_may_end_the_writer(client: HullClient, name: str) -> None:
     def write() -> None:
         with client.writer(name, batch_points=1, stop_on_error=True) as writer:
             writer.put(insert=[[1, 1]])
@@ -122,7 +122,7 @@ def acknowledged(writer, sequence: int) -> None:
 
 
 def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:
-    """Three servers one after another on the same data, the first two killed while batches are under way."""
+    """Three servers, one after another, on the same data; the first two are killed in the middle of batches."""
     data = ("--data", str(tmp_path))
     with (
         server_process(*data, killed=True) as first,
@@ -159,7 +159,7 @@ def test_every_batch_once_though_the_connection_breaks(address: str, connect: ty
 
 
 def test_refused_batches_among_broken_connections(address: str, connect: type[HullClient], name: str) -> None:
-    """The numbers of the batches after a refused one move up, while the server may have applied more than it told."""
+    """Batches after a refused one get new numbers, while the server may have applied more than it acknowledged."""
     with proxy(address) as way, connect(way.address) as client:
         client.create_hull(name)
         with client.writer(name, batch_points=1, in_flight=16) as writer:
@@ -176,7 +176,7 @@ def test_refused_batches_among_broken_connections(address: str, connect: type[Hu
         assert client.count(name, there).counts.tolist() == [int(i % 20 != 7) for i in range(600)]
 
 
-def test_another_writer_goes_on_where_one_was_acknowledged(client: HullClient, name: str) -> None:
+def test_another_writer_continues_after_the_last_acknowledged_batch(client: HullClient, name: str) -> None:
     for last in (1, 2):
         with client.writer(name, producer="p") as writer:
             assert writer.sequence == last - 1
@@ -251,7 +251,7 @@ def test_a_writer_without_a_context(client: HullClient, name: str) -> None:
     assert client.get_hull(name).info.points == 1
 
 
-def test_an_error_of_ones_own_waits_for_nothing(client: HullClient, name: str) -> None:
+def test_leaving_with_an_exception_waits_for_nothing(client: HullClient, name: str) -> None:
     writer = client.writer(name, linger=60)
     outcomes = []
 

@@ -95,6 +95,11 @@ def test_what_has_no_points_is_an_error(source: object, complaint: str) -> None:
     assert len(hull) == 5
 
 
+def test_a_single_object_is_an_error() -> None:
+    with pytest.raises(ValueError, match=r"points must have shape \(n, 2\), got \(\)"):
+        DynamicHull(np.array(None))
+
+
 def test_text_columns_are_an_error() -> None:
     with pytest.raises(TypeError, match="points row 0: coordinates must be real numbers"):
         DynamicHull(pd.DataFrame({"x": ["1", "2"], "y": ["3", "4"]}))

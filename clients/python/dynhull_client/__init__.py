@@ -1,4 +1,4 @@
-"""Client of the dynhull server: numpy arrays in and out.
+"""Clients of a dynhull server, with numpy arrays in and out: HullClient, and AsyncHullClient for asyncio.
 
 >>> from dynhull_client import HullClient
 >>> with HullClient("127.0.0.1:50051") as client:  # doctest: +SKIP
