@@ -120,9 +120,10 @@ __all__ = [
 __version__: str
 
 # Tracebacks and help show where to import a name from, not the private module that defines it.
-for _name in __all__:
-    if isinstance(_exported := globals().get(_name), type):
-        _exported.__module__ = __name__
+for _exported in [each for each in globals().values() if isinstance(each, type)]:
+    for _named in (_exported, *vars(_exported).values()):
+        if isinstance(_named, type) or hasattr(_named, "__code__"):
+            _named.__module__ = __name__
 
 
 def __getattr__(name: str) -> str:
