@@ -1,4 +1,7 @@
-"""The notebooks of the documentation: run again, they give the results they show."""
+"""The notebooks of the documentation: run again, they give the results they show.
+
+After a change, `jupyter execute --inplace docs/notebooks/*.ipynb`, with a server running, stores the new results.
+"""
 
 import os
 from collections.abc import Iterator
