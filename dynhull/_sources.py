@@ -20,7 +20,7 @@ SHAPELY_POINT = 0
 
 
 def coordinates_of(source: Any, name: str) -> Any:
-    """The (n, 2) coordinates of what holds points, and anything else as it is.
+    """The (n, 2) coordinates in a source of points; any other object unchanged.
 
     * an object with `__geo_interface__`, such as shapely's geometries, or GeoJSON as a dictionary: every vertex once
     * a list, array or GeoSeries of such objects, or a GeoDataFrame
@@ -32,7 +32,7 @@ def coordinates_of(source: Any, name: str) -> Any:
     """
     if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.ndim):
         return _of_geometries(source, name) if len(source) and _is_geometry(source[0]) else source
-    series: Any = getattr(source, "geometry", None)
+    series: Any = getattr(source, "geometry", None) if _is_geometry(source) else None
     if hasattr(series, "to_numpy"):  # of a GeoSeries or a GeoDataFrame
         return _of_geometries(series.to_numpy(), name)
     if hasattr(source, "columns"):
@@ -41,7 +41,7 @@ def coordinates_of(source: Any, name: str) -> Any:
 
 
 def _is_geometry(value: Any) -> bool:
-    """Looks at the class: a million geometries take a minute to make their `__geo_interface__`."""
+    """Whether it is GeoJSON or makes some. Asks the class: a large GeoSeries takes a minute to make its GeoJSON."""
     return hasattr(type(value), "__geo_interface__") or (isinstance(value, Mapping) and "type" in value)
 
 

@@ -37,6 +37,7 @@ FEATURE = {"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": 
         [FEATURE["geometry"]],
         pd.DataFrame({"Lat": Y, "name": list("abcde"), "Lon": X}),
         pd.DataFrame({"y": Y, "x": X}),
+        pd.DataFrame({"y": Y, "x": X, "geometry": list("abcde")}),  # not of geopandas
         pd.DataFrame({"a": X, "b": Y}),
         pd.DataFrame(PAIRS),
         pd.DataFrame({"name": list("abcde"), "a": X, "b": Y})[["a", "b"]],

@@ -25,6 +25,7 @@ class AsyncIngest:
 
     def __init__(self, connection: AsyncConnection, ingesting: Ingesting) -> None:
         self._connection = connection.blocking()
+        self._name = ingesting.name
         self._ingest = Ingest(self._connection, ingesting)
 
     @property
@@ -42,7 +43,7 @@ class AsyncIngest:
         await asyncio.to_thread(self._ingest.apply, insert, delete, move)
 
     def __repr__(self) -> str:
-        return f"<AsyncIngest to {self._ingest.name!r}>"
+        return f"<AsyncIngest to {self._name!r}>"
 
     async def __aenter__(self) -> Self:
         await asyncio.to_thread(self._ingest.__enter__)

@@ -35,12 +35,10 @@ class Ingest:
     sent may be applied.
 
     Attributes:
-        name: the hull.
         summary: the effect of all batches; None until the context was left without an error.
     """
 
     def __init__(self, connection: BlockingConnection, ingesting: Ingesting) -> None:
-        self.name = ingesting.name
         self.summary: Ingested | None = None
         self._connection = connection
         self._ingesting = ingesting
@@ -95,7 +93,7 @@ class Ingest:
         raise RuntimeError("the context of this Ingest was left: open a new one")
 
     def __repr__(self) -> str:
-        return f"<Ingest to {self.name!r}>"
+        return f"<Ingest to {self._ingesting.name!r}>"
 
     def _requests(self) -> Iterator[pb.IngestRequest]:
         """The messages to send; runs in a thread of gRPC."""
