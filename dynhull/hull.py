@@ -19,11 +19,11 @@ MOST_POINTS_DRAWN = 2000
 
 
 class MissingPointError(KeyError):
-    """A delete names a point that the hull does not hold.
+    """A delete names a point that is not there.
 
     Attributes:
         point: the coordinates.
-        row: the row of the batch; None for a single delete.
+        row: the row of the batch, None for a single delete.
     """
 
     def __init__(self, point: tuple[float, float], row: int | None = None) -> None:
@@ -40,14 +40,16 @@ class DynamicHull:
     """The convex hull of a multiset of points in the plane, under inserts and deletes. Exact for every finite double.
 
     Args:
-        points: (n, 2) array-like of finite numbers; by default none. O(n log n).
+        points: (n, 2) array-like of finite numbers, none to begin with when left out. O(n log n).
 
-    Every method that takes points also takes geometries (shapely, geopandas, GeoJSON) and frames with columns such as
-    x and y, or lon and lat. It raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
-    numeric, or not exactly a double; the message names the first bad row, and nothing is changed.
+    Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
+    numeric, or that no double can hold, names the first bad row, and changes nothing.
 
     Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
     query.
+
+    Points may also come as geometries (shapely, geopandas, GeoJSON), which give every vertex once, and as frames
+    (pandas, polars, pyarrow) with columns such as x and y, or lon and lat.
 
     >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
     >>> hull.insert(5, 2)
@@ -70,35 +72,35 @@ class DynamicHull:
     # Updates
 
     def insert(self, x: float, y: float) -> bool:
-        """Add a point. Returns whether the hull changed. O(log² n)."""
+        """Add a point. True where the hull changed. O(log² n)."""
         return self._tree.insert(x, y)
 
     def delete(self, x: float, y: float) -> bool:
-        """Remove a point once. Returns whether the hull changed. KeyError if there is no such point. O(log² n)."""
+        """Remove a point once. True where the hull changed; KeyError where the point is not there. O(log² n)."""
         try:
             return self._tree.delete(x, y)
         except KeyError:
             raise MissingPointError((as_coordinate(x, "x"), as_coordinate(y, "y"))) from None
 
     def insert_many(self, xy: npt.ArrayLike) -> int:
-        """Add points as one batch. Returns their number. O(log² n) each, O((n + k) log k) for k >= n."""
+        """Add points as one batch. Returns how many. O(log² n) each, O((n + k) log k) for k >= n."""
         return self._apply(+1, xy, "raise")
 
     def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
-        """Remove points as one batch. Returns the number removed. O(log² n) each.
+        """Remove points as one batch. Returns how many were removed. O(log² n) each.
 
         Args:
             xy: (k, 2) array-like.
-            missing: for a point that the hull does not hold, or not often enough: "raise" raises KeyError, which names
-                the row, before anything changes; "ignore" skips the row.
+            missing: for a point that is not there (often enough): "raise" raises KeyError, which names its row, before
+                anything changes; "ignore" passes over it.
         """
         return self._apply(-1, xy, missing)
 
     def apply(self, ops: npt.ArrayLike, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
-        """Apply inserts and deletes as one batch. Returns the number of rows applied. O(log² n) each.
+        """Apply inserts and deletes as one batch. Returns how many rows were applied. O(log² n) each.
 
-        A batch is a set: the order of its rows does not matter, and inserting and deleting a point in one batch has no
-        effect.
+        A batch is a set: the order of its rows does not matter, and a point inserted and deleted in one batch leaves no
+        trace.
 
         Args:
             ops: k numbers, +1 to insert and -1 to delete the point of that row.
@@ -126,25 +128,25 @@ class DynamicHull:
     # What is there
 
     def __len__(self) -> int:
-        """The number of points, with multiplicity. O(1)."""
+        """How many points, with multiplicity. O(1)."""
         return len(self._tree)
 
     @property
     def distinct(self) -> int:
-        """The number of distinct points. O(1)."""
+        """How many different points. O(1)."""
         return self._tree.distinct
 
     @property
     def changes(self) -> int:
-        """The number of updates, single or batch, that changed the hull. O(1)."""
+        """Grows by one with every update, single or batch, that changed the hull. O(1)."""
         return self._tree.changes
 
     def count(self, x: float, y: float) -> int:
-        """The multiplicity of a point; 0 if there is no such point. O(log n)."""
+        """How many times the point is there. O(log n)."""
         return self._tree.count(x, y)
 
     def count_many(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """The multiplicity of each of (k, 2) points. O(log n) each."""
+        """How many times each of (k, 2) points is there. O(log n) each."""
         return self._tree.count_many(as_points(xy))
 
     def __contains__(self, point: tuple[float, float]) -> bool:
@@ -159,7 +161,7 @@ class DynamicHull:
     def vertices(self) -> Points:
         """(h, 2) vertices, counter-clockwise from the lexicographically smallest; none lies between its neighbours.
 
-        O(h log n). (0, 2) without points; one vertex if all points are equal, two if all are on one line.
+        O(h log n). No points: (0, 2). One point, any number of times: one vertex. All on one line: two.
         """
         return self._tree.vertices()
 
@@ -174,17 +176,17 @@ class DynamicHull:
     # Queries
 
     def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
-        """The side of each of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
+        """Where each of (k, 2) points is: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
         return self._tree.locate(as_points(xy))
 
     def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether each of (k, 2) points is inside or on the boundary. Exact. O(log n) each."""
+        """Which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
         return self.locate(xy) >= 0
 
     def support(self, directions: npt.ArrayLike) -> Points:
-        """(k, 2) extreme vertices, one for each of (k, 2) directions of any length but 0. Exact. O(log n) each.
+        """(k, 2) extreme vertices, one for each of (k, 2) directions, which need no unit length. Exact. O(log n) each.
 
-        If a whole edge is extreme, its lexicographically smaller end.
+        Where a whole edge is extreme, its lexicographically smaller end.
 
         Raises:
             ValueError: a direction is (0, 0), or there are no points.
@@ -197,8 +199,8 @@ class DynamicHull:
     def tangents(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """(k, 2, 2) left and right tangent points seen from each of (k, 2) points. Exact. O(log n) each.
 
-        Seen from an outside point the hull is between the two: no part of it is left of the ray to the left tangent
-        point or right of the ray to the right one. Of two vertices on one such ray, the farther. NaN for points that
+        Seen from an outside point the hull lies between the two: none of it left of the ray to the left tangent point,
+        none of it right of the ray to the right one. Of two vertices on one such ray, the farther. NaN for points that
         are not strictly outside, and for an empty hull.
         """
         return self._tree.tangents(as_points(xy))
@@ -211,13 +213,13 @@ class DynamicHull:
         return self._tree.distance(as_points(xy))
 
     def intersect_lines(self, p: npt.ArrayLike, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """(k, 2, 2) points where the line through each of (k, 2) p and q enters and leaves the hull. O(log n) each.
+        """(k, 2, 2) where the lines through each of (k, 2) points p and q enter and leave the hull. O(log n) each.
 
-        In the order from p to q; each coordinate is the exact value rounded once. A line that touches a vertex gives it
-        twice, a line along an edge gives the edge's ends; NaN for a line that misses.
+        In the order from p to q; each coordinate is the exact value rounded once. A line that touches a vertex has it
+        twice, one along an edge has the edge's ends; NaN for a line that misses.
 
         Raises:
-            ValueError: p and q differ in length, or are equal in a row.
+            ValueError: p and q differ in length, or are the same point in a row.
         """
         starts, ends = as_points(p, "p"), as_points(q, "q")
         if len(starts) != len(ends):
@@ -248,21 +250,21 @@ class DynamicHull:
 
     @property
     def perimeter(self) -> float:
-        """Length of the boundary, within one unit in the last place per edge; a segment counts twice. O(h log n)."""
+        """Length of the boundary, within one unit in the last place an edge; two vertices count twice. O(h log n)."""
         return self._measure(measure.perimeter)
 
     @property
     def centroid(self) -> tuple[float, float]:
-        """Centre of area, the exact value rounded once; the middle of a segment; NaN without points. O(h log n)."""
+        """Centre of area, the exact value rounded once; of a segment the middle, NaN without points. O(h log n)."""
         return self._measure(measure.centroid)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x, least y, greatest x and greatest y; NaN without points. O(h log n)."""
+        """Least x, least y, greatest x, greatest y; NaN without points. O(h log n)."""
         return self._measure(measure.bounds)
 
     def diameter(self) -> float:
-        """The greatest distance of two points, within one unit in the last place; 0.0 for one or none. O(h log n)."""
+        """The greatest distance of two points, within one unit in the last place; 0.0 below two. O(h log n)."""
         return self._measure(measure.diameter)
 
     def width(self) -> float:
@@ -275,7 +277,7 @@ class DynamicHull:
     def min_box(self) -> Points:
         """(4, 2) corners of the box of least area in any direction around the points, counter-clockwise. O(h log n).
 
-        Chosen exactly, each coordinate rounded once. Flat for points on one line; NaN without points.
+        Chosen exactly, each coordinate rounded once. Of points on one line the box is flat; NaN without points.
         """
         return self._measure(measure.min_box).copy()
 
@@ -284,7 +286,7 @@ class DynamicHull:
         return self._measure(measure.min_perimeter_box).copy()
 
     def min_circle(self) -> tuple[tuple[float, float], float]:
-        """Centre and radius of the smallest circle around the points. O(h log n), and about ten rounds of O(h).
+        """Centre and radius of the smallest circle around the points. O(h log n), and O(h) a round, some ten rounds.
 
         The exact centre rounded once, the radius within one unit in the last place. (NaN, NaN) and 0.0 without points.
         """
@@ -334,7 +336,7 @@ class DynamicHull:
         return svg(self.vertices(), repr(self), points)
 
     def check(self) -> None:
-        """Raise AssertionError if an invariant of the tree is broken. O(n log n); for tests and bug reports."""
+        """Raise AssertionError where an invariant of the tree is broken. O(n log n); for tests and bug reports."""
         self._tree.check()
 
 
