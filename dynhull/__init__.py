@@ -6,4 +6,14 @@ from .implementation import KERNEL
 from .predicates import orient2d
 from .static import convex_hull
 
-__all__ = ["KERNEL", "DynamicHull", "MissingPointError", "convex_hull", "orient2d", "static"]
+__all__ = ["KERNEL", "DynamicHull", "MissingPointError", "__version__", "convex_hull", "orient2d", "static"]
+
+__version__: str
+
+
+def __getattr__(name: str) -> str:
+    if name == "__version__":  # read when asked for: it takes as long as a tenth of the import
+        from importlib.metadata import version
+
+        return version("dynhull")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

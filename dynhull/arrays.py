@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._sources import coordinates_of
 from .implementation import kernel
 
 Points = npt.NDArray[np.float64]
@@ -162,7 +163,7 @@ def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
 
 
 def _as_pairs(xy: npt.ArrayLike, name: str) -> Points:
-    array = _as_array(xy, name)
+    array = _as_array(coordinates_of(xy, name), name)
     if array.ndim == 1 and array.size == 0:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] != 2:

@@ -12,14 +12,14 @@ Ring = list[int]
 
 
 def convex_pieces(contour: npt.ArrayLike) -> list[Points]:
-    """Cut a simple polygon into convex polygons without new corners, at most four times as many as need be. O(n²).
+    """Cut a simple polygon into convex polygons without new corners, at most four times the least number. O(n²).
 
-    Ears are cut off until nothing is left (Meisters, "Polygons have ears", 1975), then triangles are joined as long as
-    they stay convex (Hertel and Mehlhorn, "Fast triangulation of simple polygons", 1983). Every decision is exact.
+    Cuts off ears until nothing is left (Meisters, "Polygons have ears", 1975), then joins triangles while they stay
+    convex (Hertel and Mehlhorn, "Fast triangulation of simple polygons", 1983). Every decision is exact.
 
     Args:
-        contour: (n, 2) corners around the polygon, either way. Corners that lie straight between their neighbours and
-            repeated ones are left out.
+        contour: (n, 2) corners around the polygon, in either direction. Repeated corners, and corners on the line
+            between their neighbours, are left out.
 
     Returns:
         (k, 2) corners of each piece, counter-clockwise. A polygon without area is one piece: a segment or a point.
@@ -32,7 +32,7 @@ def convex_pieces(contour: npt.ArrayLike) -> list[Points]:
     """
     corners = _without_straight_corners(as_points(contour, "contour"))
     if not len(corners):
-        raise ValueError("contour is empty: no polygon")
+        raise ValueError("contour is empty: it needs at least one corner")
     if len(corners) < 3:
         return [corners]
     _check_simple(corners)
@@ -44,7 +44,7 @@ def convex_pieces(contour: npt.ArrayLike) -> list[Points]:
 
 
 def _without_straight_corners(contour: Points) -> Points:
-    """Neither repeated corners, nor such as are passed straight on. Of a contour without area, its two ends."""
+    """The contour without repeated and straight corners; for a contour without area, its two ends."""
     ordered = np.unique(contour, axis=0)
     if not np.any(orient2d(ordered[:1], ordered[-1:], ordered)):
         return ordered[[0, -1]] if len(ordered) > 2 else ordered
@@ -58,7 +58,7 @@ def _without_straight_corners(contour: Points) -> Points:
 
 
 def _check_simple(corners: Points) -> None:
-    """Raise ValueError where two edges touch that are not neighbours, or a neighbour goes straight back."""
+    """Raise ValueError if two edges touch that are not neighbours, or if an edge goes straight back."""
     count = len(corners)
     points = as_tuples(corners)
     ends = np.roll(corners, -1, axis=0)
@@ -66,7 +66,7 @@ def _check_simple(corners: Points) -> None:
     for i in range(count):
         p, q, r = points[i], points[(i + 1) % count], points[(i + 2) % count]
         if orientation(p, q, r) == 0 and dot_sign(p, q, q, r) < 0:
-            raise ValueError(f"contour goes straight back at {_text(ends[i])}: no simple polygon")
+            raise ValueError(f"contour goes straight back at {_text(ends[i])}: it is not a simple polygon")
         others = np.arange(i + 2, count - (i == 0))
         near = np.all((low[others] <= high[i]) & (high[others] >= low[i]), axis=1)
         others = others[near]
@@ -76,7 +76,7 @@ def _check_simple(corners: Points) -> None:
         if across.any():
             j = int(others[across][0])
             edges = [f"from {_text(corners[k])} to {_text(ends[k])}" for k in (i, j)]
-            raise ValueError(f"contour is no simple polygon: its edges {edges[0]} and {edges[1]} meet")
+            raise ValueError(f"contour is not a simple polygon: its edges {edges[0]} and {edges[1]} meet")
 
 
 def _text(point: Points) -> str:
@@ -84,7 +84,7 @@ def _text(point: Points) -> str:
 
 
 def _triangulation(corners: Points) -> tuple[list[Ring], list[tuple[int, int]]]:
-    """Triangles, and the diagonals that were cut. Whether a corner is an ear changes only with its neighbours."""
+    """The triangles and the diagonals between them. A corner's being an ear changes only with its neighbours."""
     ring = list(range(len(corners)))
     ears = [_is_ear(corners, ring, i) for i in ring]
     triangles, diagonals = [], []
@@ -100,7 +100,7 @@ def _triangulation(corners: Points) -> tuple[list[Ring], list[tuple[int, int]]]:
 
 
 def _is_ear(corners: Points, ring: Ring, place: int) -> bool:
-    """Whether the triangle at a corner turns left, and none of the other corners is in it or on it."""
+    """Whether the triangle at a corner turns left and contains no other corner, boundary included."""
     a, b, c = (corners[ring[i % len(ring)]] for i in (place - 1, place, place + 1))
     if orient2d(a, b, c) <= 0:
         return False
@@ -113,7 +113,7 @@ def _is_ear(corners: Points, ring: Ring, place: int) -> bool:
 
 
 def _joined(points: Sequence[Point], triangles: list[Ring], diagonals: list[tuple[int, int]]) -> list[Ring]:
-    """Pieces on both sides of a diagonal become one where that is convex at both its ends."""
+    """Join the pieces on both sides of each diagonal if the result is convex at both its ends."""
     owner = {edge: ring for ring in triangles for edge in _edges(ring)}
     for a, b in diagonals:
         one, other = _from(owner[a, b], b), _from(owner[b, a], a)
@@ -137,6 +137,6 @@ def _edges(ring: Ring) -> list[tuple[int, int]]:
 
 
 def _from(ring: Ring, first: int) -> Ring:
-    """The same ring, beginning at a corner."""
+    """The ring rotated to begin at a corner."""
     place = ring.index(first)
     return ring[place:] + ring[:place]

@@ -1,25 +1,26 @@
-"""Convexity defects: where a contour leaves its hull, and how far."""
+"""Convexity defects: the parts of a contour inside its hull, and their depth."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from ._value import Value
 from .arrays import as_points
 from .exact import Integers, root
 from .measure.calipers import Indices, least, squared_height
 from .static import convex_hull
 
 
-@dataclass(frozen=True, eq=False)
-class Defects:
+@dataclass(frozen=True, eq=False, repr=False)
+class Defects(Value):
     """One row for each edge of the hull that the contour leaves, in the order of the contour.
 
     Attributes:
-        start: (k,) row of the contour where the defect begins, a corner of the hull.
-        end: (k,) row where it ends, the next corner of the hull along the contour.
-        farthest: (k,) row between the two that is farthest from the hull's edge; the first of several.
-        depth: (k,) its distance from the edge's line: the exact value within one unit in the last place.
+        start: (k,) rows of the contour where the defects begin, which are corners of the hull.
+        end: (k,) rows where they end, the next corner of the hull along the contour.
+        farthest: (k,) rows between the two that are farthest from the hull's edge; the first of several.
+        depth: (k,) their distances from the edge's line, within one unit in the last place of the exact values.
     """
 
     start: Indices
@@ -29,18 +30,18 @@ class Defects:
 
 
 def convexity_defects(contour: npt.ArrayLike) -> Defects:
-    """For each edge of a contour's hull the deepest point of the contour behind it. O(n log n).
+    """The deepest point of the contour behind each edge of its hull. O(n log n).
 
-    The convention of OpenCV's `convexityDefects`, whose depth is rounded to 1/256, without its restriction to integers
-    or floats of single precision. Which point is deepest is decided exactly.
+    Follows the convention of OpenCV's `convexityDefects`, whose depth is rounded to 1/256, but is not restricted to
+    integers or single precision. Which point is deepest is decided exactly.
 
     Args:
-        contour: (n, 2) corners of a simple polygon, either way around. Of a repeated corner of the hull, the first row
-            counts. Fewer than three corners, or all on one line: no defects.
+        contour: (n, 2) corners of a simple polygon, in either direction. For a repeated corner of the hull, the first
+            row counts. A contour with fewer than three corners, or all on one line, has no defects.
 
     Raises:
-        ValueError, TypeError: bad points, or the hull's corners do not follow each other along the contour, which
-            therefore crosses itself.
+        ValueError, TypeError: a point is bad, or the contour crosses itself, so that the corners of the hull are not in
+            order along it.
 
     >>> found = convexity_defects([[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]])
     >>> found.start, found.end, found.farthest, found.depth
@@ -65,13 +66,13 @@ def convexity_defects(contour: npt.ArrayLike) -> Defects:
 
 
 def _along_the_contour(corners: list[int]) -> list[tuple[int, int]]:
-    """Edges of the hull as rows of the contour, in its order."""
+    """The edges of the hull as pairs of rows, in the order of the contour."""
     for around in (corners, corners[::-1]):
         first = around.index(min(around))
         ordered = around[first:] + around[:first]
         if ordered == sorted(around):
             return list(zip(ordered, ordered[1:] + ordered[:1], strict=True))
-    raise ValueError("contour crosses itself: the corners of its hull do not follow each other along it")
+    raise ValueError("contour crosses itself: the corners of its hull are not in order along it")
 
 
 def _negative_squared_height(a: Integers, b: Integers, p: Integers) -> tuple[Integers, Integers, Integers]:

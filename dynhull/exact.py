@@ -1,4 +1,4 @@
-"""Rational arithmetic on doubles: values that are exact until they are rounded, once."""
+"""Rational arithmetic on doubles: values stay exact until they are rounded once."""
 
 from fractions import Fraction
 from math import inf, isqrt
@@ -14,31 +14,31 @@ Exact = tuple[Fraction, Fraction]
 Integers = npt.NDArray[Any]
 
 MANTISSA = 53
-HALF = 27  # bits: the sum of 2**26 halves is still exact in a double
+HALF = 27  # bits: a double holds the sum of 2**26 halves exactly
 # Beyond these the low part of a product of three doubles may underflow.
 SMALLEST_FACTOR, LARGEST_FACTOR = 2.0**-280, 2.0**280
 SPLITTER = 2.0**27 + 1.0
 
 
 def exact(p: Point) -> Exact:
-    """The same point in rational numbers."""
+    """A point in rational numbers."""
     return Fraction(p[0]), Fraction(p[1])
 
 
 def squared_length(a: Point, b: Point) -> Fraction:
-    """Of the way from a to b."""
+    """The squared distance of a and b."""
     (ax, ay), (bx, by) = exact(a), exact(b)
     return (bx - ax) ** 2 + (by - ay) ** 2
 
 
 def doubled_triangle(a: Point, b: Point, c: Point) -> Fraction:
-    """Twice the area of the triangle, negative where it turns right."""
+    """Twice the area of the triangle, negative if it turns right."""
     (ax, ay), (bx, by), (cx, cy) = exact(a), exact(b), exact(c)
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 def rounded(value: Fraction) -> float:
-    """The nearest double; inf with the right sign where it is beyond every double."""
+    """The nearest double; inf or -inf beyond the doubles."""
     try:
         return float(value)
     except OverflowError:
@@ -46,18 +46,18 @@ def rounded(value: Fraction) -> float:
 
 
 def root(value: Fraction) -> float:
-    """The double nearest to the square root of a rational number; inf where no double is so large."""
+    """The double nearest to the square root of a rational number; inf beyond the doubles."""
     # A quotient of at least 2 * 64 bits whose power of two is even: its root has 64 bits or more.
     shift = 130 - value.numerator.bit_length() + value.denominator.bit_length()
     shift += shift % 2
     quotient, rest = divmod(value.numerator << max(shift, 0), value.denominator << max(-shift, 0))
     whole = isqrt(quotient)
-    cut_off = rest > 0 or whole * whole < quotient  # one more bit, so that no root seems to be halfway
+    cut_off = rest > 0 or whole * whole < quotient  # one more bit: no inexact root looks halfway
     return rounded((2 * whole + cut_off) * Fraction(2) ** (-shift // 2 - 1))
 
 
 def as_integers(values: npt.NDArray[np.float64]) -> tuple[Integers, Fraction]:
-    """Python integers in an array of the same shape, and the power of two that turns them back into the values."""
+    """An array of Python integers of the same shape, and the power of two by which they are the values."""
     mantissas, exponents = np.frexp(values)
     used = exponents[mantissas != 0]
     least = int(used.min()) if used.size else 0
@@ -67,7 +67,7 @@ def as_integers(values: npt.NDArray[np.float64]) -> tuple[Integers, Fraction]:
 
 
 def exact_sum(terms: npt.NDArray[np.float64]) -> Fraction:
-    """The sum of finite doubles without any rounding. O(k), for up to 2**26 of them."""
+    """The exact sum of up to 2**26 finite doubles. O(k)."""
     mantissas, exponents = np.frexp(terms.ravel())
     if not mantissas.size:
         return Fraction(0)
@@ -97,6 +97,6 @@ def _split(a: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDA
 
 
 def safe_factors(values: Points) -> bool:
-    """Whether products of any three of the values are free of overflow and of underflow, low parts included."""
+    """Whether no product of three of the values overflows or underflows, low parts included."""
     sizes = np.abs(values)
     return bool(np.all((sizes == 0) | ((sizes > SMALLEST_FACTOR) & (sizes < LARGEST_FACTOR))))

@@ -7,12 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
+from ._shown import geometry, svg
 from .arrays import Points, as_coordinate, as_directions, as_operations, as_pairs, as_points
 from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
 
 T = TypeVar("T")
+
+MOST_POINTS_DRAWN = 2000
 
 
 class MissingPointError(KeyError):
@@ -44,6 +47,9 @@ class DynamicHull:
 
     Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
     query.
+
+    Points may also come as geometries (shapely, geopandas, GeoJSON), which give every vertex once, and as frames
+    (pandas, polars, pyarrow) with columns such as x and y, or lon and lat.
 
     >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
     >>> hull.insert(5, 2)
@@ -316,6 +322,18 @@ class DynamicHull:
 
     def __repr__(self) -> str:
         return f"<DynamicHull of {len(self)} points, {len(self.vertices())} vertices>"
+
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The hull as a GeoJSON geometry, which shapely, geopandas and other libraries read. O(h log n).
+
+        Polygon, LineString for two vertices, Point for one; without points an empty Polygon.
+        """
+        return geometry(self.vertices())
+
+    def _repr_svg_(self) -> str:
+        points = self.points() if len(self) <= MOST_POINTS_DRAWN else None
+        return svg(self.vertices(), repr(self), points)
 
     def check(self) -> None:
         """Raise AssertionError where an invariant of the tree is broken. O(n log n); for tests and bug reports."""

@@ -1,27 +1,28 @@
-"""The widest gap between two sets of points: what a hard-margin support vector machine looks for."""
+"""The widest gap between two sets of points, which a hard-margin support vector machine finds."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from ._value import Value
 from .arrays import Points, as_rows
 from .convex import Cloud, Convex
 from .gjk import contact
 
 
-@dataclass(frozen=True)
-class Margin:
-    """How two sets can be told apart by a line (in space: a plane).
+@dataclass(frozen=True, eq=False, repr=False)
+class Margin(Value):
+    """The line, or in space the plane, that separates two sets with the widest margin.
 
     Attributes:
         separable: whether there is a gap; touching sets have none.
-        margin: how wide the gap is; 0.0 without one.
-        depth: how far one set must move to come free of the other; 0.0 where they do not overlap.
+        margin: the width of the gap; 0.0 without one.
+        depth: the length of the shortest move that separates the sets; 0.0 if they do not overlap.
         normal: unit vector across the gap, from the first set to the second.
-        offset: points x with normal @ x = offset are halfway; less on the side of the first set.
-        points: (2, d) the closest points of the two hulls; overlapping, the deepest ones.
-        iterations: of GJK, and EPA where they overlap.
+        offset: the line normal @ x = offset is halfway between the sets; the value is less on the first set's side.
+        points: (2, d) the closest point of each hull; if they overlap, the deepest point of each.
+        iterations: the number of iterations of GJK and, if the sets overlap, EPA.
     """
 
     separable: bool
@@ -37,8 +38,8 @@ def max_margin(a: npt.ArrayLike | Convex, b: npt.ArrayLike | Convex) -> Margin:
     """The maximum margin between two sets of points, or the depth of their hulls' overlap.
 
     The closest points of the hulls are those of the hard-margin support vector machine (Bennett and Bredensteiner,
-    "Duality and geometry in SVM classifiers", 2000). Its weights are 2 normal / margin. O(n) a step of GJK. On two live
-    hulls each step takes O(log n), and there are a few, at most O(log n) in practice; neither hull is read in full.
+    "Duality and geometry in SVM classifiers", 2000). Its weights are 2 normal / margin. Each step of GJK takes O(n), or
+    O(log n) for live hulls, which are not read in full. There are a few steps, in practice at most O(log n).
 
     Whether there is a gap is exact in the plane; errors are those of `dynhull.gjk.contact`.
 
@@ -47,7 +48,7 @@ def max_margin(a: npt.ArrayLike | Convex, b: npt.ArrayLike | Convex) -> Margin:
         b: the same.
 
     Raises:
-        ValueError, TypeError: no points, or bad ones, or the dimensions differ.
+        ValueError, TypeError: there are no points, a point is bad, or the dimensions differ.
 
     >>> gap = max_margin([[0, 0], [1, 0], [0, 1]], [[3, 0], [4, 4]])
     >>> gap.margin, gap.normal.tolist(), gap.offset

@@ -1,4 +1,4 @@
-"""Both clients with one face, so that one test runs on both."""
+"""Both clients behind one interface, so that one test runs on both."""
 
 import asyncio
 import inspect
@@ -10,14 +10,14 @@ from dynhull_client import AsyncHullClient, HullClient
 
 @cache
 def loop() -> asyncio.AbstractEventLoop:
-    """An event loop that runs in a thread as long as the tests do."""
+    """An event loop that runs in a thread until the tests end."""
     running = asyncio.new_event_loop()
     threading.Thread(target=running.run_forever, daemon=True).start()
     return running
 
 
 def wait(function, *arguments, **options):
-    """What a function returns when it is called on the loop; awaited where it is a coroutine."""
+    """Call a function on the loop, await what it returns if necessary, and return the result."""
 
     async def call():
         result = function(*arguments, **options)
@@ -27,7 +27,7 @@ def wait(function, *arguments, **options):
 
 
 class Waiting:
-    """An object of the asyncio client: its methods wait, its iterators and contexts are plain ones."""
+    """An object of the asyncio client whose methods block and whose iterators and contexts are synchronous."""
 
     def __init__(self, inner):
         self._inner = inner

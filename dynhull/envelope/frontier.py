@@ -1,4 +1,4 @@
-"""An efficient frontier that lives: (risk, return) points come and go."""
+"""An efficient frontier under inserts and deletes of (risk, return) points."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -7,20 +7,21 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from .._value import Value
 from ..arrays import Points, as_coordinate, as_points, as_tuples
 from ..exact import rounded
 from ..hull import DynamicHull
 from ..predicates import Point, orient2d
 
 
-@dataclass(frozen=True, eq=False)
-class Tangencies:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tangencies(Value):
     """The tangency point for every risk-free rate.
 
     Attributes:
-        points: (k, 2) as the rate rises.
-        rates: (k - 1,) rising: at rates[i] the tangency moves from points[i] to points[i + 1]. Each is where the line
-            through the two meets the axis of zero risk: the exact value rounded once.
+        points: (k, 2) tangency points in the order of rising rates.
+        rates: (k - 1,) ascending: at rates[i] the tangency moves from points[i] to points[i + 1]. Each rate is where
+            the line through the two meets the axis of zero risk, the exact value rounded once.
     """
 
     points: Points
@@ -28,16 +29,16 @@ class Tangencies:
 
 
 class Frontier:
-    """The points that offer most return for their risk, and mixtures of them: an upper hull of (risk, return).
+    """The points with the highest return for their risk, and mixtures of them: an upper hull of (risk, return).
 
-    A mixture of two points is taken to lie on the line between them, as it does when the two rise and fall together;
-    less than full correlation only lowers the risk. Any risk measure that is positive will do.
+    A mixture of two points is assumed to be on the line between them, which holds if they are fully correlated; less
+    correlation only lowers the risk. Any positive risk measure is suitable.
 
     Args:
-        points: (n, 2) array-like of risk, positive, and return.
+        points: (n, 2) array-like of risk, which must be positive, and return.
 
-    Which points are efficient is exact. Methods that take points raise ValueError or TypeError for bad ones, naming the
-    first bad row, and change nothing.
+    Which points are efficient is exact. Methods that take points raise ValueError or TypeError for bad ones; the
+    message names the first bad row, and nothing is changed.
 
     >>> frontier = Frontier([[1, 2], [2, 5], [4, 6], [3, 3]])
     >>> frontier.efficient().tolist()
@@ -54,24 +55,24 @@ class Frontier:
         self._hull = DynamicHull(None if points is None else _as_risks(points))
 
     def __len__(self) -> int:
-        """How many points, with multiplicity."""
+        """The number of points, with multiplicity."""
         return len(self._hull)
 
     def add(self, risk: float, gain: float) -> bool:
-        """Add a point. True where the efficient points changed. O(log² n), and O(h log n) to tell."""
+        """Add a point. Returns whether the efficient points changed. O(log² n + h log n)."""
         (row,) = _as_risks([[risk, gain]])
         before = self.efficient()
         self._hull.insert(*row.tolist())
         return not np.array_equal(before, self.efficient())
 
     def remove(self, risk: float, gain: float) -> bool:
-        """Remove a point once. True where the efficient points changed. KeyError where it is not there."""
+        """Remove a point once. Returns whether the efficient points changed. KeyError if the point is not there."""
         before = self.efficient()
         self._hull.delete(risk, gain)
         return not np.array_equal(before, self.efficient())
 
     def points(self) -> Points:
-        """(n, 2) points by risk, then return."""
+        """(n, 2) points in order of risk, then return."""
         return self._hull.points()
 
     def efficient(self) -> Points:
@@ -80,9 +81,9 @@ class Frontier:
         return chain[: int(chain[:, 1].argmax()) + 1] if len(chain) else chain
 
     def dominated(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """(k,) whether the frontier offers more return for the same risk or less, or as much for less risk. Exact.
+        """(k,) whether the frontier offers more return for the same or less risk, or the same return for less. Exact.
 
-        Points of less risk than any here are not dominated. O(h + k log h).
+        A point with less risk than all points here is not dominated. O(h + k log h).
         """
         rows, frontier = _as_risks(points), self.efficient()
         result = np.zeros(len(rows), dtype=np.bool_)
@@ -99,10 +100,10 @@ class Frontier:
         return result
 
     def tangency(self, rate: float) -> Point:
-        """The point of most excess return over a risk-free rate per risk (Sharpe 1966). Exact. O(log n).
+        """The point with the highest excess return over a risk-free rate per risk (Sharpe 1966). Exact. O(log n).
 
-        Of several on one line the one of most risk. For rates above every return, which nobody should take, the point
-        where the loss per risk is least.
+        Of several such points, the one with the highest risk. For a rate above every return, which is of no practical
+        use, the point with the least loss per risk.
 
         Raises:
             ValueError: the rate is not finite, or there are no points.
@@ -110,23 +111,23 @@ class Frontier:
         rate = as_coordinate(rate, "rate")
         if not len(self):
             raise ValueError("a frontier without points has no tangency: add some first")
-        # All risks are positive: the hull lies to the right of the risk-free point, below the ray to its left tangent.
+        # All risks are positive: the hull is to the right of the risk-free point, below the ray to its left tangent.
         x, y = self._hull.tangents([[0.0, rate]])[0, 0].tolist()
         return x, y
 
     def sharpe_ratio(self, rate: float) -> float:
-        """The excess return per risk of the tangency, the exact value rounded once. O(log n)."""
+        """The excess return per risk at the tangency, the exact value rounded once. O(log n)."""
         risk, gain = self.tangency(rate)
         return rounded((Fraction(gain) - Fraction(rate)) / Fraction(risk))
 
     def tangencies(self) -> Tangencies:
-        """How the tangency moves as the risk-free rate goes from far below to far above. O(h log n)."""
+        """The tangencies for all risk-free rates, from far below the returns to far above. O(h log n)."""
         chain = self._upper()
         return Tangencies(chain, np.array([_at_no_risk(p, q) for p, q in pairwise(as_tuples(chain))]))
 
     def _upper(self) -> Points:
         chain = self._hull.upper()
-        return chain[1:] if len(chain) > 1 and chain[0, 0] == chain[1, 0] else chain  # without its way straight up
+        return chain[1:] if len(chain) > 1 and chain[0, 0] == chain[1, 0] else chain  # without a vertical edge
 
 
 def _at_no_risk(p: Point, q: Point) -> float:

@@ -1,4 +1,4 @@
-"""A binary phase diagram that lives: entries of composition and energy come and go."""
+"""A binary phase diagram under inserts and deletes of entries, which are a composition and an energy."""
 
 from bisect import bisect_left
 from dataclasses import dataclass
@@ -8,19 +8,20 @@ from math import nan
 import numpy as np
 import numpy.typing as npt
 
+from .._value import Value
 from ..arrays import Points, as_array, as_points, as_tuples
 from ..exact import rounded
 from ..hull import DynamicHull
 from ..predicates import Point
 
 
-@dataclass(frozen=True, eq=False)
-class Decomposition:
-    """What entries of given compositions fall into: a mixture of two stable neighbours each.
+@dataclass(frozen=True, eq=False, repr=False)
+class Decomposition(Value):
+    """The decomposition of entries of given compositions into mixtures of two stable neighbours.
 
     Attributes:
-        phases: (k, 2, 2) the two stable entries, left and right; at a stable composition that one, twice.
-        shares: (k, 2) of each of them: not negative, in sum 1. NaN, as the phases, beyond the outermost entries.
+        phases: (k, 2, 2) the two stable entries, left and right; at a stable composition that entry twice.
+        shares: (k, 2) the share of each: not negative, with sum 1. NaN, as the phases, beyond the outermost entries.
     """
 
     phases: Points
@@ -31,11 +32,13 @@ class PhaseDiagram:
     """Which entries of a binary system are stable: those on the lower hull of (composition, energy).
 
     Args:
-        entries: (n, 2) array-like: composition, the share of the second element from 0 to 1, and energy per atom. Raw
-            or formation energies: a linear term changes no answer. For the usual meaning, with entries at 0 and at 1.
+        entries: (n, 2) array-like: composition, which is the share of the second element from 0 to 1, and energy per
+            atom. Energies may be raw or of formation: a linear term changes no answer. For the usual meaning there
+            must be entries at 0 and at 1.
 
-    Which entries are stable is exact. Methods that take entries raise ValueError or TypeError for bad ones, naming the
-    first bad row, and change nothing. O(log² n) an update; the lower hull is read once after a change, O(h log n).
+    Which entries are stable is exact. Methods that take entries raise ValueError or TypeError for bad ones; the message
+    names the first bad row, and nothing is changed. O(log² n) an update; the first query after a change reads the lower
+    hull, O(h log n).
 
     >>> diagram = PhaseDiagram([[0, 0], [1, 0], [0.5, -1]])
     >>> diagram.add(0.25, -0.75).tolist()  # nothing became unstable
@@ -55,15 +58,15 @@ class PhaseDiagram:
         self._stable: tuple[int, list[Point]] = (-1, [])
 
     def __len__(self) -> int:
-        """How many entries, with multiplicity."""
+        """The number of entries, with multiplicity."""
         return len(self._hull)
 
     def add(self, composition: float, energy: float) -> Points:
-        """Add an entry. Returns the (k, 2) entries that it made unstable."""
+        """Add an entry. Returns the (k, 2) entries that became unstable."""
         return self.add_many([[composition, energy]])
 
     def add_many(self, entries: npt.ArrayLike) -> Points:
-        """Add (k, 2) entries. Returns those that were stable and are not any more, left to right."""
+        """Add (k, 2) entries. Returns the entries that became unstable, left to right."""
         added = _as_entries(entries)
         before = self._chain()
         self._hull.insert_many(added)
@@ -73,31 +76,31 @@ class PhaseDiagram:
         """Remove an entry once. Returns the (k, 2) entries that became stable.
 
         Raises:
-            KeyError: it is not there.
+            KeyError: there is no such entry.
         """
         before = self._chain()
         self._hull.delete(composition, energy)
         return self._lost(self._chain(), before)
 
     def entries(self) -> Points:
-        """(n, 2) entries by composition, then energy."""
+        """(n, 2) entries in order of composition, then energy."""
         return self._hull.points()
 
     def stable(self) -> Points:
-        """(h, 2) stable entries, left to right; those on a line between two others are left out."""
+        """(h, 2) stable entries, left to right, without those on a line between two others."""
         return np.array(self._chain(), dtype=np.float64).reshape(-1, 2)
 
     def energy_above_hull(self, entries: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """(k,) energies of (k, 2) entries, in the diagram or not, above the lower hull at their compositions.
+        """(k,) energies of (k, 2) entries, which need not be in the diagram, above the lower hull.
 
-        The exact value rounded once: 0.0 for stable entries and only for those on the hull, negative for what would
-        change it, NaN beyond the outermost entries. O(log h) each.
+        The exact value rounded once: 0.0 exactly for entries on the hull, negative for entries that would change it,
+        NaN beyond the outermost entries. O(log h) each.
         """
         rows, chain = _as_entries(entries), self._chain()
         return np.array([_above(chain, x, energy) for x, energy in rows.tolist()], dtype=np.float64)
 
     def decompose(self, compositions: npt.ArrayLike) -> Decomposition:
-        """What each of (k,) compositions falls into. The shares are exact values rounded once. O(log h) each.
+        """The decomposition of each of (k,) compositions. Shares are exact values rounded once. O(log h) each.
 
         >>> found = PhaseDiagram([[0, 0], [0.5, -1], [1, 0]]).decompose([0.125])
         >>> found.phases.tolist(), found.shares.tolist()
@@ -117,11 +120,11 @@ class PhaseDiagram:
         return Decomposition(phases, shares)
 
     def _chain(self) -> list[Point]:
-        """The lower hull, read again where it changed."""
+        """The lower hull, read again after a change."""
         changes = self._hull.changes
         if self._stable[0] != changes:
             chain = as_tuples(self._hull.lower())
-            if len(chain) > 1 and chain[-2][0] == chain[-1][0]:  # its right end goes straight up
+            if len(chain) > 1 and chain[-2][0] == chain[-1][0]:  # without a vertical edge
                 chain.pop()
             self._stable = (changes, chain)
         return self._stable[1]
@@ -140,13 +143,13 @@ def _as_entries(entries: npt.ArrayLike, name: str = "entries") -> Points:
 
 
 def _neighbours(chain: list[Point], x: float) -> tuple[Point, Point]:
-    """The stable entries on both sides of a composition within the chain."""
+    """The stable entries on both sides of a composition."""
     i = bisect_left(chain, x, key=lambda entry: entry[0])
     return (chain[i], chain[i]) if chain[i][0] == x else (chain[i - 1], chain[i])
 
 
 def _share(left: Point, right: Point, x: float) -> Fraction:
-    """Of the right neighbour."""
+    """The share of the right neighbour."""
     if left == right:
         return Fraction(0)
     return (Fraction(x) - Fraction(left[0])) / (Fraction(right[0]) - Fraction(left[0]))

@@ -1,4 +1,4 @@
-"""Energies above the hull in systems of three and more elements: static, over Qhull."""
+"""Energies above the hull in systems of three and more elements, computed once with Qhull."""
 
 import numpy as np
 import numpy.typing as npt
@@ -10,18 +10,19 @@ SUM_ERROR = 1e-9
 
 
 def energy_above_hull_nd(compositions: npt.ArrayLike, energies: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """(n,) how far each entry lies above the lower hull at its own composition; 0.0 for stable ones, up to rounding.
+    """(n,) energies of the entries above the lower hull at their compositions; 0.0 for stable ones, up to rounding.
 
-    The lower hull at a composition is the highest of the planes of its faces, which Qhull finds: within about 1e-12 of
-    the energies' range. For two elements, exactly and live: `PhaseDiagram`. O(n log n) for three elements,
+    The lower hull at a composition is the highest of the planes of its faces, which Qhull finds. The error is about
+    1e-12 of the energies' range. `PhaseDiagram` is exact and dynamic for two elements. O(n log n) for three elements,
     O(n^floor(d/2)) for d, and O(n f) for f faces.
 
     Args:
-        compositions: (n, d) shares of d elements, not negative, in sum 1 (up to 1e-9); with an entry of each element.
-        energies: (n,) per atom.
+        compositions: (n, d) shares of d elements, not negative, with sum 1 (up to 1e-9). Each pure element needs an
+            entry.
+        energies: (n,) energies per atom.
 
     Raises:
-        ValueError, TypeError: bad rows, named; or an element has no entry of its own.
+        ValueError, TypeError: a bad row, which the message names; or a pure element has no entry.
         ModuleNotFoundError: scipy is not installed (`pip install 'dynhull[nd]'`).
 
     >>> elements = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -38,7 +39,7 @@ def energy_above_hull_nd(compositions: npt.ArrayLike, energies: npt.ArrayLike) -
     for element in range(shares.shape[1]):
         if not (shares[:, element] == 1).any():
             raise ValueError(f"element {element} has no entry of its own: the energies have no reference")
-    # A lid over the elements: nothing below it changes, and no diagram is flat.
+    # A point above all entries: it changes nothing below, and the diagram is never flat.
     corners = np.eye(shares.shape[1])[:, 1:]
     height = float(np.ptp(rows[:, -1])) + 1.0
     lid = np.column_stack([corners, np.full(len(corners), rows[:, -1].max() + height)])

@@ -1,4 +1,4 @@
-"""Whether convex sets intersect, how far apart they are, and how deep they overlap, from support functions alone."""
+"""Intersection, distance and depth of overlap of convex sets, from their support functions alone."""
 
 from .contact import Contact, contact, intersect
 from .pairs import distance_many, intersect_many

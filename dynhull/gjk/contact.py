@@ -1,4 +1,4 @@
-"""GJK on two convex sets, with EPA where they overlap, and exact decisions between polygons.
+"""GJK on two convex sets, EPA if they overlap, and exact decisions between polygons.
 
 Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between complex objects in three-dimensional
 space" (1988); van den Bergen, "Proximity queries and penetration depth computation on 3D game objects" (2001).
@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from .._value import Value
 from ..arrays import Points
 from ..convex import Cloud, Convex
 from ..hull import DynamicHull
@@ -25,18 +26,19 @@ from .vectors import scale, unit
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Contact:
-    """How two convex sets lie to each other.
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Value):
+    """The distance or overlap of two convex sets.
 
     Attributes:
-        intersect: whether they have a point in common; touching counts.
-        distance: 0.0 where they intersect.
-        depth: how far one must move to part them; 0.0 where they do not overlap.
-        normal: unit vector, from the first set to the second. Where they overlap, moving the second so by `depth` parts
-            them. Where they merely touch, zero or the direction in which they part.
-        points: (2, d), one of each set: the closest ones, or where they overlap the deepest of each in the other.
-        iterations: of GJK and EPA, each of them one support point of each set.
+        intersect: whether they have a common point; touching counts.
+        distance: 0.0 if they intersect.
+        depth: the length of the shortest move that separates them; 0.0 if they do not overlap.
+        normal: unit vector from the first set to the second. If they overlap, moving the second set along it by `depth`
+            separates them. If they only touch, it is zero or the direction in which they separate.
+        points: (2, d) one point of each set: the closest points, or, if they overlap, the deepest point of each in the
+            other.
+        iterations: the number of iterations of GJK and EPA; each takes one support point of each set.
     """
 
     intersect: bool
@@ -51,14 +53,16 @@ Shape = Convex | Sequence[Convex]
 
 
 def intersect(a: Shape, b: Shape) -> bool:
-    """Whether two sets have a point in common; touching counts.
+    """Whether two sets have a common point; touching counts.
 
-    Exact for a `Cloud` in the plane (point, segment, box, polygon) or a `DynamicHull` against another; otherwise sets
-    closer than about 1e-14 of their size may count as touching. Typically three to five iterations; on two live hulls
-    each takes O(log n). Only hulls that are closer than rounding errors can tell are read in full, O(h log h).
+    Exact between two sets that are each a `Cloud` in the plane (point, segment, box, polygon) or a `DynamicHull`.
+    Otherwise sets closer than about 1e-14 of their size may count as touching. Typically three to five iterations; with
+    two live hulls each takes O(log n). Hulls are read in full, O(h log h), only if they are so close that rounding
+    errors could decide.
 
     Args:
-        a: a convex set, or several whose union is meant: see `dynhull.decompose` for concave polygons.
+        a: a convex set, or a sequence of convex sets for their union; `dynhull.decompose` makes one of a concave
+            polygon.
         b: the same.
 
     Raises:
@@ -72,18 +76,23 @@ def intersect(a: Shape, b: Shape) -> bool:
 
 
 def contact(a: Shape, b: Shape) -> Contact:
-    """How two sets lie to each other: distance and closest points, or depth of the overlap and the way out of it.
+    """The distance and closest points of two sets, or the depth of their overlap and the shortest way out of it.
 
-    Whether they intersect is decided as by `intersect`. Distance and depth, at every size from the smallest doubles to
-    the largest: for points, segments, polygons, polyhedra and live hulls within 1e-12 of the extent of the two sets
-    together, wherever they lie; moved, turned, scaled, rounded and added up, within 1e-12 of their largest coordinate;
-    with other curves (a cylinder, a cone, a ball scaled unevenly) within 1e-6 of it. Below 1e-300, also within the
-    smallest double; inf beyond the largest. Where floats are not accurate enough, the same steps are repeated in
-    fractions, about thirty times slower. Between unions, all pairs of pieces are compared: the result is that of the
-    closest two, or of the two that overlap most, whose depth is a lower bound of the unions'.
+    Whether they intersect is decided as in `intersect`. Distance and depth have these errors, at every size from the
+    smallest doubles to the largest:
+
+    * points, segments, polygons, polyhedra and live hulls: within 1e-12 of the extent of the two sets together,
+      wherever they are
+    * moved, turned, scaled, rounded or added shapes: within 1e-12 of their largest coordinate
+    * other curves, such as a cylinder, a cone or a ball scaled unevenly: within 1e-6 of it
+
+    Results below 1e-300 may also be off by the smallest double; results beyond the largest double are inf. If floats
+    cannot achieve this, the same steps run in fractions, about thirty times slower. Between unions, all pairs of pieces
+    are examined; the result is that of the closest pair, or of the pair that overlaps most, whose depth is a lower
+    bound for the unions.
 
     Args:
-        a: a convex set, or several whose union is meant.
+        a: a convex set, or a sequence of convex sets for their union.
         b: the same.
 
     Raises:
@@ -106,7 +115,7 @@ def _pieces(shape: Shape) -> Sequence[Convex]:
     if isinstance(shape, Convex):
         return [shape]
     if not shape:
-        raise ValueError("a union of no pieces is empty: it is nowhere")
+        raise ValueError("a union needs at least one piece")
     return shape
 
 
@@ -119,7 +128,7 @@ def _contact(a: Convex, b: Convex) -> Contact:
 
 
 def _in_numbers_that_do(a: Convex, b: Convex, find: Callable[[Convex, Convex, Difference, float, float], T]) -> T:
-    """What is found from the difference of the sets' cores and the radius around each, in numbers that do."""
+    """Search the difference of the sets' cores, with the radius around each, in floats or, if necessary, fractions."""
     if a.dimension != b.dimension or a.dimension not in (2, 3):
         raise ValueError(f"shapes must both be of dimension 2 or 3, got {a.dimension} and {b.dimension}")
     (inner_a, radius_a), (inner_b, radius_b) = core(a), core(b)
@@ -157,13 +166,13 @@ def _in_contact(a: Convex, b: Convex, difference: Difference, radius_a: float, r
     ends = np.array([p[:d] for p in points]) + np.outer([radius_a, -radius_b], normal)
     if _meet(a, b, seen, radius):
         return Contact(True, 0.0, max(-gap, 0.0), normal, ends, iterations)
-    if gap <= 0:  # only exact arithmetic sees it
+    if gap <= 0:  # visible only in exact arithmetic
         gap = distance_of_polygons(_corners(a), _corners(b))
     return Contact(False, gap, 0.0, normal, ends, iterations)
 
 
 def _meet(a: Convex, b: Convex, seen: Walk, radius: float) -> bool:
-    """Whether the sets intersect, from the walk through their cores and the radius to scale: exact for polygons."""
+    """Whether the sets intersect, from the walk through their cores and the scaled radius. Exact for polygons."""
     if not _are_polygons(a, b):
         return seen.distance <= radius
     if certainly_apart(seen):

@@ -1,11 +1,11 @@
-"""Rounded shapes as a core and a radius: on the cores GJK ends after a few steps, on curves it only converges."""
+"""Rounded shapes as a core and a radius: GJK ends after a few steps on cores, but only converges on curves."""
 
 from ..convex import Ball, Cloud, Convex, Mapped, Sum
 from ..hull import DynamicHull
 
 
 def core(shape: Convex) -> tuple[Convex, float]:
-    """A shape and a radius: the shape given is all points within the radius of it."""
+    """A shape and a radius; the given shape is all points within the radius of that shape."""
     if isinstance(shape, Ball):
         return Cloud(shape.centre[None]), shape.radius
     if isinstance(shape, Sum):
@@ -23,7 +23,7 @@ def core(shape: Convex) -> tuple[Convex, float]:
 
 
 def is_polytope(shape: Convex) -> bool:
-    """Whether it is known to have finitely many vertices."""
+    """Whether the shape is known to have finitely many vertices."""
     if isinstance(shape, Sum):
         return all(is_polytope(part) for part in shape.parts)
     return is_polytope(shape.shape) if isinstance(shape, Mapped) else isinstance(shape, Cloud | DynamicHull)

@@ -11,28 +11,28 @@ from .core import is_polytope
 from .simplex import foot, nearest
 from .vectors import ORIGIN, Vector, combine, dot, length, scale, subtract
 
-MOST_ITERATIONS = 256  # polytopes take a few; a curve is followed to the tolerance
-# Relative to the squared distance: what a further step could still gain.
+MOST_ITERATIONS = 256  # polytopes need a few; curves run until the tolerance
+# The most that another step can gain, relative to the squared distance.
 GAIN = 1e-15
-# Relative to the size of the difference as far as it was met: a distance below this is rounding.
+# Distances below this, relative to the size of the known part of the difference, are rounding errors.
 TOUCHING = 2.0**-50
-# Squares, and cross products of cross products, of numbers up to this stay in range.
+# Squares, and cross products of cross products, of numbers up to this do not overflow.
 LARGEST = 2.0**200
-# Powers of two from one to the other are doubles, and so are their reciprocals.
+# Powers of two between these, and their reciprocals, are doubles.
 LEAST_EXPONENT, GREATEST_EXPONENT = -1000, 1000
 
 
-# Relative to the same size: how far a walk in floats may end from the nearest point.
+# The largest error of a walk in floats, relative to the same size.
 SURE = 2.0**-46
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """What corners are computed in.
+    """The number type in which corners are computed.
 
     Attributes:
-        exponent: of the power of two that has the length one; None before the first corner that is not zero.
-        rational: whether in fractions rather than floats, which takes some thirty times as long.
+        exponent: the power of two that is scaled to length one; None before the first corner that is not zero.
+        rational: whether these are fractions rather than floats; they take about thirty times as long.
     """
 
     exponent: int | None = None
@@ -40,7 +40,7 @@ class Numbers:
 
 
 class NumbersError(Exception):
-    """The numbers did not do; all has to be done again in others.
+    """These numbers were not sufficient: repeat the search with others.
 
     Attributes:
         numbers: the others.
@@ -53,10 +53,10 @@ class NumbersError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """A point of the difference, to scale, and the points of both sets that it is the difference of, as they are.
+    """A point of the difference, scaled, and the points of the two sets whose difference it is, not scaled.
 
     Attributes:
-        rounding: relative to this w is accurate.
+        rounding: the magnitude to which the error of w is relative.
     """
 
     w: Vector
@@ -67,16 +67,16 @@ class Corner:
 
 @dataclass(frozen=True)
 class Walk:
-    """Where a walk ended.
+    """The result of a walk.
 
     Attributes:
-        simplex: the corners around the point of the difference that is nearest to the origin.
-        last: the farthest corner on the way to the origin from there.
-        nearest: that point, to the difference's scale; zero where the origin is inside, up to rounding.
-        distance: its length.
-        points: of the two sets; their difference is `nearest`.
-        iterations: each of them one corner.
-        sure: whether `nearest` is in the difference and nothing nearer is, up to rounding; or the distance is enough.
+        simplex: the corners whose hull contains the point of the difference that is nearest to the origin.
+        last: the farthest corner from that point towards the origin.
+        nearest: that point, scaled as the difference; zero if the origin is inside, up to rounding.
+        distance: the length of `nearest`.
+        points: one point of each set; their difference is `nearest`.
+        iterations: the number of corners computed.
+        sure: whether `nearest` is in the difference and no point is nearer, up to rounding; or the distance is enough.
     """
 
     simplex: list[Corner]
@@ -89,7 +89,7 @@ class Walk:
 
 
 class Difference:
-    """The set of all p - q, p of a and q of b, scaled by a power of two: squares of its corners are in range."""
+    """The set of all p - q, with p in a and q in b, scaled by a power of two so that squares do not overflow."""
 
     __slots__ = ("_a", "_b", "_exact", "_numbers", "dimension", "polytopes")
 
@@ -103,11 +103,11 @@ class Difference:
 
     @property
     def scale(self) -> float:
-        """What a length of one is, a power of two."""
+        """The length, a power of two, that is scaled to one."""
         return 2.0 ** (self._numbers.exponent or 0)
 
     def doubt(self) -> None:
-        """Have all done again in fractions, unless it is, or the sets are curved: those are only approached."""
+        """Repeat the search in fractions, unless it runs in fractions already, or the sets are curved."""
         if self.polytopes and not self._numbers.rational:
             raise NumbersError(replace(self._numbers, rational=True))
 
@@ -115,9 +115,9 @@ class Difference:
         """The farthest corner in a direction, which is not zero.
 
         Raises:
-            NumbersError: it is far larger than those that the scale was chosen by.
+            NumbersError: the corner is far larger than those for which the scale was chosen.
         """
-        # Of a length near one: its negation, its square and its products with coordinates are all in range.
+        # Its length is near one: its negation, its square and its products with coordinates do not overflow.
         size = max(map(abs, direction))
         d = [float(x / size) for x in direction[: self.dimension]]
         p, q = self._point(self._a, d), self._point(self._b, [-x for x in d])
@@ -126,7 +126,7 @@ class Difference:
         return Corner(w, p, q, rounding)
 
     def _scaled(self, p: Vector, q: Vector) -> Vector:
-        """The way from q to p, in floats rounded once. Sets the scale where there is none yet."""
+        """The vector from q to p, in floats rounded once. Chooses the scale if there is none yet."""
         w = subtract(p, q)
         halves = 1.0
         if max(map(abs, w)) == inf:
@@ -153,11 +153,11 @@ def _exponent(size: float) -> int:
 
 
 def walk(difference: Difference, enough: float) -> Walk:
-    """Walk until the origin is held, no corner is nearer to it than the simplex, or its distance surely is enough.
+    """Walk until the simplex contains the origin, no corner is nearer to it, or its distance is certainly enough.
 
     Args:
-        difference: of two sets.
-        enough: a distance, not to scale.
+        difference: the difference of two sets.
+        enough: a distance, not scaled.
     """
     last = difference.farthest((1.0, 0.0, 0.0))
     simplex = [last]
@@ -183,7 +183,7 @@ def walk(difference: Difference, enough: float) -> Walk:
             simplex, weights, v = corners, closer, ORIGIN
             break
         u = foot([corners[i].w for i in kept])
-        if not dot(u, u) < dot(v, v):  # rounding, or a square out of range: there is no nearer
+        if not dot(u, u) < dot(v, v):  # a rounding error, or a square that underflows: no nearer point
             break
         simplex, weights, v = [corners[i] for i in kept], closer, u
     on_a = combine(weights, [corner.p for corner in simplex])

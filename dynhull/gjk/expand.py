@@ -1,7 +1,7 @@
 """EPA: the expanding polytope algorithm, for the depth of an overlap.
 
-From the simplex that holds the origin, always push out the side that is nearest to it, until a side cannot be pushed:
-that side belongs to the difference, and its distance is the depth.
+Start with the simplex that contains the origin and always push out the side nearest to the origin, until that side
+cannot be pushed: it belongs to the difference, and its distance is the depth.
 """
 
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from .simplex import nearest
 from .vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale, subtract, unit
 
 MOST_ITERATIONS = 512
-# Relative to the size of the difference: a push of less is rounding.
+# A smaller push, relative to the size of the difference, is a rounding error.
 GAIN = 1e-13
-# The same where a set is curved: its sides would shrink to nothing before they stop growing.
+# The same for curved sets, whose sides would shrink below rounding before they stop growing.
 CURVED_GAIN = 1e-10
-# Of a cross product, relative to its factors.
+# The error of a cross product, relative to its factors.
 CROSS_ERROR = 4 * EPSILON
-# The same: two sides whose distances differ by less may be taken for each other.
+# Two sides whose distances differ by less, relative to the same size, may be confused.
 DOUBT = 4 * GAIN
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """How deep, in which direction the second set leaves the first, and the deepest points of each in the other."""
+    """The depth, the direction in which the second set leaves the first, and the deepest point of each in the other."""
 
     depth: float
     normal: Vector
@@ -42,8 +42,8 @@ class Side:
     Attributes:
         corners: two or three.
         normal: unit vector that points outwards.
-        distance: of its line or plane from the origin, negative where that is outside.
-        error: of the normal, in floats: of a thin triangle.
+        distance: of its line or plane from the origin; negative if the origin is outside.
+        error: the rounding error of the normal, large for a thin triangle.
     """
 
     corners: tuple[Corner, ...]
@@ -52,15 +52,15 @@ class Side:
     error: float
 
     def may_be_nearer(self, distance: float, size: float) -> bool:
-        """Whether it could be nearer to the origin than a distance, in a difference of a size."""
+        """Whether the side could be nearer to the origin than a distance, given the size of the difference."""
         return self.error == inf or self.distance - self.error * size < distance
 
 
 def expand(difference: Difference, simplex: list[Corner]) -> Overlap:
-    """Push out the simplex, which holds the origin up to rounding."""
+    """Push out the simplex, which contains the origin up to rounding."""
     corners, flat = _full(difference, list(simplex))
     iterations = len(corners) - len(simplex)
-    if flat is not None:  # moving out of their common line or plane parts them at once
+    if flat is not None:  # moving out of their common line or plane separates them at once
         kept, weights = nearest([corner.w for corner in simplex])
         return Overlap(0.0, flat, _points(weights, [simplex[i] for i in kept]), iterations)
     size = max(length(corner.w) for corner in corners)
@@ -99,7 +99,7 @@ def _points(weights: tuple[float, ...], corners: list[Corner]) -> tuple[Vector, 
 
 
 def _full(difference: Difference, corners: list[Corner]) -> tuple[list[Corner], Vector | None]:
-    """Corners of a simplex of full size, or of a smaller one and a direction in which the difference has no extent."""
+    """The corners of a full simplex, or of a smaller one and a direction in which the difference has no extent."""
     while len(corners) <= difference.dimension:
         for direction in _across(corners, difference.dimension):
             found = [difference.farthest(scale(sign, direction)) for sign in (1.0, -1.0)]
@@ -113,7 +113,7 @@ def _full(difference: Difference, corners: list[Corner]) -> tuple[list[Corner], 
 
 
 def _across(corners: list[Corner], dimension: int) -> list[Vector]:
-    """Unit vectors at right angles to a point, a segment or a triangle; the first ones that will do."""
+    """Unit vectors at right angles to a point, a segment or a triangle."""
     ways = [subtract(corner.w, corners[0].w) for corner in corners[1:]]
     if not ways:
         return list(AXES[:dimension])
@@ -136,9 +136,9 @@ def _side(corners: tuple[Corner, ...]) -> Side:
         outwards = unit(across)
         lengths = length(subtract(b, a)) * length(subtract(c, a))
         error = CROSS_ERROR * lengths / length(across) if any(across) else inf
-    if outwards == ORIGIN:  # without area: never the nearest, never seen
+    if outwards == ORIGIN:  # without area: never the nearest, never visible
         return Side(corners, outwards, inf, error)
-    # Of the corners' distances, equal but for rounding, the one nearest to the origin is the most accurate.
+    # The corners' distances are equal up to rounding; the one nearest to the origin is the most accurate.
     return Side(corners, outwards, dot(outwards, min((c.w for c in corners), key=lambda w: dot(w, w))), error)
 
 
@@ -155,7 +155,7 @@ def _outward_sides(corners: list[Corner]) -> list[Side]:
 
 
 def _visible(sides: list[Side], gone: set[int], first: int, far: Corner, rounding: float) -> list[int]:
-    """The numbers of the faces that the new corner sees, connected to the one it was found from."""
+    """The indices of the faces that the new corner sees, connected to the face from which it was found."""
     seen, edges = {first}, {}
     for i, side in enumerate(sides):
         if i not in gone:
@@ -166,7 +166,7 @@ def _visible(sides: list[Side], gone: set[int], first: int, far: Corner, roundin
         corners = sides[waiting.pop()].corners
         for k in range(3):
             i = edges[corners[k], corners[k - 1]]
-            # A face in one plane with the new corner is seen: beside it a new face might have no area.
+            # A face in one plane with the new corner counts as visible: a new face beside it might have no area.
             if i not in seen and dot(sides[i].normal, far.w) >= sides[i].distance - rounding:
                 seen.add(i)
                 waiting.append(i)
@@ -174,7 +174,7 @@ def _visible(sides: list[Side], gone: set[int], first: int, far: Corner, roundin
 
 
 def _cone(seen: list[Side], far: Corner) -> list[Side]:
-    """New sides from the rim of those that are seen to the new corner."""
+    """New sides from the rim of the visible ones to the new corner."""
     if len(far_side := seen[0].corners) == 2:
         return [_side((far_side[0], far)), _side((far, far_side[1]))]
     edges = {(side.corners[k - 1], side.corners[k]) for side in seen for k in range(3)}

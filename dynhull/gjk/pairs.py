@@ -1,4 +1,4 @@
-"""GJK on many pairs of small polygons at once: a step of the walk for all that are still on their way."""
+"""GJK on many pairs of small polygons at once: each step advances all pairs that have not finished."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from .difference import SURE
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-MOST_STEPS = 24  # who is not there by then goes alone
+MOST_STEPS = 24  # pairs that have not finished by then are decided one by one
 GAIN = 1e-15
 
 
@@ -22,13 +22,13 @@ def intersect_many(a: npt.ArrayLike, b: npt.ArrayLike) -> Bools:
     """(k,) whether the hulls of each of k pairs of small sets of points intersect; touching counts. Exact.
 
     Args:
-        a: (k, m, 2) points; repeat one where a polygon has fewer.
-        b: (k, n, 2).
+        a: (k, m, 2) points; repeat a point for polygons with fewer corners.
+        b: (k, n, 2) points.
 
     Raises:
-        ValueError, TypeError: a coordinate is not finite or no number, or the shapes do not fit.
+        ValueError, TypeError: a coordinate is not finite or not a number, or the shapes do not fit.
 
-    O(m + n) a step, a handful of steps. Pairs that floats cannot tell are decided one by one, exactly.
+    O(m + n) a step, and a few steps. Pairs that floats cannot decide are decided one by one, exactly.
 
     >>> squares = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]]])
     >>> intersect_many(np.repeat(squares, 3, axis=0), squares + [[[1, 1]], [[0.5, 0]], [[1, 1.01]]])
@@ -43,9 +43,9 @@ def intersect_many(a: npt.ArrayLike, b: npt.ArrayLike) -> Bools:
 
 
 def distance_many(a: npt.ArrayLike, b: npt.ArrayLike) -> Floats:
-    """(k,) distances of the hulls of each of k pairs, 0.0 where they intersect: like `intersect_many`.
+    """(k,) distances of the hulls of each of k pairs, 0.0 if they intersect. Arguments as for `intersect_many`.
 
-    Zero or not is exact; the distance is as accurate as that of `contact`.
+    Whether a distance is 0.0 is exact; other distances are as accurate as in `contact`.
     """
     first, second = _checked(a, b)
     walk = _walk(first, second, to_the_end=True)
@@ -57,7 +57,7 @@ def distance_many(a: npt.ArrayLike, b: npt.ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class _Walks:
-    """Of each pair: surely intersecting, surely apart, surely at the closest points, and how far up to now."""
+    """For each pair: certainly intersecting, certainly apart, certainly at the closest points; the distance so far."""
 
     inside: Bools
     apart: Bools
@@ -79,7 +79,7 @@ def _walk(a: Floats, b: Floats, to_the_end: bool) -> _Walks:
     k = len(a)
     walks = _Walks(np.zeros(k, np.bool_), np.zeros(k, np.bool_), np.zeros(k, np.bool_), np.zeros(k))
     rows = np.arange(k)
-    with np.errstate(all="ignore"):  # pairs with extreme coordinates do not get there: they go alone
+    with np.errstate(all="ignore"):  # pairs with extreme coordinates do not finish: they are decided one by one
         s = t = v = _farthest(a, b, np.broadcast_to([1.0, 0.0], (k, 2)))[0]
         size, off = np.abs(v).max(axis=1), np.zeros(k)
         for _ in range(MOST_STEPS):
@@ -106,7 +106,7 @@ def _walk(a: Floats, b: Floats, to_the_end: bool) -> _Walks:
 
 
 def _farthest(a: Floats, b: Floats, d: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of the differences p - q the farthest in direction d; how far the sets are apart along it; the error of that."""
+    """The farthest difference p - q in direction d, the gap between the sets along d, and the error of the gap."""
     p, q = np.einsum("kmi,ki->km", a, d), np.einsum("kmi,ki->km", b, d)
     i, j = p.argmax(axis=1), q.argmin(axis=1)
     all_rows = np.arange(len(a))
@@ -116,7 +116,7 @@ def _farthest(a: Floats, b: Floats, d: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _holds_origin(s: Floats, t: Floats, w: Floats) -> Bools:
-    """Whether the triangle surely does: its corners are differences rounded once, as `cross_sign` has them."""
+    """Whether the triangle certainly does: its corners are differences rounded once, as in `cross_sign`."""
     turns = [_sure_turn(p, q) for p, q in ((s, t), (t, w), (w, s))]
     held: Bools = np.abs(sum(turns)) == 3
     return held
@@ -129,10 +129,10 @@ def _sure_turn(p: Floats, q: Floats) -> npt.NDArray[np.int8]:
 
 
 def _nearest(p: Floats, q: Floats) -> tuple[Floats, Floats]:
-    """The point of each segment that is nearest to the origin, and how far it is from where its share of the way is."""
+    """The point of each segment that is nearest to the origin, and an estimate of its error."""
     way = q - p
     along, whole = -_dot(p, way), _dot(way, way)
-    # Between the ends along the normal, whose direction is right however far away the ends are.
+    # Inside a segment along the normal, whose direction is accurate however far away the ends are.
     turned = np.stack([way[:, 1], -way[:, 0]], axis=1)
     between = turned * (_dot(p, turned) / whole)[:, None]
     off = np.abs(p + way * (along / whole)[:, None] - between).max(axis=1)

@@ -10,7 +10,7 @@ from .difference import Corner, Walk
 
 
 def certainly_apart(seen: Walk) -> bool:
-    """Whether the last direction of a walk separates the two: the last corner is farthest against it. Exact."""
+    """Whether the last direction of a walk separates the two sets. Exact."""
     if not any(seen.nearest):
         return False
     x, y, _ = seen.nearest
@@ -19,7 +19,7 @@ def certainly_apart(seen: Walk) -> bool:
 
 
 def certainly_touching(seen: Walk) -> bool:
-    """Whether the simplex of a walk holds the origin. Exact: each sign is one of two differences of points."""
+    """Whether the simplex of a walk contains the origin. Exact: each sign is that of two differences of points."""
     corners = [_ends(corner) for corner in seen.simplex]
     if len(corners) == 1:
         return corners[0][0] == corners[0][1]
@@ -35,9 +35,9 @@ def _ends(corner: Corner) -> tuple[Point, Point]:
 
 
 def polygons_intersect(a: Points, b: Points) -> bool:
-    """Whether two hulls, given by their vertices, have a point in common. Exact. O(h log h).
+    """Whether two hulls, given by their vertices, have a common point. Exact. O(h log h).
 
-    Where they have none, and not both lie on one line, an edge of one of them separates the two.
+    If they have none, and do not both lie on one line, an edge of one of them separates the two.
     """
     if _edge_separates(a, b) or _edge_separates(b, a):
         return False
@@ -57,5 +57,5 @@ def _edge_separates(a: Points, b: Points) -> bool:
 
 
 def distance_of_polygons(a: Points, b: Points) -> float:
-    """Of two hulls that have no point in common: the exact value rounded. O(h log h)."""
+    """The distance of two hulls without a common point, the exact value rounded. O(h log h)."""
     return float(min(DynamicHull(a).distance(b).min(), DynamicHull(b).distance(a).min()))

@@ -8,12 +8,12 @@ from itertools import combinations
 
 from .vectors import Vector, cross, dot, normal, scale, subtract
 
-# Which corners carry the nearest point, and with what weights: positive, in sum one.
+# The corners whose weighted sum is the nearest point, and their weights: positive, with sum one.
 Place = tuple[tuple[int, ...], tuple[float, ...]]
 
 
 def nearest(corners: list[Vector]) -> Place:
-    """Of a point, a segment, a triangle or a tetrahedron, which is returned whole where it holds the origin."""
+    """The nearest part of a point, segment, triangle or tetrahedron; all of it if it contains the origin."""
     inside = (_on_point, _in_segment, _in_triangle, _in_tetrahedron)[len(corners) - 1](corners)
     if inside is not None:
         return tuple(range(len(corners))), inside
@@ -25,15 +25,15 @@ def nearest(corners: list[Vector]) -> Place:
 
 
 def squared(place: Place, corners: list[Vector]) -> float:
-    """The squared distance of the origin from a place."""
+    """The squared distance of a place from the origin."""
     v = foot([corners[i] for i in place[0]])
     return dot(v, v)
 
 
 def foot(corners: list[Vector]) -> Vector:
-    """The nearest point of the line or plane through up to three corners, where it is inside of them.
+    """The nearest point of the line or plane through up to three corners, if it is between them.
 
-    Along the normal: its direction is right even where the corners are so far away that a weighted sum is not.
+    Computed along the normal, whose direction is accurate even if the corners are too far away for a weighted sum.
     """
     if len(corners) == 1:
         return corners[0]

@@ -1,4 +1,4 @@
-"""Vectors of three floats as tuples: for a handful of them much faster than arrays. The plane has a third zero."""
+"""Vectors of three floats as tuples, which are much faster than arrays for a few. In the plane the third is zero."""
 
 from math import hypot
 
@@ -8,17 +8,17 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """The sum."""
+    """The sum of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """The way from b to a."""
+    """The vector from b to a."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def scale(s: float, a: Vector) -> Vector:
-    """So many times as long."""
+    """A multiple of a vector."""
     return s * a[0], s * a[1], s * a[2]
 
 
@@ -38,7 +38,7 @@ def length(a: Vector) -> float:
 
 
 def unit(a: Vector) -> Vector:
-    """Of length one; zero stays zero."""
+    """The vector scaled to length one; zero stays zero."""
     largest = max(map(abs, a))
     if not largest:
         return a
@@ -47,12 +47,12 @@ def unit(a: Vector) -> Vector:
 
 
 def normal(a: Vector, b: Vector, c: Vector) -> Vector:
-    """At right angles to a triangle, counter-clockwise seen from its tip. As long as the parallelogram is large."""
+    """A normal of a triangle that is counter-clockwise seen from its tip; its length is the parallelogram's area."""
     return cross(subtract(b, a), subtract(c, a))
 
 
 def combine(weights: tuple[float, ...], vectors: list[Vector]) -> Vector:
-    """The weighted sum."""
+    """The weighted sum of vectors."""
     total = ORIGIN
     for weight, vector in zip(weights, vectors, strict=True):
         total = add(total, scale(weight, vector))

@@ -1,7 +1,7 @@
-"""Measures of a convex polygon given by its (h, 2) vertices, in the order of `DynamicHull.vertices`. O(h) but for logs.
+"""Measures of a convex polygon given by its (h, 2) vertices, in the order of `DynamicHull.vertices`.
 
-Choices between vertices and edges are exact. Most are made in floating point with a bound on its error; exact integers
-choose among what that leaves.
+O(h log h) at most. Choices between vertices and edges are exact: most are made in floating point with a bound on the
+error, and exact integers decide the rest.
 """
 
 from .area import area, centroid, perimeter

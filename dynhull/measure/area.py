@@ -13,14 +13,14 @@ BLOCK = 2**16  # vertices at a time: their products stay in the cache
 
 
 def area(vertices: Points) -> float:
-    """The exact area, rounded once; inf where that is beyond every double. O(h)."""
+    """The exact area, rounded once; inf if it is beyond every double. O(h)."""
     return rounded(_moments(vertices, centre=False)[0] / 2)
 
 
 def perimeter(vertices: Points) -> float:
-    """Length of the boundary, within one unit in the last place an edge; two vertices count there and back. O(h).
+    """Length of the boundary, within one unit in the last place per edge; a segment counts twice. O(h).
 
-    inf where that is beyond every double.
+    inf if it is beyond every double.
     """
     rows = vertices.tolist()
     lengths = [hypot(x - px, y - py) for (x, y), (px, py) in zip(rows, rows[-1:] + rows[:-1], strict=True)]
@@ -42,7 +42,7 @@ def centroid(vertices: Points) -> tuple[float, float]:
 
 
 def _moments(vertices: Points, centre: bool) -> tuple[Fraction, Fraction, Fraction]:
-    """Twice the area, and where wanted six times its moments in x and y: sums of cross products, exactly."""
+    """Twice the area and, on request, six times its moments in x and y: exact sums of cross products."""
     by_products = safe_factors(vertices)
     following = np.roll(vertices, -1, axis=0)
     totals = [Fraction(0)] * 3

@@ -1,4 +1,4 @@
-"""Smallest boxes in any direction: one side lies on an edge."""
+"""Smallest boxes in any direction, which have a side on an edge."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -59,7 +59,7 @@ def _squared_half_perimeter(*corners: Integers) -> tuple[Integers, Integers, Int
 
 @dataclass
 class _Box:
-    """A box along an edge, in multiples of the edge's vector: where it begins and ends along it, its height."""
+    """A box along an edge, in multiples of the edge's vector: its begin and end along the edge, and its height."""
 
     corner: Exact
     vector: Exact

@@ -1,7 +1,7 @@
-"""Rotating calipers: the extreme vertices in many directions at once, and the best of what they hold.
+"""Rotating calipers: the extreme vertices in many directions at once, and the least value of a ratio over them.
 
 Shamos, "Computational geometry" (1978). The angles of the edges are sorted, so a binary search in floating point finds
-every extreme vertex but for rounding; exact signs then move the few that are off. O((h + k) log h).
+every extreme vertex up to rounding; exact signs then correct the few that are wrong. O((h + k) log h).
 """
 
 from collections.abc import Callable
@@ -17,10 +17,10 @@ from ..predicates import UNDERFLOW, cross_signs, dot_signs
 
 Indices = npt.NDArray[np.int64]
 Signs = npt.NDArray[np.int8]
-# Numerator, denominator and the size of the numerator's terms, for one row of corners each.
+# Numerator, denominator and the magnitude of the numerator's terms, for each row of corners.
 Formula = Callable[..., tuple[Integers, Integers, Integers]]
 
-# Where a longer type is none, the second look finds nothing new.
+# On platforms without a longer type, the second pass finds nothing new.
 PRECISIONS = (np.float64, np.longdouble)
 SMALLEST_DENOMINATOR = 1e-290
 
@@ -28,21 +28,21 @@ AHEAD, LEFT, BEHIND = 0, 1, 2  # quarter turns
 
 
 def edges(vertices: Points) -> tuple[Points, Points]:
-    """The first and the second end of each edge, counter-clockwise."""
+    """The two ends of each edge, counter-clockwise."""
     return vertices, np.roll(vertices, -1, axis=0)
 
 
 def extremes(a: Points, b: Points, turn: int, vertices: Points) -> Indices:
-    """For each way from a to b, turned left by so many quarters, the number of the farthest vertex. Exact.
+    """The index of the farthest vertex in each direction from a to b, turned left by quarter turns. Exact.
 
-    Where a whole edge is farthest, its first end, counter-clockwise. At least one vertex.
+    If a whole edge is farthest, its first end, counter-clockwise. There must be a vertex.
     """
     count = len(vertices)
     if count < 3:
         return np.where(_steps(a, b, turn, vertices[:1], vertices[-1:]) > 0, count - 1, 0)
     first, second = edges(vertices)
     angles = _angles(first, second)
-    # Up to the farthest vertex edges lead that way: they make less than a right angle with it.
+    # Edges before the farthest vertex lead that way: they are at less than a right angle to it.
     wanted = (_angles(a, b) + (turn + 1) * pi / 2 + pi / 2) % (2 * pi) - pi / 2
     found = np.searchsorted(np.maximum.accumulate(angles), wanted) % count
     moving = np.arange(len(found))
@@ -56,14 +56,14 @@ def extremes(a: Points, b: Points, turn: int, vertices: Points) -> Indices:
 
 
 def _steps(a: Points, b: Points, turn: int, c: Points, d: Points) -> Signs:
-    """Whether the way from c to d leads along the turned way from a to b, or against it."""
+    """Whether c to d leads along the turned direction from a to b (1), or against it (-1)."""
     if turn == LEFT:
         return cross_signs(a, b, c, d)
     return dot_signs(a, b, c, d) if turn == AHEAD else dot_signs(b, a, c, d)
 
 
 def _angles(a: Points, b: Points) -> npt.NDArray[np.float64]:
-    """Of the ways from a to b, in the order of a hull's edges: from straight down, where a lower chain may begin."""
+    """The angles of the directions from a to b in the order of a hull's edges, which may begin straight down."""
     dx, dy = (np.ldexp(b, -1) - np.ldexp(a, -1)).T
     angles = np.arctan2(dy, dx)
     upper = (dx < 0) | ((dx == 0) & (dy < 0))
@@ -72,7 +72,7 @@ def _angles(a: Points, b: Points) -> npt.NDArray[np.float64]:
 
 
 def _perhaps_least(formula: Formula, corners: npt.NDArray[np.floating]) -> npt.NDArray[np.bool_]:
-    """Which rows the rounding errors do not rule out. What is no number is not ruled out."""
+    """The rows that rounding errors do not rule out; a NaN rules nothing out."""
     with np.errstate(all="ignore"):
         numerator, denominator, size = formula(*corners)
         value = np.where(denominator > SMALLEST_DENOMINATOR, numerator / denominator, np.nan)
@@ -82,7 +82,7 @@ def _perhaps_least(formula: Formula, corners: npt.NDArray[np.floating]) -> npt.N
 
 
 def rounding(values: npt.NDArray[np.floating]) -> np.floating:
-    """The relative error of at most a dozen roundings in this type, and to spare."""
+    """A safe bound on the relative error of at most a dozen roundings in this type."""
     return 32 * np.finfo(values.dtype).eps
 
 
@@ -90,7 +90,8 @@ def least(formula: Formula, *corners: Points) -> tuple[Fraction, int]:
     """The least value of a ratio over rows of corners, and the first row that has it. Exact.
 
     Args:
-        formula: of the corners' coordinates, in floats and in integers alike. Of degree two: areas, squared lengths.
+        formula: of degree two in the corners' coordinates, such as an area or a squared length; called with floats and
+            with integers.
         corners: (k, 2) each, k at least 1.
     """
     stacked = np.stack(corners)

@@ -24,10 +24,10 @@ class _Circle:
 
 
 def min_circle(vertices: Points) -> tuple[tuple[float, float], float]:
-    """Centre and radius of the smallest circle around the points: the exact values, each rounded (radius: one ulp).
+    """Centre and radius of the smallest circle around the points: exact values, each rounded (radius: one ulp).
 
-    NaN and 0.0 for no vertices. Gärtner, "Fast and robust smallest enclosing balls" (1999): while a point lies outside,
-    the farthest one joins the two or three that hold the circle. O(h) a round, some ten rounds. Whether a point lies
+    NaN and 0.0 for no vertices. Gärtner, "Fast and robust smallest enclosing balls" (1999): while a point is outside,
+    the farthest one joins the two or three that define the circle. O(h) a round, about ten rounds. Whether a point is
     outside is decided exactly.
     """
     if not len(vertices):
@@ -48,7 +48,7 @@ def _corner(vertices: Points, row: int) -> Point:
 
 
 def _around(points: list[Point]) -> tuple[_Circle, list[Point]]:
-    """The smallest circle around up to four points, and those that hold it."""
+    """The smallest circle around up to four points, and the points that define it."""
     corners = [exact(p) for p in points]
     candidates = [
         (circle, held)
@@ -76,7 +76,7 @@ def _through(points: list[Exact]) -> _Circle | None:
 
 
 def _farthest(vertices: Points, circle: _Circle) -> int:
-    """The number of the vertex farthest from the circle's centre. Integers decide where floats cannot tell."""
+    """The index of the vertex farthest from the circle's centre. Integers decide what floats cannot."""
     shift = -int(np.frexp(np.abs(vertices).max())[1]) - 2
     scaled = np.ldexp(vertices, shift)
     centre = [value * Fraction(2) ** shift for value in circle.centre]
@@ -94,10 +94,10 @@ def _farthest(vertices: Points, circle: _Circle) -> int:
 
 
 def _perhaps_farthest(points: npt.NDArray[np.floating], centre: list[Fraction]) -> npt.NDArray[np.bool_]:
-    """Which points the rounding errors do not rule out."""
+    """The points that rounding errors do not rule out."""
     high = np.array([rounded(value) for value in centre])
     low = [rounded(value - Fraction(part)) for value, part in zip(centre, high.tolist(), strict=True)]
-    x, y = high.astype(points.dtype) + low  # rounded: that moves a distance by so much of the centre's own size
+    x, y = high.astype(points.dtype) + low  # rounded: changes a distance relative to the size of the centre itself
     squares = (points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2
     error = rounding(points) * (squares + np.sqrt(squares) * (abs(x) + abs(y))) + UNDERFLOW
     possible: npt.NDArray[np.bool_] = squares + error >= (squares - error).max()

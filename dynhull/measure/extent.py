@@ -1,4 +1,4 @@
-"""How far a hull reaches: bounds, diameter, width."""
+"""The extent of a hull: bounds, diameter, width."""
 
 from math import nan
 
@@ -10,7 +10,7 @@ from .calipers import LEFT, edges, extremes, least, squared_height
 
 
 def bounds(vertices: Points) -> tuple[float, float, float, float]:
-    """Least x, least y, greatest x, greatest y. Exact; NaN for no vertices. O(h)."""
+    """Least x, least y, greatest x and greatest y. Exact; NaN for no vertices. O(h)."""
     if not len(vertices):
         return nan, nan, nan, nan
     (x0, y0), (x1, y1) = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
@@ -26,7 +26,7 @@ def diameter(vertices: Points) -> float:
         return 0.0
     a, b = edges(vertices)
     far = extremes(a, b, LEFT, vertices)
-    after = (far + 1) % len(vertices)  # as far, where there is a parallel edge
+    after = (far + 1) % len(vertices)  # equally far if there is a parallel edge
     p, q = np.concatenate([a, b, a, b]), vertices[np.concatenate([far, far, after, after])]
     return root(-least(_negative_squared_length, p, q)[0])
 

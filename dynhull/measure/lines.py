@@ -1,4 +1,4 @@
-"""Distances of points to a convex polygon, and where lines cross it."""
+"""Distances of points to a convex polygon, and its intersections with lines."""
 
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
@@ -18,10 +18,10 @@ def distance(vertices: Points, tangents: npt.NDArray[np.float64], xy: Points) ->
 
     Args:
         vertices: (h, 2), counter-clockwise.
-        tangents: (k, 2, 2), for each point the left and the right tangent point, NaN where it is not outside.
+        tangents: (k, 2, 2) the left and right tangent point of each point; NaN if the point is not outside.
         xy: (k, 2) points.
 
-    Along the chain that a point sees the distance falls, then rises: O(h + k log h).
+    The distance falls, then rises along the chain that a point sees: O(h + k log h).
     """
     corners = as_tuples(vertices)
     if not corners:
@@ -38,12 +38,12 @@ def distance(vertices: Points, tangents: npt.NDArray[np.float64], xy: Points) ->
 
 
 def _squared_distance(corners: Sequence[Point], first: int, edges: int, p: Point) -> Fraction:
-    """From p to the chain of so many edges that begins at a corner: its distance falls, then rises."""
+    """The squared distance of p to a chain, given by its first corner and number of edges; it falls, then rises."""
     low, high = 0, edges
     while low < high:
         middle = (low + high) // 2
         a, b = corners[(first + middle) % len(corners)], corners[(first + middle + 1) % len(corners)]
-        if dot_sign(b, p, a, b) >= 0:  # the nearest point is b, or comes after it
+        if dot_sign(b, p, a, b) >= 0:  # the nearest point is b or beyond it
             low = middle + 1
         else:
             high = middle
@@ -57,10 +57,10 @@ def _squared_distance(corners: Sequence[Point], first: int, edges: int, p: Point
 
 
 def intersect_lines(vertices: Points, p: Points, q: Points) -> npt.NDArray[np.float64]:
-    """(k, 2, 2) where the line through each p and q enters and leaves the hull, in the order from p to q.
+    """(k, 2, 2) points where the line through each p and q enters and leaves the hull, in the order from p to q.
 
-    Each coordinate is the exact value rounded once. A line that touches a vertex has it twice, one along an edge has
-    the edge's ends; NaN for a line that misses. O(h + k log h).
+    Each coordinate is the exact value rounded once. A line that touches a vertex gives it twice, a line along an edge
+    gives the edge's ends; NaN for a line that misses. O(h + k log h).
     """
     corners = as_tuples(vertices)
     result = np.full((len(p), 2, 2), nan)
@@ -79,7 +79,7 @@ def intersect_lines(vertices: Points, p: Points, q: Points) -> npt.NDArray[np.fl
 
 
 def _chord(lower: Sequence[Point], upper: Sequence[Point], p: Point, q: Point) -> tuple[Point, Point] | None:
-    """Where the line from p to q, p < q, crosses the two chains: on the left, on the right."""
+    """The points where the line from p to q, p < q, crosses the two chains: left, right."""
     lowest = bisect_left(range(len(lower) - 1), 1, key=lambda i: cross_sign(p, q, lower[i], lower[i + 1]))
     highest = bisect_left(range(len(upper) - 1), 1, key=lambda i: -cross_sign(p, q, upper[i], upper[i + 1]))
     for chain, i, outward in ((lower, lowest, 1), (upper, highest, -1)):
@@ -105,7 +105,7 @@ def _chord(lower: Sequence[Point], upper: Sequence[Point], p: Point, q: Point) -
 
 
 def _meet(p: Point, q: Point, a: Point, b: Point) -> Point:
-    """Where the line through p and q crosses the segment from a to b: their sides differ, or b is on the line."""
+    """The point where the line through p and q crosses the segment from a to b, which it certainly does."""
     at_a, at_b = doubled_triangle(p, q, a), doubled_triangle(p, q, b)
     share = at_a / (at_a - at_b)
     (ax, ay), (bx, by) = exact(a), exact(b)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .._value import Value
 from ..arrays import as_rows
 from ..exact import as_integers
 from .monotone_chain import monotone_chain
@@ -24,8 +25,8 @@ LARGEST_TO_SUBTRACT = 2.0**1022
 DOUBTFUL_VOLUME = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class HullND:
+@dataclass(frozen=True, eq=False, repr=False)
+class HullND(Value):
     """A convex hull in d dimensions.
 
     Attributes:

@@ -6,5 +6,5 @@ from dynhull_client import HullClient
 
 @pytest.fixture(params=CLIENTS)
 def connect(request: pytest.FixtureRequest) -> type[HullClient]:
-    """HullClient, or AsyncHullClient behind the same face."""
+    """HullClient, or AsyncHullClient behind the same interface."""
     return CLIENTS[request.param]

@@ -42,7 +42,7 @@ def hull(client: HullClient, name: str) -> str:
     return name
 
 
-def test_a_hull_from_birth_to_death(client: HullClient, name: str) -> None:
+def test_a_hull_from_creation_to_deletion(client: HullClient, name: str) -> None:
     info = client.create_hull(name)
     assert (info.name, info.revision, info.points, info.distinct) == (name, 0, 0, 0)
     assert client.apply(name, insert=SQUARE) == Applied(1, 8, 0, 0, True, 8)
@@ -62,6 +62,40 @@ def test_a_hull_from_birth_to_death(client: HullClient, name: str) -> None:
     client.delete_hull(name)
     with pytest.raises(HullNotFoundError):
         client.get_hull(name)
+
+
+def test_a_hull_may_exist_already(client: HullClient, name: str) -> None:
+    assert client.create_hull(name, exist_ok=True).revision == 0
+    client.apply(name, insert=SQUARE)
+    info = client.create_hull(name, exist_ok=True)
+    assert (info.name, info.revision, info.points) == (name, 1, 8)
+    with pytest.raises(HullExistsError):
+        client.create_hull(name)
+    with pytest.raises(InvalidRequestError):
+        client.create_hull("a b", exist_ok=True)
+
+
+def test_waiting_for_a_hull(address: str, connect: type[HullClient], name: str) -> None:
+    with proxy(address) as way, connect(way.address) as waiting, HullClient(address) as client:
+        with pytest.raises(DeadlineError, match=f"not within 0.2 s: .*{name}"):
+            waiting.wait_for_hull(name, timeout=0.2)
+        way.server = "127.0.0.1:1"
+        way.cut()
+        found = []
+        thread = threading.Thread(target=lambda: found.append(waiting.wait_for_hull(name, min_revision=2)))
+        thread.start()
+        way.server = address
+        client.create_hull(name)
+        client.apply(name, insert=SQUARE)
+        client.apply(name, delete=SQUARE[:1])
+        thread.join()
+        assert [(info.revision, info.points) for info in found] == [(2, 7)]
+
+
+def test_points_without_a_name_are_an_error_that_says_what_to_write(client: HullClient, hull: str) -> None:
+    with pytest.raises(TypeError, match=rf"write apply\('{hull}', insert=points\) or apply\('{hull}', delete=points\)"):
+        client.apply(hull, SQUARE)
+    assert client.get_hull(hull).revision == 0
 
 
 def test_moves_and_counted_deletes(client: HullClient, hull: str) -> None:
@@ -98,7 +132,7 @@ def test_an_ingest_of_nothing_changes_nothing(client: HullClient, hull: str) -> 
     assert (stream.summary.batches, stream.summary.revision) == (0, 0)
 
 
-def test_the_servers_error_comes_out_of_apply_when_there_is_another(client: HullClient, hull: str) -> None:
+def test_the_next_apply_raises_the_servers_error(client: HullClient, hull: str) -> None:
     def apply_for_ever() -> None:
         with client.ingest(hull) as stream:
             stream.apply(insert=SQUARE)
@@ -113,7 +147,7 @@ def test_the_servers_error_comes_out_of_apply_when_there_is_another(client: Hull
     assert client.get_hull(hull).revision == 1
 
 
-def test_the_servers_error_comes_at_the_end_otherwise(client: HullClient, hull: str) -> None:
+def test_leaving_an_ingest_raises_the_servers_error(client: HullClient, hull: str) -> None:
     stream = client.ingest(hull)
     with pytest.raises(PointMissingError), stream:
         stream.apply(delete=[[8, 8]])
@@ -122,7 +156,7 @@ def test_the_servers_error_comes_at_the_end_otherwise(client: HullClient, hull: 
         pass
 
 
-def test_an_error_of_ones_own_cancels_an_ingest(client: HullClient, hull: str) -> None:
+def test_leaving_with_an_exception_cancels_an_ingest(client: HullClient, hull: str) -> None:
     stream = client.ingest(hull)
 
     def fail_half_way() -> None:

@@ -1,4 +1,4 @@
-"""What hulls are for, asked of a server: the answers of the library on the same points."""
+"""Measures, separations, phase diagrams and frontiers of a server: the library's answers on the same points."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -36,7 +36,7 @@ def client(address: str, connect: type[HullClient]) -> Iterator[HullClient]:
 
 @pytest.fixture
 def make(client: HullClient, name: str):
-    """Makes a hull of points, and tells its name."""
+    """Makes a hull of points and returns its name."""
 
     def make(points, which: str = "") -> str:
         client.create_hull(name + which)
@@ -59,18 +59,18 @@ SETS = {
 
 @pytest.mark.parametrize("points", SETS.values(), ids=SETS)
 def test_measures(client: HullClient, make, points) -> None:
-    told, expected = client.get_measures(make(points)), DynamicHull(points)
-    assert told.revision == bool(len(points))
-    assert (told.area, told.perimeter) == (expected.area, expected.perimeter)
+    answer, expected = client.get_measures(make(points)), DynamicHull(points)
+    assert answer.revision == bool(len(points))
+    assert (answer.area, answer.perimeter) == (expected.area, expected.perimeter)
     for numbers, measured in [
-        (told.centroid, expected.centroid),
-        (told.bounds, expected.bounds),
-        (told.min_box, expected.min_box()),
-        (told.min_perimeter_box, expected.min_perimeter_box()),
-        (told.min_circle[0], expected.min_circle()[0]),
+        (answer.centroid, expected.centroid),
+        (answer.bounds, expected.bounds),
+        (answer.min_box, expected.min_box()),
+        (answer.min_perimeter_box, expected.min_perimeter_box()),
+        (answer.min_circle[0], expected.min_circle()[0]),
     ]:
         np.testing.assert_array_equal(numbers, measured)
-    assert (told.diameter, told.width, told.min_circle[1]) == (
+    assert (answer.diameter, answer.width, answer.min_circle[1]) == (
         expected.diameter(),
         expected.width(),
         expected.min_circle()[1],
@@ -81,28 +81,28 @@ def test_measures(client: HullClient, make, points) -> None:
 def test_separation(client: HullClient, make, offset) -> None:
     name, other = make(POINTS), make(POINTS + offset, "-other")
     client.apply(other, insert=[POINTS[0] + offset])
-    told, expected = client.separate(name, other), max_margin(DynamicHull(POINTS), DynamicHull(POINTS + offset))
-    assert (told.revision, told.other_revision) == (1, 2)
-    assert told.intersect == (not expected.separable)
-    assert (told.distance, told.depth, told.offset) == (expected.margin, expected.depth, expected.offset)
-    assert list(told.normal) == expected.normal.tolist()
-    assert told.closest.tolist() == expected.points.tolist()
+    answer, expected = client.separate(name, other), max_margin(DynamicHull(POINTS), DynamicHull(POINTS + offset))
+    assert (answer.revision, answer.other_revision) == (1, 2)
+    assert answer.intersect == (not expected.separable)
+    assert (answer.distance, answer.depth, answer.offset) == (expected.margin, expected.depth, expected.offset)
+    assert list(answer.normal) == expected.normal.tolist()
+    assert answer.closest.tolist() == expected.points.tolist()
 
 
 def test_touching_hulls_and_hulls_next_to_each_other(client: HullClient, make) -> None:
     name, other = make([[0, 0], [1, 0], [0.5, 1]]), make([[1, 0], [2, 0]], "-other")
-    told = client.separate(name, other)
-    assert (told.intersect, told.distance, told.depth) == (True, 0, 0)
+    answer = client.separate(name, other)
+    assert (answer.intersect, answer.distance, answer.depth) == (True, 0, 0)
     client.apply(other, move=([[1, 0]], [[np.nextafter(1, 2), 0]]))
-    told = client.separate(name, other)
-    assert (told.intersect, told.distance, told.depth) == (False, np.spacing(1.0), 0)
+    answer = client.separate(name, other)
+    assert (answer.intersect, answer.distance, answer.depth) == (False, np.spacing(1.0), 0)
 
 
 def test_a_hull_and_itself(client: HullClient, make) -> None:
     name = make([[0, 0], [4, 0], [4, 2], [0, 2]])
-    told = client.separate(name, name)
-    assert (told.revision, told.other_revision) == (1, 1)
-    assert (told.intersect, told.distance, told.depth) == (True, 0, 2)
+    answer = client.separate(name, name)
+    assert (answer.revision, answer.other_revision) == (1, 1)
+    assert (answer.intersect, answer.distance, answer.depth) == (True, 0, 2)
     one = make([[7, 7]], "-one")
     assert (client.separate(one, one).intersect, client.separate(one, one).depth) == (True, 0)
 
@@ -118,8 +118,8 @@ def test_two_hulls_wait_for_their_revisions(client: HullClient, make) -> None:
         waiting = pool.submit(client.separate, name, other, min_revision=2, other_min_revision=2)
         client.apply(other, insert=[[0, 2]])
         client.apply(name, insert=[[0, 1]])
-        told = waiting.result()
-    assert (told.revision, told.other_revision, told.distance) == (2, 2, 1)
+        answer = waiting.result()
+    assert (answer.revision, answer.other_revision, answer.distance) == (2, 2, 1)
 
 
 def test_hulls_that_are_empty_or_not_there(client: HullClient, make) -> None:
@@ -135,33 +135,33 @@ def test_hulls_that_are_empty_or_not_there(client: HullClient, make) -> None:
 @pytest.mark.parametrize("count", [0, 1, 2, len(ENTRIES)])
 def test_phase_diagrams(client: HullClient, make, count: int) -> None:
     hull, diagram = make(ENTRIES[:count]), PhaseDiagram(ENTRIES[:count])
-    told, expected = client.phase_diagram(hull, ENTRIES), diagram.decompose(ENTRIES[:, 0])
-    assert told.revision == bool(count)
-    assert told.stable.tolist() == diagram.stable().tolist()
-    np.testing.assert_array_equal(told.energies_above_hull, diagram.energy_above_hull(ENTRIES))
-    np.testing.assert_array_equal(told.phases, expected.phases)
-    np.testing.assert_array_equal(told.shares, expected.shares)
+    answer, expected = client.phase_diagram(hull, ENTRIES), diagram.decompose(ENTRIES[:, 0])
+    assert answer.revision == bool(count)
+    assert answer.stable.tolist() == diagram.stable().tolist()
+    np.testing.assert_array_equal(answer.energies_above_hull, diagram.energy_above_hull(ENTRIES))
+    np.testing.assert_array_equal(answer.phases, expected.phases)
+    np.testing.assert_array_equal(answer.shares, expected.shares)
     alone = client.phase_diagram(hull)
-    assert alone.stable.tolist() == told.stable.tolist()
+    assert alone.stable.tolist() == answer.stable.tolist()
     assert [each.shape for each in (alone.energies_above_hull, alone.phases, alone.shares)] == [(0,), (0, 2, 2), (0, 2)]
 
 
 @pytest.mark.parametrize("count", [1, 2, len(OFFERS)])
 def test_frontiers(client: HullClient, make, count: int) -> None:
     rates = [-3.0, 0.0, 1.25, 1e308, *Frontier(OFFERS[:count]).tangencies().rates.tolist()]
-    told, expected = client.frontier(make(OFFERS[:count]), OFFERS, rates), Frontier(OFFERS[:count])
-    assert told.revision == 1
-    assert told.efficient.tolist() == expected.efficient().tolist()
-    assert told.dominated.tolist() == expected.dominated(OFFERS).tolist()
-    assert told.tangencies.tolist() == [list(expected.tangency(rate)) for rate in rates]
-    assert told.sharpe_ratios.tolist() == [expected.sharpe_ratio(rate) for rate in rates]
-    assert told.turning_rates.tolist() == expected.tangencies().rates[: len(told.efficient) - 1].tolist()
+    answer, expected = client.frontier(make(OFFERS[:count]), OFFERS, rates), Frontier(OFFERS[:count])
+    assert answer.revision == 1
+    assert answer.efficient.tolist() == expected.efficient().tolist()
+    assert answer.dominated.tolist() == expected.dominated(OFFERS).tolist()
+    assert answer.tangencies.tolist() == [list(expected.tangency(rate)) for rate in rates]
+    assert answer.sharpe_ratios.tolist() == [expected.sharpe_ratio(rate) for rate in rates]
+    assert answer.turning_rates.tolist() == expected.tangencies().rates[: len(answer.efficient) - 1].tolist()
 
 
 def test_a_frontier_without_points(client: HullClient, make) -> None:
     empty = make([])
-    told = client.frontier(empty, [[1, 2]])
-    assert (told.efficient.shape, told.turning_rates.shape, told.dominated.tolist()) == ((0, 2), (0,), [False])
+    answer = client.frontier(empty, [[1, 2]])
+    assert (answer.efficient.shape, answer.turning_rates.shape, answer.dominated.tolist()) == ((0, 2), (0,), [False])
     with pytest.raises(HullEmptyError):
         client.frontier(empty, rates=[0])
 

@@ -1,4 +1,4 @@
-"""A watch that goes on by itself: the copy it keeps is exact whatever happened to the connection and the server."""
+"""A watch that reconnects by itself: its copy is exact after any failure of the connection or the server."""
 
 import asyncio
 import threading
@@ -14,6 +14,7 @@ from server_process import server_process
 from dynhull_client import (
     AsyncHullClient,
     Change,
+    Deleted,
     HullClient,
     HullCopy,
     HullNotFoundError,
@@ -51,7 +52,7 @@ class Follower:
         return sum(isinstance(event, Snapshot) for event in self.events)
 
 
-def test_it_goes_on_after_lost_connections(address: str, connect: type[HullClient], name: str) -> None:
+def test_it_continues_after_lost_connections(address: str, connect: type[HullClient], name: str) -> None:
     copy = HullCopy()
     with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
         client.create_hull(name)
@@ -87,7 +88,7 @@ def test_it_outlives_its_server(tmp_path: Path, connect: type[HullClient]) -> No
     assert copy.vertices.tolist() == [[1, 2], [3, 4]]
 
 
-def test_it_begins_anew_where_the_server_has_forgotten(connect: type[HullClient]) -> None:
+def test_it_starts_again_if_the_server_has_forgotten(connect: type[HullClient]) -> None:
     with server_process("--history-bytes", "0") as server, connect(server.address) as client:
         client.create_hull("a")
         copy = HullCopy()
@@ -103,7 +104,7 @@ def test_it_begins_anew_where_the_server_has_forgotten(connect: type[HullClient]
         assert (copy.revision, copy.points, len(copy.vertices)) == (0, 0, 0)
 
 
-def test_a_sketch_goes_on_too(address: str, connect: type[HullClient], name: str) -> None:
+def test_a_sketch_continues_too(address: str, connect: type[HullClient], name: str) -> None:
     with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
         client.create_hull(name)
         with watching.watch(name, directions=[[1, 0]]) as watch:
@@ -129,6 +130,62 @@ def test_what_it_does_not_wait_for(connect: type[HullClient], address: str, name
             client.watch(name, copy=HullCopy(), resume=HullCopy())
 
 
+def test_following_a_hull_that_is_deleted_and_created_again(address: str, connect: type[HullClient], name: str) -> None:
+    copy = HullCopy()
+    with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
+        watch = watching.watch(name, copy=copy, follow=True)
+        creating = threading.Timer(0.1, client.create_hull, (name,))
+        creating.start()
+        assert next(watch).revision == 0  # waited for the hull to come
+        client.apply(name, insert=[[1, 2], [3, 4]])
+        assert isinstance(next(watch), Change)
+        first = copy.uid
+        client.delete_hull(name)
+        assert next(watch) == Deleted(1)
+        assert (copy.uid, copy.revision, copy.points, len(copy.vertices)) == ("", 0, 0, 0)
+        client.create_hull(name)
+        client.apply(name, insert=[[5, 6]])
+        snapshot = next(watch)
+        assert isinstance(snapshot, Snapshot)
+        while copy.revision < 1:
+            next(watch)
+        assert copy.vertices.tolist() == [[5, 6]]
+        assert watch.lost is None
+        assert snapshot.uid not in ("", first)
+
+        way.server = "127.0.0.1:1"
+        way.cut()
+        client.delete_hull(name)
+        client.create_hull(name)
+        way.server = address
+        assert isinstance(next(watch), Deleted)
+        assert isinstance(next(watch), Snapshot)
+        assert (copy.revision, copy.points) == (0, 0)
+        watch.close()
+
+
+def test_following_from_a_copy_of_an_earlier_hull(address: str, connect: type[HullClient], name: str) -> None:
+    copy = HullCopy()
+    with connect(address) as client:
+        client.create_hull(name)
+        client.apply(name, insert=[[1, 2]])
+        with client.watch(name, copy=copy) as watch:
+            next(watch)
+        client.delete_hull(name)
+        client.create_hull(name)
+        with client.watch(name, copy=copy, follow=True) as watch:
+            assert next(watch) == Deleted(1)
+            assert next(watch).revision == copy.revision == 0
+
+
+def test_closing_ends_the_wait_for_a_hull(address: str, connect: type[HullClient], name: str) -> None:
+    with connect(address) as client:
+        watch = client.watch(name, follow=True)
+        closing = threading.Timer(0.2, watch.close)
+        closing.start()
+        assert list(watch) == []
+
+
 def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:
     with server_process(killed=True) as server, connect(server.address) as client:
         client.create_hull("a")
@@ -140,7 +197,7 @@ def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:
         assert list(watch) == []
 
 
-def test_a_wait_given_up_does_not_end_the_watch(address: str, name: str) -> None:
+def test_a_cancelled_wait_does_not_end_the_watch(address: str, name: str) -> None:
     async def follow() -> HullCopy:
         copy = HullCopy()
         async with AsyncHullClient(address) as client:

@@ -1,4 +1,4 @@
-"""The writer: every batch exactly once, whatever happens to the connection and the server."""
+"""The writer: every batch exactly once, after any failure of the connection or the server."""
 
 import signal
 import threading
@@ -47,7 +47,7 @@ def test_points_are_gathered_into_batches(client: HullClient, name: str) -> None
     assert client.get_hull(name).vertices.tolist() == expected.vertices().tolist()
 
 
-def test_what_waits_is_sent_after_the_linger_time(client: HullClient, name: str) -> None:
+def test_points_are_sent_after_the_linger_time(client: HullClient, name: str) -> None:
     with client.writer(name, linger=0.05) as writer:
         began = time.monotonic()
         first = writer.put(insert=[[1, 1]])
@@ -66,11 +66,11 @@ def test_a_refused_batch_is_the_only_one_that_fails(client: HullClient, name: st
         failed = [i for i, outcome in enumerate(outcomes) if outcome.exception() is not None]
         assert failed == [0, 10, 20, 30, 40]
         assert outcomes[20].exception().value == "(-1.0, 20.0)"
-        writer.flush()  # told once
+        writer.flush()  # reported once
     assert (client.get_hull(name).revision, writer.sequence) == (45, 45)
 
 
-def test_or_ends_the_writer(client: HullClient, name: str) -> None:
+def test_a_refused_batch_may_end_the_writer(client: HullClient, name: str) -> None:
     def write() -> None:
         with client.writer(name, batch_points=1, stop_on_error=True) as writer:
             writer.put(insert=[[1, 1]])
@@ -122,7 +122,7 @@ def acknowledged(writer, sequence: int) -> None:
 
 
 def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:
-    """Three servers one after another on the same data, the first two killed while batches are under way."""
+    """Three servers, one after another, on the same data; the first two are killed in the middle of batches."""
     data = ("--data", str(tmp_path))
     with (
         server_process(*data, killed=True) as first,
@@ -159,7 +159,7 @@ def test_every_batch_once_though_the_connection_breaks(address: str, connect: ty
 
 
 def test_refused_batches_among_broken_connections(address: str, connect: type[HullClient], name: str) -> None:
-    """The numbers of the batches after a refused one move up, while the server may have applied more than it told."""
+    """Batches after a refused one get new numbers, while the server may have applied more than it acknowledged."""
     with proxy(address) as way, connect(way.address) as client:
         client.create_hull(name)
         with client.writer(name, batch_points=1, in_flight=16) as writer:
@@ -176,7 +176,7 @@ def test_refused_batches_among_broken_connections(address: str, connect: type[Hu
         assert client.count(name, there).counts.tolist() == [int(i % 20 != 7) for i in range(600)]
 
 
-def test_another_writer_goes_on_where_one_was_acknowledged(client: HullClient, name: str) -> None:
+def test_another_writer_continues_after_the_last_acknowledged_batch(client: HullClient, name: str) -> None:
     for last in (1, 2):
         with client.writer(name, producer="p") as writer:
             assert writer.sequence == last - 1
@@ -185,7 +185,7 @@ def test_another_writer_goes_on_where_one_was_acknowledged(client: HullClient, n
     assert client.get_hull(name).revision == 2
 
 
-def test_two_writers_of_one_name_are_told(client: HullClient, name: str) -> None:
+def test_two_writers_of_one_name_are_an_error(client: HullClient, name: str) -> None:
     first, second = (client.writer(name, producer="p") for _ in range(2))
     with first, pytest.raises(ProducerInUseError, match="'p'"), second:  # noqa: PT012  # leaving may raise it too
         first.put(insert=POINTS[0])
@@ -220,19 +220,38 @@ def test_what_a_writer_cannot_do(client: HullClient, name: str) -> None:
     with pytest.raises(ValueError, match="batch_points must be at least 1, got 0"):
         client.writer(name, batch_points=0)
     writer = client.writer(name)
-    with pytest.raises(RuntimeError, match="context"):
-        writer.put(insert=[[1, 2]])
+    with pytest.raises(RuntimeError, match="has not started"):
+        _ = writer.sequence
     with writer:
         with pytest.raises(ValueError, match="insert row 0"):
             writer.put(insert=[[np.nan, 2]])
         writer.put(insert=[[1, 2]])
-    with pytest.raises(RuntimeError, match="left"):
+    with pytest.raises(RuntimeError, match="closed"):
         writer.put(insert=[[1, 2]])
-    with pytest.raises(RuntimeError, match="once"), writer:
+    with pytest.raises(RuntimeError, match="closed"), writer:
         pass
 
 
-def test_an_error_of_ones_own_waits_for_nothing(client: HullClient, name: str) -> None:
+def test_a_writer_without_a_context(client: HullClient, name: str) -> None:
+    writer = client.writer(name, linger=60)
+    outcome = writer.put(insert=[[1, 2]])
+    writer.close()
+    assert outcome.result().revision == writer.sequence == 1
+    writer.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        writer.put(insert=[[1, 2]])
+    unused = client.writer(name)
+    unused.flush()
+    unused.close()
+    refused = client.writer(name, batch_points=1)
+    refused.put(delete=[[9, 9]])
+    with pytest.raises(PointMissingError):
+        refused.close()
+    refused.close()
+    assert client.get_hull(name).info.points == 1
+
+
+def test_leaving_with_an_exception_waits_for_nothing(client: HullClient, name: str) -> None:
     writer = client.writer(name, linger=60)
     outcomes = []
 

@@ -58,8 +58,8 @@ def test_polygons_without_area():
     [
         ([], "contour is empty"),
         ([[0, 0], [2, 2], [2, 0], [0, 2]], r"edges from \(0.0, 0.0\) to \(2.0, 2.0\) and .* meet"),
-        ([[0, 0], [4, 0], [4, 4], [2, 0], [0, 4]], "no simple polygon"),
-        ([[0, 0], [4, 0], [4, 4], [4, 2], [9, 9], [0, 4]], "no simple polygon"),
+        ([[0, 0], [4, 0], [4, 4], [2, 0], [0, 4]], "not a simple polygon"),
+        ([[0, 0], [4, 0], [4, 4], [4, 2], [9, 9], [0, 4]], "not a simple polygon"),
         ([[0, 0], [1, np.inf]], "contour row 1"),
     ],
 )

@@ -6,7 +6,7 @@ from metrics import measured, scrape
 from refusal import refusal
 
 from dynhull_client import HullClient, HullCopy
-from dynhull_client.messages import decode_event
+from dynhull_client._messages import decode_event
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 

@@ -11,7 +11,7 @@ from inputs import points
 
 from dynhull import DynamicHull
 from dynhull_client import Change, HullClient, HullCopy, Snapshot
-from dynhull_client.messages import decode_event
+from dynhull_client._messages import decode_event
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub

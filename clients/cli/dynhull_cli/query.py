@@ -13,8 +13,7 @@ from .tab_lines import tab_line
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dynhull_client import HullClient
-    from dynhull_client.messages import Points
+    from dynhull_client import HullClient, Points
 
 SIDES = {1: "inside", 0: "boundary", -1: "outside"}
 

@@ -12,8 +12,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from dynhull_client import Change, HullClient, HullCopy, Measures, Snapshot, Watch
-from dynhull_client.messages import Event, Points
+from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Snapshot, Watch
 
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line

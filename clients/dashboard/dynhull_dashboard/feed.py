@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from dynhull_client import (
     AsyncHullClient,
     AsyncWatch,
+    Deleted,
     DynhullError,
     Event,
     HullCopy,
@@ -134,7 +135,7 @@ class HullFeed:
     def _take(self, event: Event, copy: HullCopy) -> None:
         self._failure, self.followed = None, True
         self.revision, self.points = event.revision, event.points
-        if isinstance(event, Progress):
+        if isinstance(event, Progress | Deleted):
             return
         assert event.measures is not None  # requested by measures=True
         self.vertices = len(copy.vertices)

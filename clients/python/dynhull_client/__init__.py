@@ -1,4 +1,4 @@
-"""Client of the dynhull server: numpy arrays in and out.
+"""Clients of a dynhull server, with numpy arrays in and out: HullClient, and AsyncHullClient for asyncio.
 
 >>> from dynhull_client import HullClient
 >>> with HullClient("127.0.0.1:50051") as client:  # doctest: +SKIP
@@ -7,17 +7,18 @@
 ...     print(client.get_hull("fleet").vertices)
 """
 
-from .async_client import AsyncHullClient
-from .async_ingest import AsyncIngest
-from .async_watch import AsyncWatch
-from .async_writer import AsyncWriter
-from .client import HullClient
-from .errors import (
+from ._async_client import AsyncHullClient
+from ._async_ingest import AsyncIngest
+from ._async_watch import AsyncWatch
+from ._async_writer import AsyncWriter
+from ._client import HullClient
+from ._errors import (
     DeadlineError,
     DynhullError,
     HullEmptyError,
     HullExistsError,
     HullNotFoundError,
+    HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
@@ -30,14 +31,15 @@ from .errors import (
     UnauthenticatedError,
     UnavailableError,
 )
-from .hull_copy import HullCopy
-from .ingest import Ingest
-from .messages import (
+from ._hull_copy import HullCopy
+from ._ingest import Ingest
+from ._messages import (
     Applied,
     Change,
     ChanRound,
     Counted,
     Crossings,
+    Deleted,
     Difference,
     Distances,
     Event,
@@ -46,6 +48,7 @@ from .messages import (
     Ingested,
     Located,
     Measures,
+    Points,
     Progress,
     Sampled,
     Sketch,
@@ -54,9 +57,9 @@ from .messages import (
     Tangents,
     Verification,
 )
-from .uses import Efficient, Measured, Phases, Separation
-from .watch import Watch
-from .writer import Writer
+from ._uses import Efficient, Measured, Phases, Separation
+from ._watch import Watch
+from ._writer import Writer
 
 __all__ = [
     "Applied",
@@ -69,6 +72,7 @@ __all__ = [
     "Counted",
     "Crossings",
     "DeadlineError",
+    "Deleted",
     "Difference",
     "Distances",
     "DynhullError",
@@ -81,6 +85,7 @@ __all__ = [
     "HullExistsError",
     "HullInfo",
     "HullNotFoundError",
+    "HullReplacedError",
     "HullUnsuitableError",
     "Ingest",
     "Ingested",
@@ -93,6 +98,7 @@ __all__ = [
     "PermissionDeniedError",
     "Phases",
     "PointMissingError",
+    "Points",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -108,4 +114,21 @@ __all__ = [
     "Verification",
     "Watch",
     "Writer",
+    "__version__",
 ]
+
+__version__: str
+
+# Tracebacks and help show where to import a name from, not the private module that defines it.
+for _exported in [each for each in globals().values() if isinstance(each, type)]:
+    for _named in (_exported, *vars(_exported).values()):
+        if isinstance(_named, type) or hasattr(_named, "__code__"):
+            _named.__module__ = __name__
+
+
+def __getattr__(name: str) -> str:
+    if name == "__version__":
+        import dynhull
+
+        return dynhull.__version__
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

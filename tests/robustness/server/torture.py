@@ -37,7 +37,7 @@ import numpy as np
 
 import dynhull
 from dynhull_client import HullCopy
-from dynhull_client.messages import decode_event
+from dynhull_client._messages import decode_event
 from dynhull_proto.v1 import batch_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub

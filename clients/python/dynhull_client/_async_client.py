@@ -1,21 +1,18 @@
 """The asyncio client."""
 
-import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine
 from types import TracebackType
-from typing import Any, ClassVar, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-import grpc
-
-from . import calls, uses
-from .async_ingest import AsyncIngest
-from .async_watch import AsyncWatch
-from .async_writer import AsyncWriter
-from .calls import Call
-from .connection import Connection
-from .errors import error_of
-from .messages import HullInfo
-from .methods import documented, opening
+from . import _calls as calls
+from . import _uses as uses
+from ._async_ingest import AsyncIngest
+from ._async_watch import AsyncWatch
+from ._async_writer import AsyncWriter
+from ._calls import Call
+from ._connection import AsyncConnection
+from ._messages import HullInfo
+from ._methods import Client, answer_of, documented, opening
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -27,21 +24,22 @@ def _answering(
     """The coroutine that makes a call and returns its answer."""
 
     async def method(self: "AsyncHullClient", /, *arguments: P.args, **options: P.kwargs) -> Result:
-        return await self._answer(describe(*arguments, **options))
+        return await self._connection.answer(describe(*arguments, **options))
 
-    documented(method, describe)
+    documented(method, describe, answer_of(describe))
     return method
 
 
-class AsyncHullClient(Connection):
-    """A connection to a dynhull server; arguments and errors as of `Connection`.
+class AsyncHullClient(Client[AsyncConnection]):
+    """A client of a dynhull server for asyncio; arguments and errors as for `HullClient`.
 
-    Made and used in one running event loop. An async context manager, closed on leaving.
+    Make and use it in one running event loop. An async context manager, which closes it.
     """
 
-    _grpc: ClassVar[Any] = grpc.aio
+    _connect = AsyncConnection
 
     create_hull = _answering(calls.create_hull)
+    wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)
     last_sequence = _answering(calls.last_sequence)
@@ -63,18 +61,17 @@ class AsyncHullClient(Connection):
     writer = opening(AsyncWriter, calls.writer)
 
     async def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> AsyncIterator[HullInfo]:
-        """The hulls whose names begin with `prefix`, in the order of their names, fetched as they are wanted."""
+        """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
         following: str | None = ""
         while following is not None:
-            hulls, token = await self._answer(calls.list_page(prefix, following, timeout))
+            hulls, token = await self._connection.answer(calls.list_page(prefix, following, timeout))
             for each in hulls:
                 yield each
             following = token or None
 
     async def close(self) -> None:
-        """Close the connection; calls under way end."""
-        self._closed = True
-        await self.channel.close()
+        """Close the connection and end the calls on it."""
+        await self._connection.close()
 
     async def __aenter__(self) -> Self:
         return self
@@ -83,12 +80,3 @@ class AsyncHullClient(Connection):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         await self.close()
-
-    async def _answer(self, call: Call[Result]) -> Result:
-        attempts = self.attempts(call)
-        while True:
-            try:
-                return call.decode(await self.begin(getattr(self.stub, call.method), call.request, attempts.timeout()))
-            except grpc.RpcError as failure:
-                pause = attempts.pause_after(error_of(failure))
-            await asyncio.sleep(pause)

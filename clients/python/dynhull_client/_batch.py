@@ -1,4 +1,4 @@
-"""Arrays as a batch to send."""
+"""Batches as messages."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -8,7 +8,7 @@ import numpy.typing as npt
 from dynhull.arrays import as_points
 from dynhull_proto.v1 import batch_pb2, points_pb2
 
-from .messages import encode_points
+from ._messages import encode_points
 
 Missing = Literal["raise", "count"]
 BYTES_PER_POINT = 16
@@ -20,7 +20,7 @@ def encode_batch(
     move: tuple[npt.ArrayLike, npt.ArrayLike] | None,
     missing: Missing,
 ) -> batch_pb2.Batch:
-    """The batch as sent; ValueError or TypeError names the argument and the first bad row."""
+    """Arrays as a batch; ValueError or TypeError names the argument and the first bad row."""
     if missing not in ("raise", "count"):
         raise ValueError(f'missing must be "raise" or "count", got {missing!r}')
     batch = batch_pb2.Batch()
@@ -40,12 +40,12 @@ def encode_batch(
 
 
 def batch_rows(batch: batch_pb2.Batch) -> int:
-    """How many rows its arrays have."""
+    """The number of rows of its arrays."""
     return sum(len(points.packed) for points in _parts(batch)) // BYTES_PER_POINT
 
 
 def join_batches(batches: Sequence[batch_pb2.Batch]) -> batch_pb2.Batch:
-    """One batch that does what these do; all have the same policy for missing points."""
+    """One batch with the effect of all these, which have the same policy for missing points."""
     joined = batch_pb2.Batch(missing_points=batches[0].missing_points)
     for whole, *pieces in zip(_parts(joined), *map(_parts, batches), strict=True):
         packed = b"".join(piece.packed for piece in pieces)

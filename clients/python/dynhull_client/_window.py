@@ -1,4 +1,7 @@
-"""A writer's batches: gathered, numbered, sent, acknowledged. No I/O, no clock: `Writer` and `AsyncWriter` do that."""
+"""The batches of a writer: gathered, numbered, sent, acknowledged.
+
+No I/O and no clock: `Writer` and `AsyncWriter` add them.
+"""
 
 from collections import deque
 from collections.abc import Callable
@@ -10,9 +13,9 @@ import grpc
 from dynhull_proto.v1 import batch_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from .batch import batch_rows, join_batches
-from .calls import Writing
-from .errors import (
+from ._batch import batch_rows, join_batches
+from ._calls import Writing
+from ._errors import (
     DynhullError,
     HullNotFoundError,
     PermissionDeniedError,
@@ -20,14 +23,14 @@ from .errors import (
     SequenceGapError,
     UnauthenticatedError,
 )
-from .messages import Applied, decode_applied
-from .retry import PASSING, pauses
+from ._messages import Applied, decode_applied
+from ._retry import passes, pauses
 
 if TYPE_CHECKING:
     from asyncio import Future as TaskFuture
     from concurrent.futures import Future as ThreadFuture
 
-# What refuses the writer, not one of its batches.
+# These refuse the writer, not one of its batches.
 FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
 Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
 Settled = list[tuple[Any, Applied | DynhullError]]
@@ -35,9 +38,15 @@ Settled = list[tuple[Any, Applied | DynhullError]]
 
 @dataclass(slots=True)
 class Batch(Generic[Future]):
-    """Points to be sent as one batch, numbered when it is sent for the first time.
+    """Points to send as one batch, which gets its number when it is first sent.
 
-    `rows` are the points, `due` is when it is sent at the latest, `sent` how often it was.
+    Attributes:
+        outcome: the future of its effect.
+        due: the time at which it is sent at the latest.
+        parts: the points put so far.
+        rows: their number.
+        sent: how often it was sent.
+        request: the message, once it was sent.
     """
 
     outcome: Future
@@ -49,13 +58,13 @@ class Batch(Generic[Future]):
 
 
 class Window(Generic[Future]):
-    """The batches of a writer that are not acknowledged yet.
+    """The batches of a writer that are not acknowledged.
 
     Attributes:
-        sequence: the number of the last batch acknowledged.
-        failure: what ended the writer; None as long as nothing has.
-        begun: how many batches there have been.
-        settled: how many of them have been applied or refused.
+        sequence: the number of the last acknowledged batch.
+        failure: the error that ended the writer; None while it works.
+        begun: the number of batches begun.
+        settled: the number of batches applied or refused.
     """
 
     def __init__(self, writing: Writing, sequence: int, new_outcome: Callable[[], Future]) -> None:
@@ -84,7 +93,7 @@ class Window(Generic[Future]):
         return self._gathering is None and not self._under_way
 
     def put(self, batch: batch_pb2.Batch, now: float) -> Future:
-        """Add points; the outcome is that of the batch they become part of."""
+        """Add points to the batch being gathered; returns its outcome."""
         if self.failure is not None:
             raise self.failure
         if self._gathering is None:
@@ -95,7 +104,7 @@ class Window(Generic[Future]):
         return self._gathering.outcome
 
     def hurry(self, now: float) -> None:
-        """Let nothing linger."""
+        """Make the gathered points due now."""
         if self._gathering is not None:
             self._gathering.due = now
 
@@ -104,7 +113,7 @@ class Window(Generic[Future]):
         return pb.StreamRequest(name=self._writing.name, producer=self._writing.producer)
 
     def take(self, now: float) -> pb.StreamRequest | None:
-        """The next message to send on this connection; None where there is none as yet."""
+        """The next message to send on this connection; None if there is none yet."""
         most = 1 if self._one_at_a_time else self._writing.in_flight
         if self._on_this_connection >= most:
             return None
@@ -124,18 +133,18 @@ class Window(Generic[Future]):
         return batch.request
 
     def due_in(self, now: float) -> float | None:
-        """Seconds until the points gathered are to be sent; None where none wait for that."""
+        """Seconds until the gathered points are due; None if nothing waits for that."""
         waits = self._gathering is not None and self._on_this_connection == len(self._under_way)
         return max(0.0, self._gathering.due - now) if self._gathering is not None and waits else None
 
     def acknowledge(self, response: pb.StreamResponse) -> Settled:
-        """The first batch under way has been applied."""
-        if not self._under_way:  # everything was abandoned while the response was on its way
+        """Settle the first batch under way, which was applied."""
+        if not self._under_way:  # abandoned while the response was on its way
             return []
         applied = decode_applied(response.result)
         if applied.duplicate and self._under_way[0].sent == 1:
             batch = f"batch {response.sequence} of producer {self._writing.producer!r}"
-            message = f"{batch} had been applied before it was sent: another writer has the same name"
+            message = f"{batch} had been applied before it was sent: another writer uses the same name"
             return self._end(ProducerInUseError(message, grpc.StatusCode.FAILED_PRECONDITION, "PRODUCER_IN_USE", {}))
         self._lost_since, self._pauses = None, pauses()
         self._one_at_a_time = False
@@ -145,17 +154,17 @@ class Window(Generic[Future]):
         return [(self._under_way.popleft().outcome, applied)]
 
     def lost(self, error: DynhullError, now: float) -> tuple[Settled, float | None]:
-        """The connection has ended: what that settles, and seconds until the next one; None where there is none."""
+        """Handle the end of a connection: what it settles, and the seconds until the next one; None for no next one."""
         alone = self._on_this_connection == 1
         self._on_this_connection = 0
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
             return self._end(error), None
-        if error.reason and not isinstance(error, PASSING):
+        if error.reason and not passes(error):
             return self._refuse(error)
         if error.code == grpc.StatusCode.RESOURCE_EXHAUSTED and alone:  # gRPC's own limit on messages
             return self._refuse(error)
-        # Where nobody says which batch it was, or whether it was applied, sending one at a time will tell.
-        self._one_at_a_time = not isinstance(error, PASSING)
+        # If it is unknown which batch failed, or whether it was applied, sending one at a time finds out.
+        self._one_at_a_time = not passes(error)
         if self.empty or self._lost_since is None:
             self._lost_since = now
         if now - self._lost_since > self._writing.patience:
@@ -163,7 +172,7 @@ class Window(Generic[Future]):
         return [], next(self._pauses)
 
     def abandon(self) -> list[Future]:
-        """Forget everything; returns the outcomes that nobody will know."""
+        """Drop all batches; returns their outcomes, which stay unknown."""
         left = [each.outcome for each in self._under_way]
         if self._gathering is not None:
             left.append(self._gathering.outcome)
@@ -172,13 +181,13 @@ class Window(Generic[Future]):
         return left
 
     def raise_refusal(self) -> None:
-        """Raise what has ended the writer, or what refused a batch, the first since the last call."""
+        """Raise the error that ended the writer, or the first refusal since the last call."""
         refusal, self._refusal = self.failure or self._refusal, None
         if refusal is not None:
             raise refusal
 
     def _refuse(self, error: DynhullError) -> tuple[Settled, float | None]:
-        """The first batch is at fault, for all before it have been acknowledged; the others move up by a number."""
+        """Settle the first batch, which is at fault, as all before it are acknowledged; renumber the others."""
         if self._writing.stop_on_error:
             return self._end(error), None
         self._refusal = self._refusal or error
@@ -186,7 +195,7 @@ class Window(Generic[Future]):
         self.settled += 1
         self._lost_since = None
         for batch in self._under_way:
-            assert batch.request is not None  # what is under way has been sent
+            assert batch.request is not None  # batches under way were sent
             batch.request.sequence -= 1
             batch.sent = 0
         return [(refused.outcome, error)], 0.0
@@ -197,12 +206,12 @@ class Window(Generic[Future]):
 
 
 def settle(settled: Settled) -> None:
-    """Tell what became of batches."""
+    """Set the outcomes of batches."""
     for outcome, result in settled:
-        if outcome.done():  # cancelled by whoever waited for it
+        if outcome.done():  # cancelled by its caller
             continue
         if isinstance(result, Applied):
             outcome.set_result(result)
         else:
             outcome.set_exception(result)
-            outcome.exception()  # flush and close raise it too: asyncio need not complain that nobody has looked
+            outcome.exception()  # flush and close raise it too: asyncio need not report it as never retrieved

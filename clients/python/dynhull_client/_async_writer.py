@@ -1,33 +1,39 @@
-"""Points to a hull in numbered batches, each applied exactly once, with asyncio."""
+"""Sends points to a hull in numbered batches, each applied exactly once, with asyncio."""
+
+from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
 from contextlib import suppress
 from time import monotonic
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import grpc
-import numpy.typing as npt
 
-from dynhull_proto.v1 import hull_service_pb2 as pb
-
-from .batch import encode_batch
-from .calls import Writing
-from .errors import DynhullError, error_of
-from .window import Window, settle
+from ._batch import encode_batch
+from ._calls import Writing, last_sequence
+from ._errors import DynhullError, error_of
+from ._window import Window, settle
+from ._writer import CLOSED
 
 if TYPE_CHECKING:
-    from .async_client import AsyncHullClient
-    from .messages import Applied
+    from collections.abc import AsyncIterator
+    from types import TracebackType
+
+    import numpy.typing as npt
+
+    from dynhull_proto.v1 import hull_service_pb2 as pb
+
+    from ._connection import AsyncConnection
+    from ._messages import Applied
 
 
 class AsyncWriter:
-    """`Writer` for asyncio: an async context manager for one use, whose `put` and `flush` are awaited."""
+    """`Writer` for asyncio: an async context manager for one use. Await `put`, `flush` and `close`."""
 
-    def __init__(self, client: "AsyncHullClient", writing: Writing) -> None:
-        self._client = client
+    def __init__(self, connection: AsyncConnection, writing: Writing) -> None:
+        self._connection = connection
         self._writing = writing
+        self._opening = asyncio.Lock()
         self._turn = asyncio.Condition()
         self._connections = 0
         self._closed = False
@@ -36,32 +42,36 @@ class AsyncWriter:
 
     @property
     def sequence(self) -> int:
-        """The number of the producer's last batch that was acknowledged."""
-        return self._opened().sequence
+        """The number of the producer's last acknowledged batch. RuntimeError before the writer has started."""
+        if self._window is None:
+            raise RuntimeError("the writer has not started: put points, or use it in an async with statement")
+        return self._window.sequence
 
     async def put(
         self,
         insert: npt.ArrayLike | None = None,
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
-    ) -> "asyncio.Future[Applied]":
-        """Add points to the next batch, all to the same one; waits where too many are under way.
+    ) -> asyncio.Future[Applied]:
+        """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
 
-        Returns the future of what the batch did. Arguments and errors as of `Writer.put`.
+        Returns the future of the batch's effect. Arguments and errors as for `Writer.put`.
         """
         batch = encode_batch(insert, delete, move, self._writing.missing)
-        window = self._opened()
+        window = await self._open()
         async with self._turn:
             await self._turn.wait_for(lambda: not window.full or window.failure or self._closed)
             if self._closed:
-                raise RuntimeError("the writer's context has been left")
+                raise RuntimeError(CLOSED)
             outcome = window.put(batch, monotonic())
             self._turn.notify_all()
         return outcome
 
     async def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
-        window = self._opened()
+        window = self._window
+        if window is None:
+            return
         async with self._turn:
             window.hurry(monotonic())
             self._turn.notify_all()
@@ -69,43 +79,54 @@ class AsyncWriter:
             await self._turn.wait_for(lambda: window.settled >= begun or window.failure or self._closed)
             window.raise_refusal()
 
+    async def close(self) -> None:
+        """Wait like `flush`, then end the writer. A second call does nothing."""
+        if self._closed:
+            return
+        try:
+            await self.flush()
+        finally:
+            await self._end()
+
     async def __aenter__(self) -> Self:
-        if self._window is not None:
-            raise RuntimeError("a writer is used once")
-        begin = await self._client.last_sequence(self._writing.name, self._writing.producer)
-        self._window = Window(self._writing, begin, asyncio.get_running_loop().create_future)
-        self._task = asyncio.create_task(self._run(), name=f"writer to {self._writing.name}")
+        await self._open()
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        try:
-            if error is None:
-                await self.flush()
-        finally:
-            await self._close()
+        if error is None:
+            await self.close()
+        else:
+            await self._end()
 
-    def _opened(self) -> Window["asyncio.Future[Applied]"]:
-        if self._window is None:
-            raise RuntimeError("use a writer as a context manager")
-        return self._window
+    def __repr__(self) -> str:
+        return f"<AsyncWriter to {self._writing.name!r} as producer {self._writing.producer!r}>"
 
-    async def _close(self) -> None:
-        async with self._turn:
+    async def _open(self) -> Window[asyncio.Future[Applied]]:
+        async with self._opening:
+            if self._closed:
+                raise RuntimeError(CLOSED)
+            if self._window is None:
+                begin = await self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
+                self._window = Window(self._writing, begin, asyncio.get_running_loop().create_future)
+                self._task = asyncio.create_task(self._run(self._window), name=f"writer to {self._writing.name}")
+            return self._window
+
+    async def _end(self) -> None:
+        async with self._opening, self._turn:
             self._closed = True
-            left = self._opened().abandon()
+            left = [] if self._window is None else self._window.abandon()
             self._turn.notify_all()
         for outcome in left:
             outcome.cancel()
-        assert self._task is not None  # there is one with the window
-        self._task.cancel()
-        with suppress(asyncio.CancelledError):
-            await self._task
+        if self._task is not None:
+            self._task.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._task
 
-    async def _run(self) -> None:
+    async def _run(self, window: Window[asyncio.Future[Applied]]) -> None:
         """One connection after another, until the writer is closed or has failed."""
-        window = self._opened()
         while True:
             lost = await self._connect(window)
             async with self._turn:
@@ -119,11 +140,11 @@ class AsyncWriter:
                 return
             await asyncio.sleep(pause)
 
-    async def _connect(self, window: Window["asyncio.Future[Applied]"]) -> DynhullError:
-        """Send batches and read acknowledgements; returns what ended the connection."""
+    async def _connect(self, window: Window[asyncio.Future[Applied]]) -> DynhullError:
+        """Send batches and read acknowledgements; returns the error that ended the connection."""
         requests = self._requests(window, self._connections)
         try:
-            call = self._client.begin(self._client.stub.Stream, requests, None)
+            call = self._connection.begin(self._connection.stub.Stream, requests, None)
         except DynhullError as error:
             return error
         try:
@@ -138,12 +159,12 @@ class AsyncWriter:
             return error_of(failure)
         finally:
             call.cancel()
-        return DynhullError("the server has ended the stream", await call.code(), "", {})
+        return DynhullError("the server ended the stream", await call.code(), "", {})
 
     async def _requests(
-        self, window: Window["asyncio.Future[Applied]"], connection: int
+        self, window: Window[asyncio.Future[Applied]], connection: int
     ) -> AsyncIterator[pb.StreamRequest]:
-        """What is to be sent on a connection."""
+        """The messages to send on a connection."""
         yield window.first()
         while True:
             async with self._turn:

@@ -1,23 +1,29 @@
-"""What hulls are for, asked of the server: calls as those in `calls`, and their answers."""
+"""Calls that put a hull to use, made as those in `calls`, and their answers."""
 
-from collections.abc import Iterable
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from dynhull._value import Value
 from dynhull.arrays import as_coordinate
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from .calls import Call, encoded
-from .messages import Measures, Points, decode_measures, decode_points
+from ._calls import Call, encoded
+from ._messages import Measures, Points, decode_measures, decode_points
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 Doubles = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Measured(Measures):
-    """All measures of a hull at one revision, as of `dynhull.DynamicHull`: of one without points 0 and NaN.
+    """All measures of a hull at one revision, as in `dynhull.DynamicHull`. Without points: lengths 0, coordinates NaN.
 
     `min_box` and `min_perimeter_box` are (4, 2) corners, counter-clockwise; `min_circle` is a centre and a radius.
     """
@@ -30,20 +36,20 @@ class Measured(Measures):
     revision: int
 
 
-@dataclass(frozen=True, slots=True)
-class Separation:
-    """How two hulls, each at one revision, lie to each other; lengths within 1e-12 of their size.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Separation(Value):
+    """The distance or overlap of two hulls, each at one revision. Lengths are within 1e-12 of the hulls' size.
 
     Attributes:
-        revision: the first hull's.
-        other_revision: the other's.
-        intersect: whether they have a point in common; touching counts. Exact.
-        distance: 0.0 where they intersect. The maximum margin between the two sets of points.
-        depth: how far one must move to part them; 0.0 where they do not overlap.
-        normal: unit vector from the first to the other. Where they overlap, moving the other so by `depth` parts them.
-            Where they merely touch, zero or the direction in which they part.
-        offset: points x with normal @ x = offset are halfway; less on the side of the first.
-        closest: (2, 2) the closest points, the first hull's and the other's; overlapping, the deepest ones.
+        revision: the revision of the first hull.
+        other_revision: the revision of the other hull.
+        intersect: whether they have a common point; touching counts. Exact.
+        distance: 0.0 if they intersect; otherwise also the maximum margin between the two sets of points.
+        depth: the length of the shortest move that separates them; 0.0 if they do not overlap.
+        normal: unit vector from the first hull to the other. If they overlap, moving the other hull along it by `depth`
+            separates them. If they only touch, it is zero or the direction in which they separate.
+        offset: the line normal @ x = offset is halfway between them; the value is less on the first hull's side.
+        closest: (2, 2) the closest point of each hull; if they overlap, the deepest point of each.
     """
 
     revision: int
@@ -56,17 +62,19 @@ class Separation:
     closest: Points
 
 
-@dataclass(frozen=True, slots=True)
-class Phases:
-    """A hull as a binary phase diagram, and what it says of k entries, as of `dynhull.envelope.PhaseDiagram`.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Phases(Value):
+    """A hull as a binary phase diagram, and its answers for k entries, as in `dynhull.envelope.PhaseDiagram`.
 
     Attributes:
-        revision: the hull's.
+        revision: the hull's revision.
         stable: (h, 2) stable entries, left to right.
-        energies_above_hull: (k,) how far each entry lies above the lower hull, negative for what would change it.
-        phases: (k, 2, 2) what each falls into: the stable entries on both sides; at a stable composition that one,
+        energies_above_hull: (k,) height of each entry above the lower hull; negative for an entry that would become
+            stable.
+        phases: (k, 2, 2) the two stable entries that each entry decomposes into; at a stable composition that entry
             twice.
-        shares: (k, 2) of each of them, in sum 1. NaN, as all answers, beyond the outermost stable entries.
+        shares: (k, 2) the share of each of the two; their sum is 1. NaN, as all answers, beyond the outermost stable
+            entries.
     """
 
     revision: int
@@ -76,17 +84,18 @@ class Phases:
     shares: Doubles
 
 
-@dataclass(frozen=True, slots=True)
-class Efficient:
-    """A hull as an efficient frontier, and what it says of others, as of `dynhull.envelope.Frontier`.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Efficient(Value):
+    """A hull as an efficient frontier, and its answers for k points and r rates, as in `dynhull.envelope.Frontier`.
 
     Attributes:
-        revision: the hull's.
+        revision: the hull's revision.
         efficient: (h, 2) corners of the frontier, from least risk to most return.
-        turning_rates: (h - 1,) rising risk-free rates: at turning_rates[i] the tangency moves from efficient[i] on.
-        dominated: (k,) whether the frontier offers something better than each of the points asked about.
-        tangencies: (r, 2) the point of most excess return per risk, for each of the rates asked about.
-        sharpe_ratios: (r,) its excess return per risk.
+        turning_rates: (h - 1,) ascending risk-free rates: at turning_rates[i] the tangency moves from efficient[i] to
+            efficient[i + 1].
+        dominated: (k,) whether the frontier offers something better than each point.
+        tangencies: (r, 2) the point with the highest excess return per risk, for each rate.
+        sharpe_ratios: (r,) the excess return per risk of that point.
     """
 
     revision: int
@@ -98,7 +107,7 @@ class Efficient:
 
 
 def get_measures(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Measured]:
-    """Every measure: those of `get_hull`, diameter, width, smallest boxes and smallest circle."""
+    """All measures: those of `get_hull`, and the diameter, width, smallest boxes and smallest circle."""
     request = pb.GetMeasuresRequest(name=name, min_revision=min_revision)
 
     def decode(response: pb.GetMeasuresResponse) -> Measured:
@@ -118,15 +127,15 @@ def get_measures(name: str, *, min_revision: int = 0, timeout: float | None = No
 def separate(
     name: str, other: str, *, min_revision: int = 0, other_min_revision: int = 0, timeout: float | None = None
 ) -> Call[Separation]:
-    """Whether two hulls intersect, how far apart they are and the line between them, or how deep they overlap.
+    """Whether two hulls intersect, their distance and the line between them, or the depth of their overlap.
 
-    A hull and itself are read once: it overlaps itself by its width. HullEmptyError where one of them has no points.
+    A hull overlaps itself by its width. HullEmptyError if one of them has no points.
 
     Args:
         name: the first hull.
-        other: the other.
+        other: the other hull.
         min_revision: a revision of the first hull to wait for.
-        other_min_revision: one of the other.
+        other_min_revision: a revision of the other hull to wait for.
         timeout: seconds, instead of the client's.
     """
     request = pb.SeparateRequest(
@@ -151,10 +160,10 @@ def separate(
 def phase_diagram(
     name: str, entries: npt.ArrayLike = (), *, min_revision: int = 0, timeout: float | None = None
 ) -> Call[Phases]:
-    """The hull as a binary phase diagram: the stable entries, and what (k, 2) entries fall into. Exact.
+    """The hull as a binary phase diagram: the stable entries, and the decomposition of (k, 2) entries. Exact.
 
-    Entries, the hull's points among them, are compositions, the share of the second element from 0 to 1, and energies.
-    HullUnsuitableError where the hull has a point of another composition.
+    An entry, like each point of the hull, is a composition, which is the share of the second element from 0 to 1, and
+    an energy. HullUnsuitableError if the hull has a point with another composition.
     """
     request = pb.PhaseDiagramRequest(name=name, min_revision=min_revision, entries=encoded(entries, "entries"))
 
@@ -178,14 +187,14 @@ def frontier(
     min_revision: int = 0,
     timeout: float | None = None,
 ) -> Call[Efficient]:
-    """The hull as an efficient frontier, its points being risk and return. Exact.
+    """The hull, whose points are risk and return, as an efficient frontier. Exact.
 
-    HullUnsuitableError where the hull has a point without positive risk, HullEmptyError for rates without points.
+    HullUnsuitableError if the hull has a point without positive risk; HullEmptyError for rates if it has no points.
 
     Args:
         name: the hull.
         points: (k, 2) risks and returns to compare with the frontier.
-        rates: (r,) risk-free rates to tell the tangencies of.
+        rates: (r,) risk-free rates whose tangencies to return.
         min_revision: a revision to wait for.
         timeout: seconds, instead of the client's.
     """

@@ -1,38 +1,44 @@
 """Many batches in one call."""
 
+from __future__ import annotations
+
 import threading
 from collections import deque
-from collections.abc import Iterator
-from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import grpc
-import numpy.typing as npt
 
-from dynhull_proto.v1 import hull_service_pb2 as pb
+from ._errors import error_of
+from ._messages import Ingested, decode_ingested
 
-from .calls import Ingesting
-from .connection import Connection
-from .errors import error_of
-from .messages import Ingested, decode_ingested
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import TracebackType
 
-# Batches handed over and not yet sent. A longer queue is no faster, and a stalled server must not fill the memory.
+    import numpy.typing as npt
+
+    from dynhull_proto.v1 import hull_service_pb2 as pb
+
+    from ._calls import Ingesting
+    from ._connection import BlockingConnection
+
+# Batches that wait to be sent. A longer queue is no faster, and a stalled server must not fill the memory.
 LONGEST_QUEUE = 16
 
 
 class Ingest:
-    """A stream of batches to one hull, applied in order, each its own revision. A context manager for one use.
+    """A stream of batches to one hull, applied in order, each as its own revision. A context manager for one use.
 
-    `apply` returns once the batch is on its way, and waits while the server is behind. Leaving the context waits until
-    all are applied. An error of the server is raised by the next `apply` or on leaving, whichever comes first; the
-    batches before the one at fault stay applied. Leaving with an exception of one's own cancels the call: of the
-    batches on their way some may be applied.
+    `apply` returns once the batch waits to be sent, and blocks while too many do. Leaving the context waits until all
+    batches are applied. The next `apply`, or leaving the context, raises an error of the server; the batches before the
+    one at fault stay applied. Leaving the context with an exception cancels the call: some of the batches that were
+    sent may be applied.
 
     Attributes:
-        summary: what was done, once the context has been left without an error.
+        summary: the effect of all batches; None until the context was left without an error.
     """
 
-    def __init__(self, connection: Connection, ingesting: Ingesting) -> None:
+    def __init__(self, connection: BlockingConnection, ingesting: Ingesting) -> None:
         self.summary: Ingested | None = None
         self._connection = connection
         self._ingesting = ingesting
@@ -43,7 +49,7 @@ class Ingest:
 
     def __enter__(self) -> Self:
         if self._call is not None:
-            raise RuntimeError("an Ingest is used once")
+            raise RuntimeError("an Ingest can be used once: open a new one")
         self._call = self._connection.begin(
             self._connection.stub.Ingest.future, self._requests(), self._ingesting.timeout
         )
@@ -54,7 +60,7 @@ class Ingest:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         if self._call is None:
-            raise RuntimeError("an Ingest is left that was not entered")
+            raise RuntimeError("this Ingest was not entered: use it in a with statement")
         if error is not None:
             self._call.cancel()
             return
@@ -70,13 +76,13 @@ class Ingest:
         """Send a batch; arguments as for `HullClient.apply`.
 
         Raises:
-            ValueError, TypeError: an argument is no array of finite points; nothing was sent.
-            DynhullError: the server has refused an earlier batch.
-            RuntimeError: the context has not been entered, or has been left.
+            ValueError, TypeError: an argument is not an array of finite points; nothing was sent.
+            DynhullError: the server refused an earlier batch.
+            RuntimeError: the context was not entered, or was left.
         """
         request = self._ingesting.batch(insert, delete, move)
         if self._call is None:
-            raise RuntimeError("use an Ingest as a context manager")
+            raise RuntimeError("an Ingest works only inside its context: write `with client.ingest(...) as stream:`")
         with self._turn:
             self._turn.wait_for(lambda: self._closed or len(self._queue) < LONGEST_QUEUE)
             if not self._closed:
@@ -84,10 +90,13 @@ class Ingest:
                 self._turn.notify_all()
                 return
         _result(self._call)
-        raise RuntimeError("the Ingest's context has been left")
+        raise RuntimeError("the context of this Ingest was left: open a new one")
+
+    def __repr__(self) -> str:
+        return f"<Ingest to {self._ingesting.name!r}>"
 
     def _requests(self) -> Iterator[pb.IngestRequest]:
-        """What is to be sent; runs in a thread of gRPC's."""
+        """The messages to send; runs in a thread of gRPC."""
         while True:
             with self._turn:
                 self._turn.wait_for(lambda: self._queue or self._closed)

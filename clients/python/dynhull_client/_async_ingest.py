@@ -1,0 +1,58 @@
+"""Many batches in one call, with asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Self
+
+from ._ingest import Ingest
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    import numpy.typing as npt
+
+    from ._calls import Ingesting
+    from ._connection import AsyncConnection
+    from ._messages import Ingested
+
+
+class AsyncIngest:
+    """`Ingest` for asyncio: an async context manager for one use. Await `apply`."""
+
+    # An Ingest in threads with its own connection: when the server refuses a batch while another one is being sent,
+    # grpc.aio may report an internal error instead of the refusal.
+
+    def __init__(self, connection: AsyncConnection, ingesting: Ingesting) -> None:
+        self._connection = connection.blocking()
+        self._name = ingesting.name
+        self._ingest = Ingest(self._connection, ingesting)
+
+    @property
+    def summary(self) -> Ingested | None:
+        """The effect of all batches; None until the context was left without an error."""
+        return self._ingest.summary
+
+    async def apply(
+        self,
+        insert: npt.ArrayLike | None = None,
+        delete: npt.ArrayLike | None = None,
+        move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+    ) -> None:
+        """Send a batch; arguments and errors as for `Ingest.apply`."""
+        await asyncio.to_thread(self._ingest.apply, insert, delete, move)
+
+    def __repr__(self) -> str:
+        return f"<AsyncIngest to {self._name!r}>"
+
+    async def __aenter__(self) -> Self:
+        await asyncio.to_thread(self._ingest.__enter__)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            await asyncio.to_thread(self._ingest.__exit__, kind, error, traceback)
+        finally:
+            self._connection.close()

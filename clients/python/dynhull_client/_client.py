@@ -1,0 +1,92 @@
+"""The synchronous client."""
+
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Concatenate, ParamSpec, Self, TypeVar
+
+from . import _calls as calls
+from . import _uses as uses
+from ._calls import Call
+from ._connection import BlockingConnection
+from ._ingest import Ingest
+from ._messages import HullInfo
+from ._methods import Client, answer_of, documented, opening
+from ._watch import Watch
+from ._writer import Writer
+
+P = ParamSpec("P")
+Result = TypeVar("Result")
+
+
+def _answering(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["HullClient", P], Result]:
+    """The method that makes a call and returns its answer."""
+
+    def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Result:
+        return self._connection.answer(describe(*arguments, **options))
+
+    documented(method, describe, answer_of(describe))
+    return method
+
+
+class HullClient(Client[BlockingConnection]):
+    """A client of a dynhull server. Threads may share it. A context manager, which closes it.
+
+    Every method raises a `DynhullError` if it fails: `UnavailableError` if no server answers, `DeadlineError` after the
+    timeout, `HullNotFoundError` if there is no such hull, `InvalidRequestError` if the server refuses a value. Arrays
+    that are not finite points raise ValueError or TypeError, as in `dynhull`, and nothing is sent.
+
+    Args:
+        address: host:port.
+        timeout: seconds a call may take unless the call has its own timeout; None for no limit. Ingests, writers and
+            watches have no limit by default.
+        wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.
+        token: the bearer token to send; only over an encrypted connection or to this machine.
+        tls: how to encrypt; None for no encryption. `grpc.ssl_channel_credentials()` trusts the certificate authorities
+            of this machine; it also takes a root certificate, and a client's key and certificate.
+        retries: how often a call that reached no server is repeated, after a growing pause. Only calls that are safe to
+            repeat are: reads, and batches with a producer and a sequence number.
+    """
+
+    _connect = BlockingConnection
+
+    create_hull = _answering(calls.create_hull)
+    wait_for_hull = _answering(calls.wait_for_hull)
+    delete_hull = _answering(calls.delete_hull)
+    apply = _answering(calls.apply)
+    last_sequence = _answering(calls.last_sequence)
+    locate = _answering(calls.locate)
+    count = _answering(calls.count)
+    support = _answering(calls.support)
+    tangents = _answering(calls.tangents)
+    distance = _answering(calls.distance)
+    intersect_lines = _answering(calls.intersect_lines)
+    get_hull = _answering(calls.get_hull)
+    sample_points = _answering(calls.sample_points)
+    verify = _answering(calls.verify)
+    get_measures = _answering(uses.get_measures)
+    separate = _answering(uses.separate)
+    phase_diagram = _answering(uses.phase_diagram)
+    frontier = _answering(uses.frontier)
+    ingest = opening(Ingest, calls.ingest)
+    watch = opening(Watch, calls.watch)
+    writer = opening(Writer, calls.writer)
+
+    def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[HullInfo]:
+        """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
+        following: str | None = ""
+        while following is not None:
+            hulls, token = self._connection.answer(calls.list_page(prefix, following, timeout))
+            yield from hulls
+            following = token or None
+
+    def close(self) -> None:
+        """Close the connection and end the calls on it."""
+        self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,129 @@
+"""A channel to a server, and calls on it."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any, ClassVar, TypeVar
+
+import grpc
+
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+from ._calls import Call
+from ._errors import DynhullError, error_of
+from ._retry import Attempts
+
+DEFAULT_ADDRESS = "127.0.0.1:50051"
+DEFAULT_TIMEOUT = 30.0
+DEFAULT_RETRIES = 3
+MAX_MESSAGE_BYTES = 2**31 - 1
+
+OPTIONS = [
+    # Only the server's limits apply.
+    ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
+    ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
+    # Finds a restarted server within a second; by default gRPC may take two minutes.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+]
+
+Result = TypeVar("Result")
+
+
+class Connection:
+    """A channel with what every call on it needs. Arguments as for `HullClient`.
+
+    Attributes:
+        address: host:port.
+        stub: the generated stub.
+        blocking: makes a BlockingConnection with the same arguments, for use in threads.
+    """
+
+    _grpc: ClassVar[Any]
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        timeout: float | None,
+        wait_for_ready: bool,
+        token: str | None,
+        tls: grpc.ChannelCredentials | None,
+        retries: int,
+    ) -> None:
+        self.address = address
+        self.blocking = partial(
+            BlockingConnection,
+            address,
+            timeout=timeout,
+            wait_for_ready=wait_for_ready,
+            token=token,
+            tls=tls,
+            retries=retries,
+        )
+        self._timeout = timeout
+        self._retries = retries
+        self._wait_for_ready = wait_for_ready
+        self._closed = False
+        # Call credentials would do the same, but gRPC sends them over TLS only, which a local server does not need.
+        self._metadata = () if token is None else (("authorization", f"Bearer {token}"),)
+        if tls is None:
+            self._channel = self._grpc.insecure_channel(address, OPTIONS)
+        else:
+            self._channel = self._grpc.secure_channel(address, tls, OPTIONS)
+        self.stub: Any = HullServiceStub(self._channel)
+
+    def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
+        """Begin a call: a method of the stub with a message, or with an iterator of messages."""
+        if self._closed:
+            raise DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
+        return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
+
+    def _begin(self, call: Call[Any], attempts: Attempts) -> Any:
+        return self.begin(getattr(self.stub, call.method), call.request, attempts.timeout())
+
+    def _attempts(self, call: Call[Any]) -> Attempts:
+        return Attempts(call, self._timeout if call.timeout is None else call.timeout, self._retries)
+
+
+class BlockingConnection(Connection):
+    """A connection whose calls block the thread. Threads may share it."""
+
+    _grpc: ClassVar[Any] = grpc
+
+    def answer(self, call: Call[Result]) -> Result:
+        """Make a call, again if it may be repeated, and return its answer."""
+        attempts = self._attempts(call)
+        while True:
+            try:
+                return call.decode(self._begin(call, attempts))
+            except grpc.RpcError as failure:
+                call, pause = attempts.after(call, error_of(failure))
+            time.sleep(pause)
+
+    def close(self) -> None:
+        """End the connection and the calls on it."""
+        self._closed = True
+        self._channel.close()
+
+
+class AsyncConnection(Connection):
+    """A connection of one event loop."""
+
+    _grpc: ClassVar[Any] = grpc.aio
+
+    async def answer(self, call: Call[Result]) -> Result:
+        """Make a call, again if it may be repeated, and return its answer."""
+        attempts = self._attempts(call)
+        while True:
+            try:
+                return call.decode(await self._begin(call, attempts))
+            except grpc.RpcError as failure:
+                call, pause = attempts.after(call, error_of(failure))
+            await asyncio.sleep(pause)
+
+    async def close(self) -> None:
+        """End the connection and the calls on it."""
+        self._closed = True
+        await self._channel.close()

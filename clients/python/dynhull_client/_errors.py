@@ -1,0 +1,160 @@
+"""The errors a call may end with, one class for each cause."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import grpc
+from google.rpc.error_details_pb2 import ErrorInfo
+from grpc_status import rpc_status
+
+DOMAIN = "dynhull.v1"
+
+
+class DynhullError(Exception):
+    """A call failed. A reason that this version of the client does not know is an error of this class itself.
+
+    Attributes:
+        code: the gRPC status code.
+        reason: the server's machine-readable reason, such as "POINT_MISSING"; empty if the server gave none.
+        metadata: what else the server reports, as text.
+        field: the field of the request at fault; None if no single field is.
+        row: the row of that field at fault; None if no single row is.
+        value: the value at fault as text, or the limit that was exceeded; None if there is none.
+        expected: after a gap in a producer's numbers, the next number.
+        oldest: after a forgotten revision, the oldest revision the server remembers.
+        batch: for an ingest, the number of batches applied before the error; None for other calls.
+    """
+
+    def __init__(self, message: str, code: grpc.StatusCode, reason: str, metadata: Mapping[str, str]) -> None:
+        super().__init__(message)
+        self.code = code
+        self.reason = reason
+        self.metadata = MappingProxyType(dict(metadata))
+        self.field = metadata.get("field")
+        self.row = _number(metadata.get("row"))
+        self.value = metadata.get("value")
+        self.expected = _number(metadata.get("expected"))
+        self.oldest = _number(metadata.get("oldest"))
+        self.batch = _number(metadata.get("batch"))
+
+
+class InvalidRequestError(DynhullError, ValueError):
+    """A field of the request has a value that is not allowed; nothing has changed."""
+
+
+class HullNotFoundError(DynhullError, LookupError):
+    """There is no hull of that name."""
+
+
+class HullExistsError(DynhullError):
+    """There is already a hull of that name."""
+
+
+class PointMissingError(DynhullError, LookupError):
+    """A batch deletes a point that is not in the hull; nothing of the batch was applied."""
+
+
+class LimitExceededError(DynhullError):
+    """The request exceeds a limit of the server, such as the size of a message."""
+
+
+class SequenceGapError(DynhullError):
+    """A numbered batch arrived before its predecessors; `expected` is the next number."""
+
+
+class ProducerInUseError(DynhullError):
+    """A writer's batch had been applied before it was sent: another writer uses the same producer name."""
+
+
+class HullEmptyError(DynhullError, ValueError):
+    """The query has no answer for a hull without points."""
+
+
+class HullUnsuitableError(DynhullError, ValueError):
+    """The query has no answer for a hull with the point that the message names."""
+
+
+class RevisionForgottenError(DynhullError, LookupError):
+    """A watch cannot resume from that revision: start it again. `oldest` is the oldest revision it can resume from."""
+
+
+class HullReplacedError(RevisionForgottenError):
+    """A watch cannot resume: the hull was deleted, and another one has its name now."""
+
+
+class UnauthenticatedError(DynhullError):
+    """The server requires a token and received none, or one that it does not know."""
+
+
+class PermissionDeniedError(DynhullError, PermissionError):
+    """The token does not allow the call."""
+
+
+class UnavailableError(DynhullError, ConnectionError):
+    """No server answers at the address, or it is starting or shutting down."""
+
+
+class OutcomeUnknownError(DynhullError):
+    """The server's disk failed during the batch, which may or may not have been applied.
+
+    A Writer resolves this itself. Otherwise read the producer's last sequence number, or the hull, before you send the
+    batch again.
+    """
+
+
+class DeadlineError(DynhullError, TimeoutError):
+    """The call took longer than its timeout."""
+
+
+BY_REASON: Mapping[str, type[DynhullError]] = {
+    "DISK_FULL": LimitExceededError,
+    "DRAINING": UnavailableError,
+    "HULL_EMPTY": HullEmptyError,
+    "HULL_EXISTS": HullExistsError,
+    "HULL_NOT_FOUND": HullNotFoundError,
+    "HULL_REPLACED": HullReplacedError,
+    "HULL_UNSUITABLE": HullUnsuitableError,
+    "INVALID_FIELD": InvalidRequestError,
+    "LIMIT_EXCEEDED": LimitExceededError,
+    "MALFORMED_MESSAGE": InvalidRequestError,
+    "OUTCOME_UNKNOWN": OutcomeUnknownError,
+    "PERMISSION_DENIED": PermissionDeniedError,
+    "POINT_MISSING": PointMissingError,
+    "REVISION_FORGOTTEN": RevisionForgottenError,
+    "SEQUENCE_GAP": SequenceGapError,
+    "STARTING": UnavailableError,
+    "STORAGE_FAILED": UnavailableError,
+    "UNAUTHENTICATED": UnauthenticatedError,
+}
+
+# What gRPC itself and proxies answer, without a reason. The server gives a reason with every refusal.
+BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
+    grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineError,
+    grpc.StatusCode.PERMISSION_DENIED: PermissionDeniedError,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceededError,
+    grpc.StatusCode.UNAUTHENTICATED: UnauthenticatedError,
+    grpc.StatusCode.UNAVAILABLE: UnavailableError,
+}
+
+
+def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
+    """The error that a finished call ended with."""
+    code, message = call.code(), call.details()
+    info = _error_info(call)
+    if info.reason:
+        return BY_REASON.get(info.reason, DynhullError)(message or code.name, code, info.reason, info.metadata)
+    return BY_CODE.get(code, DynhullError)(message or code.name, code, "", {})
+
+
+def _error_info(call: grpc.Call | grpc.RpcError) -> ErrorInfo:
+    """The server's reason; without one where something else answered."""
+    status = rpc_status.from_call(call)
+    for detail in [] if status is None else status.details:
+        info = ErrorInfo()
+        if detail.Unpack(info) and info.domain == DOMAIN:
+            return info
+    return ErrorInfo()
+
+
+def _number(text: str | None) -> int | None:
+    return int(text) if text is not None and text.isdecimal() else None

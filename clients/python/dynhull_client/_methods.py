@@ -1,0 +1,88 @@
+"""What the methods of both clients have in common: they are made of the functions in `calls` and `uses`."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
+
+import grpc
+
+from ._connection import DEFAULT_ADDRESS, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
+
+P = ParamSpec("P")
+Description = TypeVar("Description")
+Stream = TypeVar("Stream")
+AnyConnection = TypeVar("AnyConnection", bound=Connection)
+
+Function = Callable[..., Any]
+
+
+class Client(Generic[AnyConnection]):
+    """What `HullClient` and `AsyncHullClient` have in common."""
+
+    _connect: type[AnyConnection]
+
+    def __init__(
+        self,
+        address: str = DEFAULT_ADDRESS,
+        *,
+        timeout: float | None = DEFAULT_TIMEOUT,
+        wait_for_ready: bool = False,
+        token: str | None = None,
+        tls: grpc.ChannelCredentials | None = None,
+        retries: int = DEFAULT_RETRIES,
+    ) -> None:
+        self._connection = self._connect(
+            address, timeout=timeout, wait_for_ready=wait_for_ready, token=token, tls=tls, retries=retries
+        )
+
+    @property
+    def address(self) -> str:
+        """The server's host:port."""
+        return self._connection.address
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.address!r})"
+
+
+class Annotation(str):
+    """The source of an annotation, which a signature shows without quotes."""
+
+    __slots__ = ()
+    __repr__ = str.__str__
+
+
+def documented(method: Function, describe: Function, returns: str) -> None:
+    """Give a method the name, documentation and parameters of the function that describes its call.
+
+    Annotations are shown as the source has them: numpy's ArrayLike alone fills five lines otherwise.
+    """
+    described = inspect.signature(describe)
+    this = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
+    parameters = [
+        parameter.replace(annotation=Annotation(parameter.annotation.replace("npt.", "")))
+        for parameter in described.parameters.values()
+        if parameter.kind != inspect.Parameter.VAR_POSITIONAL  # takes nothing: see `calls.apply`
+    ]
+    method.__name__ = method.__qualname__ = describe.__name__
+    method.__doc__ = describe.__doc__
+    method.__signature__ = described.replace(  # type: ignore[attr-defined]
+        parameters=[this, *parameters], return_annotation=Annotation(returns)
+    )
+
+
+def answer_of(describe: Function) -> str:
+    """The source of the answer's type: that of a description is `Call[answer]`."""
+    annotation: str = describe.__annotations__["return"]
+    return annotation.removeprefix("Call[").removesuffix("]")
+
+
+def opening(
+    kind: Callable[[AnyConnection, Description], Stream], describe: Callable[P, Description]
+) -> Callable[Concatenate[Client[AnyConnection], P], Stream]:
+    """The method that opens a stream of the given kind."""
+
+    def method(self: Client[AnyConnection], /, *arguments: P.args, **options: P.kwargs) -> Stream:
+        return kind(self._connection, describe(*arguments, **options))
+
+    documented(method, describe, kind.__name__)
+    return method

@@ -1,0 +1,74 @@
+"""When to repeat a call, and after which pause."""
+
+import random
+from collections.abc import Iterator
+from time import monotonic
+from typing import TypeVar
+
+import grpc
+
+from ._calls import Call
+from ._errors import DeadlineError, DynhullError, HullNotFoundError, OutcomeUnknownError
+
+FIRST_PAUSE = 0.1
+LONGEST_PAUSE = 5.0
+# A hull that is awaited is asked for this often: a missing hull costs the server little.
+LONGEST_PAUSE_FOR_A_HULL = 1.0
+
+Answer = TypeVar("Answer")
+
+
+def passes(error: DynhullError) -> bool:
+    """Whether the call may succeed later, once the server can be reached or can read its disk.
+
+    Decided by the code for UNAVAILABLE, which means this in every gRPC service, whatever the reason.
+    """
+    return error.code == grpc.StatusCode.UNAVAILABLE or isinstance(error, OutcomeUnknownError)
+
+
+def pauses(longest: float = LONGEST_PAUSE) -> Iterator[float]:
+    """Seconds before each new attempt: doubled each time up to `longest`, less a random part.
+
+    The random part keeps clients that lost the same server from reconnecting at the same moment (Brooker,
+    "Exponential Backoff and Jitter", 2015).
+    """
+    pause = FIRST_PAUSE
+    while True:
+        yield pause * random.uniform(0.5, 1)  # noqa: S311  # no secret
+        pause = min(2 * pause, longest)
+
+
+def seconds_until(deadline: float | None) -> float | None:
+    """Seconds left until a time of the monotonic clock; None for no deadline."""
+    return None if deadline is None else max(0.0, deadline - monotonic())
+
+
+class Attempts:
+    """The attempts at one call, which share its timeout."""
+
+    def __init__(self, call: Call[Answer], timeout: float | None, retries: int) -> None:
+        self._timeout = timeout
+        self._deadline = None if timeout is None else monotonic() + timeout
+        self._pauses = pauses(LONGEST_PAUSE_FOR_A_HULL if call.awaits_hull else LONGEST_PAUSE)
+        self._left = retries if call.repeatable else 0
+
+    def timeout(self) -> float | None:
+        """Seconds left."""
+        return seconds_until(self._deadline)
+
+    def after(self, call: Call[Answer], error: DynhullError) -> tuple[Call[Answer], float]:
+        """The next call to make after an error, and the seconds until then; raises the error if there is none."""
+        instead = call.instead(error)
+        if instead is not None:
+            return instead, 0.0
+        pause, left = next(self._pauses), self.timeout()
+        late = left is not None and left <= pause
+        if call.awaits_hull and (passes(error) or isinstance(error, HullNotFoundError)):
+            if late:
+                message = f"not within {self._timeout:g} s: {error}"
+                raise DeadlineError(message, grpc.StatusCode.DEADLINE_EXCEEDED, "", {}) from error
+            return call, pause
+        self._left -= 1
+        if self._left < 0 or late or not passes(error):
+            raise error from None
+        return call, pause

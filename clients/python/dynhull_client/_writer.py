@@ -1,0 +1,203 @@
+"""Sends points to a hull in numbered batches, each applied exactly once."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future
+from time import monotonic
+from typing import TYPE_CHECKING, Any, Self
+
+import grpc
+
+from ._batch import encode_batch
+from ._calls import Writing, last_sequence
+from ._errors import DynhullError, error_of
+from ._window import Window, settle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import TracebackType
+
+    import numpy.typing as npt
+
+    from dynhull_proto.v1 import hull_service_pb2 as pb
+
+    from ._connection import BlockingConnection
+    from ._messages import Applied
+
+
+CLOSED = "the writer is closed: open a new one"
+
+
+class Writer:
+    """Gathers points into batches, sends several ahead, and sends them again after the connection or the server failed.
+
+    A context manager for one use: leaving it closes the writer; leaving it with an exception drops what is not
+    acknowledged. Outside a with statement, call `close`. The first `put`, or entering the context, asks the server for
+    the producer's last batch.
+
+    The futures of all points of a refused batch carry its error. The next `flush` or `close` also raises the first such
+    error. Threads may share a writer.
+    """
+
+    def __init__(self, connection: BlockingConnection, writing: Writing) -> None:
+        self._connection = connection
+        self._writing = writing
+        self._opening = threading.Lock()
+        self._turn = threading.Condition()
+        self._connections = 0
+        self._closed = False
+        self._call: Any = None
+        self._window: Window[Future[Applied]] | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def sequence(self) -> int:
+        """The number of the producer's last acknowledged batch. RuntimeError before the writer has started."""
+        if self._window is None:
+            raise RuntimeError("the writer has not started: put points, or use it in a with statement")
+        return self._window.sequence
+
+    def put(
+        self,
+        insert: npt.ArrayLike | None = None,
+        delete: npt.ArrayLike | None = None,
+        move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+    ) -> Future[Applied]:
+        """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
+
+        Returns:
+            The effect of the batch once it is acknowledged, or the error of a refused batch. Several calls may share a
+            batch: its counts, and the row in its error, refer to all of them. A callback must not put.
+
+        Raises:
+            ValueError, TypeError: an argument is not an array of finite points; nothing was added.
+            DynhullError: the writer has ended: nothing after its error was applied.
+            RuntimeError: the writer is closed.
+        """
+        batch = encode_batch(insert, delete, move, self._writing.missing)
+        window = self._open()
+        with self._turn:
+            self._turn.wait_for(lambda: not window.full or window.failure or self._closed)
+            if self._closed:
+                raise RuntimeError(CLOSED)
+            outcome = window.put(batch, monotonic())
+            self._turn.notify_all()
+        return outcome
+
+    def flush(self) -> None:
+        """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
+        window = self._window
+        if window is None:
+            return
+        with self._turn:
+            window.hurry(monotonic())
+            self._turn.notify_all()
+            begun = window.begun
+            self._turn.wait_for(lambda: window.settled >= begun or window.failure or self._closed)
+            window.raise_refusal()
+
+    def close(self) -> None:
+        """Wait like `flush`, then end the writer. A second call does nothing."""
+        if self._closed:
+            return
+        try:
+            self.flush()
+        finally:
+            self._end()
+
+    def __enter__(self) -> Self:
+        self._open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self._end()
+
+    def __repr__(self) -> str:
+        return f"<Writer to {self._writing.name!r} as producer {self._writing.producer!r}>"
+
+    def _open(self) -> Window[Future[Applied]]:
+        with self._opening:
+            if self._closed:
+                raise RuntimeError(CLOSED)
+            if self._window is None:
+                begin = self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
+                self._window = Window(self._writing, begin, _new_outcome)
+                name = f"writer to {self._writing.name}"
+                self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
+                self._thread.start()
+            return self._window
+
+    def _end(self) -> None:
+        with self._opening, self._turn:
+            self._closed = True
+            left = [] if self._window is None else self._window.abandon()
+            self._turn.notify_all()
+            if self._call is not None:
+                self._call.cancel()
+        for outcome in left:
+            outcome.cancel()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self, window: Window[Future[Applied]]) -> None:
+        """One connection after another, until the writer is closed or has failed."""
+        while True:
+            lost = self._connect(window)
+            with self._turn:
+                if self._closed or window.failure:
+                    return
+                self._connections += 1
+                settled, pause = window.lost(lost, monotonic())
+                self._turn.notify_all()
+            settle(settled)
+            if pause is None:
+                return
+            with self._turn:
+                if self._turn.wait_for(lambda: self._closed, pause):
+                    return
+
+    def _connect(self, window: Window[Future[Applied]]) -> DynhullError:
+        """Send batches and read acknowledgements; returns the error that ended the connection."""
+        requests = self._requests(window, self._connections)
+        try:
+            with self._turn:
+                self._call = call = self._connection.begin(self._connection.stub.Stream, requests, None)
+                if self._closed:
+                    call.cancel()
+            for response in call:
+                with self._turn:
+                    settled = window.acknowledge(response)
+                    self._turn.notify_all()
+                settle(settled)
+                if window.failure:
+                    call.cancel()
+        except DynhullError as error:
+            return error
+        except grpc.RpcError as failure:
+            return error_of(failure)
+        return DynhullError("the server ended the stream", call.code(), "", {})
+
+    def _requests(self, window: Window[Future[Applied]], connection: int) -> Iterator[pb.StreamRequest]:
+        """The messages to send on a connection; runs in a thread of gRPC."""
+        yield window.first()
+        while True:
+            with self._turn:
+                request = None
+                while request is None:
+                    if self._closed or window.failure or self._connections != connection:
+                        return
+                    request = window.take(monotonic())
+                    if request is None:
+                        self._turn.wait(window.due_in(monotonic()))
+                self._turn.notify_all()
+            yield request
+
+
+def _new_outcome() -> Future[Applied]:
+    return Future()

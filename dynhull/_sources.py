@@ -1,0 +1,135 @@
+"""Points from GeoJSON, geometries of other libraries and data frames. Imports none of these libraries."""
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+COLUMN_NAMES = (
+    ("x", "y"),
+    ("lon", "lat"),
+    ("lng", "lat"),
+    ("long", "lat"),
+    ("longitude", "latitude"),
+    ("easting", "northing"),
+)
+LARGEST_EXACT_INTEGER = 2**53
+SHAPELY_POINT = 0
+
+
+def coordinates_of(source: Any, name: str) -> Any:
+    """The (n, 2) coordinates in a source of points; any other object unchanged.
+
+    * an object with `__geo_interface__`, such as shapely's geometries, or GeoJSON as a dictionary: every vertex once
+    * a list, array or GeoSeries of such objects, or a GeoDataFrame
+    * a frame (pandas, polars, pyarrow): its two columns with names such as x and y, or lon and lat, in any order; the
+      two columns of a frame that has no others
+
+    Raises:
+        ValueError: a geometry is missing or empty, or a frame has no or several such pairs of columns.
+    """
+    if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.ndim):
+        return _of_geometries(source, name) if len(source) and _is_geometry(source[0]) else source
+    series: Any = getattr(source, "geometry", None) if _is_geometry(source) else None
+    if hasattr(series, "to_numpy"):  # of a GeoSeries or a GeoDataFrame
+        return _of_geometries(series.to_numpy(), name)
+    if hasattr(source, "columns"):
+        return _of_frame(source, name)
+    return list(_positions(_geojson(source), name)) if _is_geometry(source) else source
+
+
+def _is_geometry(value: Any) -> bool:
+    """Whether it is GeoJSON or makes some. Asks the class: a large GeoSeries takes a minute to make its GeoJSON."""
+    return hasattr(type(value), "__geo_interface__") or (isinstance(value, Mapping) and "type" in value)
+
+
+def _geojson(value: Any) -> Mapping[str, Any]:
+    geojson: Mapping[str, Any] = value if isinstance(value, Mapping) else value.__geo_interface__
+    return geojson
+
+
+def _of_geometries(geometries: Sequence[Any] | npt.NDArray[Any], name: str) -> Any:
+    shapely = sys.modules.get("shapely")
+    if shapely is not None:
+        array = np.empty(len(geometries), np.object_)
+        array[:] = geometries
+        if shapely.is_geometry(array).all() and (shapely.get_type_id(array) == SHAPELY_POINT).all():
+            empty = np.flatnonzero(shapely.is_empty(array))
+            if empty.size:
+                raise ValueError(f"{name} row {empty[0]} is an empty Point: it has no coordinates")
+            return shapely.get_coordinates(array)
+    found: list[Sequence[float]] = []
+    for row, geometry in enumerate(geometries):
+        if not _is_geometry(geometry):
+            raise ValueError(f"{name} row {row} is {geometry!r}: must be a geometry, as row 0 is")
+        found.extend(_positions(_geojson(geometry), f"{name} row {row}"))
+    return found
+
+
+def _positions(geojson: Mapping[str, Any], name: str) -> Iterator[Sequence[float]]:
+    """Every vertex once: rings repeat their first one at the end."""
+    kind = geojson.get("type")
+    coordinates: Any = geojson.get("coordinates")
+    match kind:
+        case "FeatureCollection":
+            for row, feature in enumerate(geojson["features"]):
+                yield from _positions(feature, f"{name} row {row}")
+        case "Feature" if geojson["geometry"] is None:
+            raise ValueError(f"{name} is a Feature without geometry: leave it out")
+        case "Feature":
+            yield from _positions(geojson["geometry"], name)
+        case "GeometryCollection":
+            for geometry in geojson["geometries"]:
+                yield from _positions(geometry, name)
+        case "Point" if not coordinates:
+            raise ValueError(f"{name} is an empty Point: it has no coordinates")
+        case "Point":
+            yield coordinates[:2]
+        case "MultiPoint" | "LineString":
+            yield from _plane(coordinates)
+        case "MultiLineString":
+            for line in coordinates:
+                yield from _plane(line)
+        case "LinearRing":
+            yield from _plane(coordinates[:-1])
+        case "Polygon":
+            for ring in coordinates:
+                yield from _plane(ring[:-1])
+        case "MultiPolygon":
+            for polygon in coordinates:
+                for ring in polygon:
+                    yield from _plane(ring[:-1])
+        case _:
+            raise ValueError(f"{name} is of the type {kind!r}: not a GeoJSON geometry")
+
+
+def _plane(positions: Iterable[Sequence[float]]) -> Iterator[Sequence[float]]:
+    return (position[:2] for position in positions)  # a third number is a height
+
+
+def _of_frame(frame: Any, name: str) -> npt.NDArray[Any]:
+    columns = list(getattr(frame, "column_names", frame.columns))
+    lower = [str(column).lower() for column in columns]
+    pairs = [pair for pair in COLUMN_NAMES if all(lower.count(each) == 1 for each in pair)]
+    if len(pairs) == 1:
+        chosen = [columns[lower.index(each)] for each in pairs[0]]
+    elif len(columns) == 2:
+        chosen = columns
+    else:
+        listed = ", ".join(map(str, columns))
+        example = [str(column) for column in columns[:2]]
+        raise ValueError(f"{name} has the columns {listed}: choose two, x first, as in frame[{example}]")
+    x, y = (_exact(np.asarray(frame[column])) for column in chosen)
+    if x.dtype != y.dtype:  # numpy would round large integers to join them with floats
+        x, y = x.astype(np.object_), y.astype(np.object_)
+    return np.column_stack((x, y))
+
+
+def _exact(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Integers as doubles if that changes none of them."""
+    if column.dtype.kind not in "iu" or not column.size:
+        return column
+    exact = int(column.min()) >= -LARGEST_EXACT_INTEGER and int(column.max()) <= LARGEST_EXACT_INTEGER
+    return column.astype(np.float64) if exact else column

@@ -1,0 +1,33 @@
+"""The notebooks of the documentation: run again, they give the results they show.
+
+After a change, `jupyter execute --inplace docs/notebooks/*.ipynb`, with a server running, stores the new results.
+"""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs/notebooks").glob("*.ipynb"))
+RICHEST_FIRST = ("text/html", "image/svg+xml", "text/plain")
+
+
+def results(notebook: nbformat.NotebookNode) -> Iterator[str]:
+    """What a reader sees below each cell."""
+    for cell in notebook.cells:
+        for output in cell.get("outputs", []):
+            data = output.get("data", {"text/plain": output.get("text")})
+            yield next(data[kind] for kind in RICHEST_FIRST if kind in data)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_gives_the_results_it_shows(path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(os.environ, "DYNHULL_ADDRESS", address)
+    shown = nbformat.read(path, as_version=4)
+    run = nbformat.read(path, as_version=4)
+    NotebookClient(run, timeout=60).execute()
+    assert list(results(run)) == list(results(shown))
+    assert any("<svg" in result for result in results(shown))
