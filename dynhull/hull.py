@@ -320,7 +320,3 @@ class DynamicHull:
     def check(self) -> None:
         """Raise AssertionError where an invariant of the tree is broken. O(n log n); for tests and bug reports."""
         self._tree.check()
-
-
-if kernel is not None:
-    kernel.take_over(DynamicHull)

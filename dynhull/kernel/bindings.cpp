@@ -9,7 +9,6 @@
 #include "chan.hpp"
 #include "check.hpp"
 #include "lock.hpp"
-#include "one_point.hpp"
 #include "static_hull.hpp"
 
 namespace nb = nanobind;
@@ -382,12 +381,6 @@ Point point_of(nb::handle pair) {
   return p;
 }
 
-void take_over(nb::handle dynamic_hull) {
-  OnePoint<&Hull::count>::replace(dynamic_hull, "count");
-  OnePoint<&Hull::insert>::replace(dynamic_hull, "insert");
-  OnePoint<&Hull::remove>::replace(dynamic_hull, "delete");
-}
-
 }  // namespace
 }  // namespace dynhull
 
@@ -470,7 +463,6 @@ NB_MODULE(_kernel, module) {
              "The same by Chan's algorithm, and its rounds: guess, groups, steps, closed. O(n log h).");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` for each row of three arrays.");
 
-  module.def("take_over", &take_over, "dynamic_hull"_a, "Put methods of the kernel's in the place of the class's own.");
   module.def("_before_fork", &Turns::before_fork);
   module.def("_after_fork_in_parent", &Turns::after_fork_in_parent);
   module.def("_after_fork_in_child", &Turns::after_fork_in_child);
