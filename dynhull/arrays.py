@@ -241,8 +241,7 @@ def _as_double_scalar(value: Any, name: str) -> float:
 def plain_points(xy: npt.NDArray[Any]) -> Points | None:
     """What `as_points` makes of an (n, 2) array of finite doubles; None of anything else."""
     if kernel is not None:
-        points: Points | None = kernel.plain_points(xy)
-        return points
+        return kernel.plain_points(xy)
     if xy.dtype != np.float64 or xy.ndim != 2 or xy.shape[1] != 2:
         return None
     copy = _copy(xy)
@@ -252,8 +251,7 @@ def plain_points(xy: npt.NDArray[Any]) -> Points | None:
 def packed_points(packed: bytes) -> Points | None:
     """The points whose coordinates are these little-endian doubles; None where one is not finite."""
     if kernel is not None and sys.byteorder == "little":
-        points: Points | None = kernel.packed_points(packed)
-        return points
+        return kernel.packed_points(packed)
     return plain_points(np.frombuffer(packed, "<f8").astype(np.float64, copy=False).reshape(-1, 2))
 
 

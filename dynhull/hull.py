@@ -1,7 +1,7 @@
 """DynamicHull: the public face of a hull tree. Checks arguments, speaks numpy."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,9 @@ from .arrays import Points, as_coordinate, as_directions, as_operations, as_pair
 from .implementation import kernel
 from .nodes import LOWER, UPPER
 from .tree import HullTree
+
+if TYPE_CHECKING:
+    from . import _kernel
 
 T = TypeVar("T")
 
@@ -57,7 +60,7 @@ class DynamicHull:
     __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
     dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
-    _tree_type: ClassVar[type[HullTree]] = HullTree if kernel is None else kernel.HullTree
+    _tree_type: ClassVar["type[HullTree | _kernel.HullTree]"] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
         self._tree = self._tree_type(points)

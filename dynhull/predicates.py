@@ -157,9 +157,8 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
         return orientation(one, two, three)
     p, q, r = np.broadcast_arrays(*pairs)
     if kernel is not None:
-        rows = (np.ascontiguousarray(pair).reshape(-1, 2) for pair in (p, q, r))
-        signs: Signs = kernel.orientations(*rows)
-        return signs.reshape(p.shape[:-1])
+        flat = [np.ascontiguousarray(pair).reshape(-1, 2) for pair in (p, q, r)]
+        return kernel.orientations(*flat).reshape(p.shape[:-1])
     return _orientations(p, q, r)
 
 

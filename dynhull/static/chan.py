@@ -70,7 +70,6 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
 
 def _by_kernel(points: Points, collinear: Collinear, trace: Trace | None) -> Points:
     assert kernel is not None
-    hull: Points
     hull, rounds = kernel.chan(points)
     if trace is not None:
         trace += [

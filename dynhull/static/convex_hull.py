@@ -32,5 +32,8 @@ def convex_hull(xy: npt.ArrayLike) -> Points:
         return monotone_chain(xy)
     # The kernel finds coordinates that are not finite while it works. The check says which.
     pairs = as_pairs(xy)
-    hull: Points | None = kernel.convex_hull(pairs)
-    return kernel.convex_hull(as_points(pairs)) if hull is None else hull
+    hull = kernel.convex_hull(pairs)
+    if hull is None:
+        hull = kernel.convex_hull(as_points(pairs))
+        assert hull is not None
+    return hull

@@ -8,15 +8,16 @@
 // root exactly when the hull changed.
 #pragma once
 
-#include "build.hpp"
+#include "../tree/build.hpp"
+#include "../tree/update.hpp"
 #include "plan.hpp"
 
 namespace dynhull {
 
-class Commit {
+class DividedBatch {
  public:
   // Needs room in nodes for the plan's extra leaves. All other memory is taken here; apply() cannot fail.
-  Commit(Nodes& nodes, const Plan& plan)
+  DividedBatch(Nodes& nodes, const Plan& plan)
       : nodes_(nodes), changes_(plan.changes().data()), count_(plan.changes().size()) {
     for (Side side : SIDES) candidates_[side].resize(count_);
     if (count_ > FEW) {

@@ -16,7 +16,7 @@ namespace dynhull {
 
 constexpr std::size_t FEW_ROWS = 64, ALL_ROWS = std::numeric_limits<std::size_t>::max();
 
-class Turns {
+class ReadWriteLock {
  public:
   // Wait until nobody writes, or until nobody reads or writes.
   void await_readable() {
@@ -43,8 +43,8 @@ class Turns {
   }
 
  private:
-  friend class Reading;
-  friend class Writing;
+  friend class ReadLock;
+  friend class WriteLock;
 
   struct Signal {
     std::mutex mutex;
@@ -95,46 +95,46 @@ class Turns {
 };
 
 // A batch that reads, with the GIL let go of.
-class Reading {
+class ReadLock {
  public:
-  explicit Reading(Turns& turns, std::size_t rows = ALL_ROWS) : turns_(turns) {
-    Turns::wait([&] { return Turns::forking_ == 0 && !turns.writing_ && !turns.writer_waits(); });
-    ++turns.readers_;
-    ++Turns::running_;
+  explicit ReadLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
+    ReadWriteLock::wait([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && !lock.writer_waits(); });
+    ++lock.readers_;
+    ++ReadWriteLock::running_;
     if (rows > FEW_ROWS) release_.emplace();
   }
-  ~Reading() {
+  ~ReadLock() {
     release_.reset();
-    --turns_.readers_;
-    --Turns::running_;
-    Turns::wake();
+    --lock_.readers_;
+    --ReadWriteLock::running_;
+    ReadWriteLock::wake();
   }
-  Reading(const Reading&) = delete;
+  ReadLock(const ReadLock&) = delete;
 
  private:
-  Turns& turns_;
+  ReadWriteLock& lock_;
   std::optional<nanobind::gil_scoped_release> release_;
 };
 
 // A batch that writes, with the GIL let go of.
-class Writing {
+class WriteLock {
  public:
-  explicit Writing(Turns& turns, std::size_t rows = ALL_ROWS) : turns_(turns) {
-    turns.await_as_writer([&] { return Turns::forking_ == 0 && !turns.writing_ && turns.readers_ == 0; });
-    turns.writing_ = true;
-    ++Turns::running_;
+  explicit WriteLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
+    lock.await_as_writer([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && lock.readers_ == 0; });
+    lock.writing_ = true;
+    ++ReadWriteLock::running_;
     if (rows > FEW_ROWS) release_.emplace();
   }
-  ~Writing() {
+  ~WriteLock() {
     release_.reset();
-    turns_.writing_ = false;
-    --Turns::running_;
-    Turns::wake();
+    lock_.writing_ = false;
+    --ReadWriteLock::running_;
+    ReadWriteLock::wake();
   }
-  Writing(const Writing&) = delete;
+  WriteLock(const WriteLock&) = delete;
 
  private:
-  Turns& turns_;
+  ReadWriteLock& lock_;
   std::optional<nanobind::gil_scoped_release> release_;
 };
 

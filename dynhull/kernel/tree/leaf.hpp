@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "predicates.hpp"
+#include "../predicates/signs.hpp"
 
 #ifndef DYNHULL_LEAF
 #define DYNHULL_LEAF 62  // entries: 1,024 bytes

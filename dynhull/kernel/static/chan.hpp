@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "../sort/by_point.hpp"
 #include "chain.hpp"
-#include "sort.hpp"
 
 namespace dynhull {
 

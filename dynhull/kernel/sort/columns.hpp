@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "point.hpp"
+#include "../predicates/point.hpp"
 
 namespace dynhull {
 

@@ -7,18 +7,18 @@
 #include <iterator>
 #include <vector>
 
+#include "../sort/columns.hpp"
 #include "chain.hpp"
-#include "columns.hpp"
 
 namespace dynhull {
 
 // How high and wide a box is comes from rounded arithmetic; whether it lies in the hull is decided exactly, corner by
 // corner, and a box that does not is left out. A hull that contains the corners contains the box, and a point in the
 // open box is no vertex. The points of a column lie between two x that are in other columns.
-class Interior {
+class InnerBoxes {
  public:
   // Of a hull given by its vertices, counter-clockwise from the least.
-  explicit Interior(std::span<const Point> vertices) {
+  explicit InnerBoxes(std::span<const Point> vertices) {
     if (vertices.empty()) return;
     const auto greatest = std::max_element(vertices.begin(), vertices.end());
     std::vector<Point> upper = {vertices.front()};
@@ -26,7 +26,7 @@ class Interior {
     lay_boxes({vertices.begin(), greatest + 1}, upper);
   }
   // Of a hull given by its chains, from left to right.
-  Interior(std::span<const Point> lower, std::span<const Point> upper) { lay_boxes(lower, upper); }
+  InnerBoxes(std::span<const Point> lower, std::span<const Point> upper) { lay_boxes(lower, upper); }
 
   // False also where it cannot tell.
   bool holds(Point p) const {

@@ -1,37 +1,11 @@
 // Updates one by one, on the tree at nodes.root: repair the leaf, then climb while the hull changes.
 #pragma once
 
-#include "overhead.hpp"
-#include "shape.hpp"
+#include "balance.hpp"
+#include "finger.hpp"
+#include "place.hpp"
 
 namespace dynhull {
-
-// Where a point is, or belongs.
-struct Place {
-  Ref leaf;
-  unsigned entry;
-  bool there;
-};
-
-inline Place find_in(const Nodes& nodes, Ref tree, Point p) {
-  const Leaf& leaf = nodes.leaf(tree);
-  const unsigned i = leaf.find(p);
-  return {tree, i, leaf.holds(i, p)};
-}
-
-inline Place find(const Nodes& nodes, Point p) {
-  if (nodes.root == NONE) return {NONE, 0, false};
-  const Ref tree = nodes.descend(nodes.root, p);
-  nodes.leaf(tree).fetch();
-  return find_in(nodes, tree, p);
-}
-
-// The same, faster where `guess`, a leaf that may be gone by now, has points on both sides of p.
-inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
-  const Leaf& leaf = nodes.leaf(guess);
-  if (leaf.size > 0 && leaf.first() <= p && p <= leaf[leaf.size - 1]) return find_in(nodes, guess, p);
-  return find(nodes, p);
-}
 
 // One branch, which goes the same way almost always, where || makes two that each go either way.
 inline bool either(bool first, bool second) { return first + second != 0; }
@@ -40,18 +14,18 @@ inline bool either(bool first, bool second) { return first + second != 0; }
 template <class Over>
 class Climb {
  public:
-  Climb(const Nodes& nodes, Point p, Side side, Over& overhead)
-      : nodes_(nodes), side_(side), overhead_(overhead), known_(overhead.over(p)) {}
+  Climb(const Nodes& nodes, Point p, Side side, Over& finger)
+      : nodes_(nodes), side_(side), finger_(finger), known_(finger.over(p)) {}
 
   // From v up, the first node whose bridge shares some x with the part from `left` to `right`, or NONE.
   Ref first_near(Ref v, double left, double right) {
     v = first_near(v, known_, left, right);
     if (v != known_) return v;
     if (v == NONE) {
-      if (stood_) overhead_.earn();
+      if (stood_) finger_.earn();
       return NONE;
     }
-    if (overhead_.clear(side_, left, right)) return NONE;
+    if (finger_.clear(side_, left, right)) return NONE;
     known_ = NONE;
     return first_near(v, NONE, left, right);
   }
@@ -59,7 +33,7 @@ class Climb {
   // The bridge of the last node has to change.
   void changes() {
     stood_ = false;
-    if (known_ == NONE) overhead_.forget();
+    if (known_ == NONE) finger_.forget();
   }
 
  private:
@@ -73,7 +47,7 @@ class Climb {
 
   const Nodes& nodes_;
   Side side_;
-  Over& overhead_;
+  Over& finger_;
   Ref known_;  // the first node that the overhead knows of; NONE from there on
   bool stood_ = true;
 };
@@ -83,8 +57,8 @@ class Climb {
 // `neighbours` are those of p on the chain, infinite where p is its end. With one of them between p and the bridge, the
 // chain turns before it gets there, and p lies inside the bridge's line.
 template <class Over>
-bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& overhead) {
-  Climb climb(nodes, p, side, overhead);
+bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& finger) {
+  Climb climb(nodes, p, side, finger);
   const auto next = [&](Ref from) { return climb.first_near(from, neighbours.a.x, neighbours.b.x); };
   for (v = next(v); v != NONE; v = next(nodes.node(v).parent)) {
     Edge& edge = nodes.bridge(v, side);
@@ -125,8 +99,8 @@ inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone, Edge 
 //
 // `neighbours` are those of p on the chain, infinite where p was its end.
 template <class Over>
-bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& overhead) {
-  Climb climb(nodes, p, side, overhead);
+bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& finger) {
+  Climb climb(nodes, p, side, finger);
   const auto next = [&](Ref from) { return climb.first_near(from, p.x, p.x); };
   for (v = next(v); v != NONE; v = next(nodes.node(v).parent)) {
     Edge& edge = nodes.bridge(v, side);
@@ -145,8 +119,8 @@ bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Ove
 
 // Insert a point that is not there. Returns the sides, as bits, on which the hull changed.
 // Needs room for one more leaf and node. `overhead` is that of a batch in order.
-template <class Over = NoOverhead>
-unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead = Over()) {
+template <class Over = NoFinger>
+unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& finger = Over()) {
   if (place.leaf == NONE) {
     nodes.replace(NONE, NONE, nodes.take_leaf());
     nodes.leaf(nodes.root).assign(&p, 1);
@@ -154,7 +128,7 @@ unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead = Over
   }
   if (nodes.leaf(place.leaf).size == LEAF) {
     const Ref right = split(nodes, place.leaf);
-    overhead.forget();
+    finger.forget();
     const unsigned half = nodes.leaf(place.leaf).size;
     if (place.entry > half) place = {right, place.entry - half, false};
   }
@@ -162,32 +136,30 @@ unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& overhead = Over
   const unsigned on_leaf = leaf.add(place.entry, p);
   unsigned changed = 0;
   for (Side side : SIDES)
-    if (on_leaf & (1u << side) &&
-        climb_added(nodes, leaf.parent, p, side, leaf.neighbours(side, place.entry), overhead))
+    if (on_leaf & (1u << side) && climb_added(nodes, leaf.parent, p, side, leaf.neighbours(side, place.entry), finger))
       changed |= 1u << side;
   return changed;
 }
 
 // Remove a point that is there. Returns the sides, as bits, on which the hull changed.
-template <class Over = NoOverhead>
-unsigned remove_point(Nodes& nodes, Place place, Point p, Over&& overhead = Over()) {
+template <class Over = NoFinger>
+unsigned remove_point(Nodes& nodes, Place place, Point p, Over&& finger = Over()) {
   Leaf& leaf = nodes.leaf(place.leaf);
   const Edge neighbours[] = {leaf.neighbours(UPPER, place.entry), leaf.neighbours(LOWER, place.entry)};
   const unsigned on_leaf = leaf.remove(place.entry);
   const bool empty = leaf.size == 0;
-  if (empty) overhead.forget();
+  if (empty) finger.forget();
   const Ref above = empty ? drop(nodes, place.leaf) : leaf.parent;
   unsigned changed = 0;
   for (Side side : SIDES)
-    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side, neighbours[side], overhead))
-      changed |= 1u << side;
+    if (on_leaf & (1u << side) && climb_removed(nodes, above, p, side, neighbours[side], finger)) changed |= 1u << side;
   if (empty)
     rebalance(nodes, above);
   else if (leaf.size < LOW && leaf.size % MERGE_STEP == 1)
     merge(nodes, place.leaf);
   else
     return changed;
-  overhead.forget();
+  finger.forget();
   return changed;
 }
 

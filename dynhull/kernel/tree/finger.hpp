@@ -6,17 +6,17 @@
 namespace dynhull {
 
 // Of a single update.
-struct NoOverhead {
+struct NoFinger {
   Ref over(Point) { return NONE; }
   bool clear(Side, double, double) { return false; }
   void forget() {}
   void earn() {}
 };
 
-class Overhead {
+class Finger {
  public:
   // The nodes of this height or more.
-  Overhead(const Nodes& nodes, unsigned height) : nodes_(nodes), height_(height) {}
+  Finger(const Nodes& nodes, unsigned height) : nodes_(nodes), height_(height) {}
 
   // The lowest of them over p, or NONE: also where to ask did not pay of late. No p may lie before an earlier one. O(1)
   // amortized where updates are dense.

@@ -46,8 +46,8 @@ class Distinct {
   }
 
   std::size_t count_, size_;
-  Buffer<Point> points_;
-  Buffer<Repeated> repeated_;
+  Scratch<Point> points_;
+  Scratch<Repeated> repeated_;
   std::size_t repeated_size_ = 0;
   bool finite_;
 };

@@ -4,31 +4,32 @@
 
 #include <memory>
 
-#include "interior.hpp"
+#include "../hull_tree.hpp"
+#include "../static/inner_boxes.hpp"
 #include "queries.hpp"
 
 namespace dynhull {
 
-class FlatChains {
+class LocateIndex {
  public:
   bool fresh(const HullTree& tree) const { return version_ == tree.version(); }
 
   // Whether so many queries since the hull's last change pay for a refresh: chains cost about as much as a query a
   // vertex, boxes as much as BOXES_PAY queries.
   bool stale(const HullTree& tree, std::uint64_t queries) const {
-    return fresh(tree) ? !interior_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
+    return fresh(tree) ? !inner_boxes_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
   }
 
   // O(h log n).
   void refresh(const HullTree& tree, std::uint64_t queries) {
     version_ = STALE;
     usable_ = false;
-    interior_.reset();
+    inner_boxes_.reset();
     for (Side side : SIDES) chain_[side] = tree.chain(side);
     const std::size_t longest = std::max(chain_[UPPER].size(), chain_[LOWER].size());
     vertices_ = chain_[UPPER].size() + chain_[LOWER].size();
     if (longest > 1 && longest < CELLS_LIMIT) lay_grid(2 * longest + 64);
-    if (queries > BOXES_PAY) interior_ = std::make_unique<Interior>(chain_[LOWER], chain_[UPPER]);
+    if (queries > BOXES_PAY) inner_boxes_ = std::make_unique<InnerBoxes>(chain_[LOWER], chain_[UPPER]);
     version_ = tree.version();
   }
 
@@ -71,7 +72,7 @@ class FlatChains {
     for (std::size_t i = 0; i < count; ++i) {
       where[i] = 1;
       rest[left_over] = static_cast<std::uint8_t>(i);
-      left_over += !(interior_ && interior_->holds(points[i]));
+      left_over += !(inner_boxes_ && inner_boxes_->holds(points[i]));
     }
     std::size_t cells[BLOCK];
     std::uint32_t left[BLOCK][2];
@@ -120,7 +121,7 @@ class FlatChains {
 
   std::vector<Point> chain_[2];
   std::vector<Cell> grid_;
-  std::unique_ptr<const Interior> interior_;
+  std::unique_ptr<const InnerBoxes> inner_boxes_;
   double least_ = 0, greatest_ = 0, scale_ = 0;
   std::size_t vertices_ = 0;
   std::uint64_t version_ = STALE;

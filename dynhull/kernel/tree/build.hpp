@@ -1,8 +1,8 @@
 // Building from sorted points.
 #pragma once
 
-#include "shape.hpp"
-#include "threads.hpp"
+#include "../threads.hpp"
+#include "balance.hpp"
 
 namespace dynhull {
 

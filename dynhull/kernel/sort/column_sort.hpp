@@ -2,9 +2,9 @@
 // sorted.
 #pragma once
 
-#include "buffer.hpp"
-#include "sort.hpp"
-#include "threads.hpp"
+#include "../memory/scratch.hpp"
+#include "../threads.hpp"
+#include "by_point.hpp"
 
 namespace dynhull {
 
@@ -34,7 +34,7 @@ class ColumnSort {
     const Point* points;
     std::size_t count;
     Range range = {};
-    Buffer<std::uint16_t> columns{count};     // of each point
+    Scratch<std::uint16_t> columns{count};    // of each point
     std::array<std::size_t, MOST> next = {};  // how many points each column has, then where its next one goes
     bool finite = true, repeated = false;
   };
@@ -95,7 +95,7 @@ class ColumnSort {
     const auto size = [&](unsigned column) { return starts_[column + 1] - starts_[column]; };
     std::size_t most = 0;
     for (unsigned column = first; column < last; ++column) most = std::max(most, size(column));
-    const Buffer<Point> scratch(most);
+    const Scratch<Point> scratch(most);
     bool repeated = false;
     for (unsigned column = first; column < last; ++column) {
       Point *const begin = to_ + starts_[column], *const end = begin + size(column);

@@ -1,8 +1,8 @@
 // The parts of a tree: leaves, inner nodes, and their links, by number in growing arrays.
 #pragma once
 
+#include "../memory/pool.hpp"
 #include "leaf.hpp"
-#include "store.hpp"
 
 namespace dynhull {
 
@@ -113,9 +113,9 @@ class Nodes {
   Ref root = NONE;
 
  private:
-  Store<Leaf> leaves_;
-  Store<Node> nodes_;
-  Store<Bridges> bridges_;
+  Pool<Leaf> leaves_;
+  Pool<Node> nodes_;
+  Pool<Bridges> bridges_;
 };
 
 }  // namespace dynhull

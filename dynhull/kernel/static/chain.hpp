@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "predicates.hpp"
+#include "../predicates/signs.hpp"
 
 namespace dynhull {
 

@@ -3,9 +3,9 @@
 
 #include <optional>
 
-#include "batch.hpp"
-#include "distinct.hpp"
-#include "sequence.hpp"
+#include "batch/divide.hpp"
+#include "batch/in_order.hpp"
+#include "sort/distinct.hpp"
 
 namespace dynhull {
 
@@ -151,7 +151,7 @@ class HullTree {
     }
     if (as_large) return rebuild(plan);
     nodes_.reserve(plan.extra_leaves);
-    Commit commit(nodes_, plan);
+    DividedBatch commit(nodes_, plan);
     recount(plan);
     return commit.apply();
   }

@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "memory.hpp"
+#include "pages.hpp"
 
 namespace dynhull {
 
@@ -15,7 +15,7 @@ struct Block {
 
 // Blocks that a thread has had a use for, for its next batch: the C library gives free memory of some size back to the
 // system, which hands it out again page by page, zeroed. That was a tenth of the cost of a large batch.
-class Spares {
+class BlockCache {
  public:
   static Block take(std::size_t bytes) {
     if (!worth_keeping(bytes)) return {bytes > 0 ? memory::resize(nullptr, 0, bytes) : nullptr, bytes};
@@ -26,17 +26,17 @@ class Spares {
     memory::release(block.data, block.bytes);
   }
 
-  Spares(const Spares&) = delete;
-  ~Spares() {
+  BlockCache(const BlockCache&) = delete;
+  ~BlockCache() {
     for (const Block& block : blocks_) memory::release(block.data, block.bytes);
   }
 
  private:
   static bool worth_keeping(std::size_t bytes) { return memory::PAGE <= bytes && bytes < memory::LARGE; }
 
-  Spares() = default;
-  static Spares& of_this_thread() {
-    static thread_local Spares spares;
+  BlockCache() = default;
+  static BlockCache& of_this_thread() {
+    static thread_local BlockCache spares;
     return spares;
   }
 
@@ -64,11 +64,11 @@ class Spares {
 
 // A fixed number of plain records, not initialised.
 template <class Record>
-class Buffer {
+class Scratch {
  public:
-  explicit Buffer(std::size_t count) : block_(Spares::take(memory::whole_pages(count * sizeof(Record)))) {}
-  Buffer(const Buffer&) = delete;
-  ~Buffer() { Spares::give_back(block_); }
+  explicit Scratch(std::size_t count) : block_(BlockCache::take(memory::whole_pages(count * sizeof(Record)))) {}
+  Scratch(const Scratch&) = delete;
+  ~Scratch() { BlockCache::give_back(block_); }
 
   Record* data() const { return static_cast<Record*>(block_.data); }
   Record& operator[](std::size_t i) const { return data()[i]; }

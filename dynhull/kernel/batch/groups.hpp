@@ -1,32 +1,11 @@
 // The rows of a batch as a set: sorted, equal points together.
 #pragma once
 
-#include <unordered_map>
-#include <vector>
-
-#include "buffer.hpp"
-#include "sort.hpp"
-#include "update.hpp"
+#include "../memory/scratch.hpp"
+#include "../sort/by_point.hpp"
+#include "../tree/nodes.hpp"
 
 namespace dynhull {
-
-struct PointHash {
-  std::size_t operator()(Point p) const {
-    const auto x = std::bit_cast<std::uint64_t>(p.x), y = std::bit_cast<std::uint64_t>(p.y);
-    const std::uint64_t mixed = (x ^ std::rotl(y, 32)) * 0x9e3779b97f4a7c15;
-    return static_cast<std::size_t>(mixed ^ (mixed >> 29));
-  }
-};
-
-// How often, for the points that are there more than once.
-using Copies = std::unordered_map<Point, std::uint64_t, PointHash>;
-
-// The number of a point that is there more than once, or nullptr.
-inline std::uint64_t* copies_at(const Nodes& nodes, Copies& copies, const Place& place) {
-  const Leaf& leaf = nodes.leaf(place.leaf);
-  const bool repeated = place.there & (leaf.repeated >> place.entry & 1);
-  return repeated ? &copies.find(leaf[place.entry])->second : nullptr;
-}
 
 struct Group {
   Point p;
@@ -53,7 +32,7 @@ class Groups {
 
   Groups(Ops ops, const Point* points, std::size_t count)
       : rows_applied(static_cast<std::int64_t>(count)), rows_(few(count)), groups_(count + 1) {
-    const Buffer<Row> scratch(count);
+    const Scratch<Row> scratch(count);
     Plain plain;
     for (std::size_t i = 0; i < count; ++i)
       rows_[i] = {plain(points[i]), static_cast<std::int64_t>(2 * i + ops.deletes(i))};
@@ -136,8 +115,8 @@ class Groups {
     for (; from < to; from += TOGETHER) descend_together(nodes, tree, from, std::min(from + TOGETHER, to));
   }
 
-  Buffer<Row> rows_;
-  Buffer<Group> groups_;
+  Scratch<Row> rows_;
+  Scratch<Group> groups_;
   std::size_t size_;
 };
 

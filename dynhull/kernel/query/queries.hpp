@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "nearest.hpp"
-#include "tree.hpp"
+#include "../tree/search.hpp"
+#include "constructions.hpp"
 
 namespace dynhull {
 
@@ -132,7 +132,7 @@ inline Point crossing_point(Cursor cursor, Point p, Point q, int sign) {
     } else {
       const int at_a = sign * orientation(p, q, a);
       if (at_a == 0) return a;
-      if (at_a > 0) return meet(p, q, a, b);
+      if (at_a > 0) return intersection(p, q, a, b);
       cursor.go_left();
     }
   }

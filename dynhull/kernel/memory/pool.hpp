@@ -4,29 +4,29 @@
 #include <type_traits>
 #include <utility>
 
-#include "memory.hpp"
+#include "pages.hpp"
 
 namespace dynhull {
 
 // Slots are handed out by number, freed ones first; `reserve` may throw, nothing else does.
 template <class Record>
-class Store {
+class Pool {
   static_assert(std::is_trivially_copyable_v<Record> && sizeof(Record) >= sizeof(std::uint32_t));
 
  public:
-  Store() = default;
-  Store(Store&& other) noexcept { swap(other); }
-  Store(const Store& other) : used_(other.used_), freed_(other.freed_), free_(other.free_) {
+  Pool() = default;
+  Pool(Pool&& other) noexcept { swap(other); }
+  Pool(const Pool& other) : used_(other.used_), freed_(other.freed_), free_(other.free_) {
     if (used_ == 0) return;
     data_ = static_cast<Record*>(memory::resize(nullptr, 0, whole_pages(used_)));
     capacity_ = used_;
     std::copy_n(other.data_, used_, data_);
   }
-  Store& operator=(Store&& other) noexcept {
+  Pool& operator=(Pool&& other) noexcept {
     swap(other);
     return *this;
   }
-  ~Store() { memory::release(data_, bytes()); }
+  ~Pool() { memory::release(data_, bytes()); }
 
   Record& operator[](std::uint32_t i) { return data_[i]; }
   const Record& operator[](std::uint32_t i) const { return data_[i]; }
@@ -61,7 +61,7 @@ class Store {
   std::size_t used() const { return used_ - freed_; }
   std::size_t reserved_bytes() const { return bytes(); }
 
-  void swap(Store& other) noexcept {
+  void swap(Pool& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(capacity_, other.capacity_);
     std::swap(used_, other.used_);

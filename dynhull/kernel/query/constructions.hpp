@@ -8,54 +8,54 @@
 #include <algorithm>
 #include <optional>
 
-#include "predicates.hpp"
+#include "../predicates/signs.hpp"
 
 namespace dynhull {
 
 // An unevaluated sum: `low` is at most half a unit in the last place of `high`.
-struct Pair {
+struct DoubleDouble {
   double high, low;
-  Pair operator-() const { return {-high, -low}; }
+  DoubleDouble operator-() const { return {-high, -low}; }
 };
 
 // An operation on pairs is off by 2^-102 of its result at most, and so is a difference of coordinates by nothing; a
 // value here has less than 2^4 operations. The rest is for the roundings of the bound itself.
-constexpr double PAIR_ERROR = 0x1p-96;
+constexpr double DOUBLE_DOUBLE_ERROR = 0x1p-96;
 
 // Whether a bound relative to something of this size holds: no part of the value overflows, and what underflows is
 // far below the bound.
 inline bool safe(double size) { return size > 0x1p-500 && size < 0x1p500; }
 
-inline Pair fast_sum(double large, double small) {
+inline DoubleDouble fast_sum(double large, double small) {
   const double high = large + small;
   return {high, small - (high - large)};
 }
-inline Pair sum(double a, double b) {
+inline DoubleDouble sum(double a, double b) {
   const double high = a + b;
   const double b_part = high - a;
   return {high, (a - (high - b_part)) + (b - b_part)};
 }
-inline Pair difference(double a, double b) { return sum(a, -b); }
-inline Pair sum(Pair a, Pair b) {
-  const Pair high = sum(a.high, b.high), low = sum(a.low, b.low);
-  const Pair both = fast_sum(high.high, high.low + low.high);
+inline DoubleDouble difference(double a, double b) { return sum(a, -b); }
+inline DoubleDouble sum(DoubleDouble a, DoubleDouble b) {
+  const DoubleDouble high = sum(a.high, b.high), low = sum(a.low, b.low);
+  const DoubleDouble both = fast_sum(high.high, high.low + low.high);
   return fast_sum(both.high, low.low + both.low);
 }
-inline Pair product(Pair a, Pair b) {
+inline DoubleDouble product(DoubleDouble a, DoubleDouble b) {
   const double high = a.high * b.high;
   return fast_sum(high, std::fma(a.high, b.high, -high) + (a.high * b.low + a.low * b.high));
 }
-inline Pair quotient(Pair a, Pair b) {
+inline DoubleDouble quotient(DoubleDouble a, DoubleDouble b) {
   const double high = a.high / b.high;
   return fast_sum(high, (std::fma(-high, b.high, a.high) + (a.low - high * b.low)) / b.high);
 }
-inline Pair root(Pair square) {
+inline DoubleDouble root(DoubleDouble square) {
   const double high = std::sqrt(square.high);
   return fast_sum(high, (std::fma(-high, high, square.high) + square.low) / (2 * high));
 }
 
 // The double nearest to a value that is off by an error at most, where that is beyond doubt.
-inline std::optional<double> rounded(Pair value, double error) {
+inline std::optional<double> rounded(DoubleDouble value, double error) {
   const double least = value.high + (value.low - error), most = value.high + (value.low + error);
   return least == most ? std::optional(least) : std::nullopt;
 }
@@ -119,17 +119,17 @@ inline Scaled root(Scaled square) {
   });
 }
 
-inline Pair squared_length(Point a, Point b) {
-  const Pair x = difference(b.x, a.x), y = difference(b.y, a.y);
+inline DoubleDouble squared_length(Point a, Point b) {
+  const DoubleDouble x = difference(b.x, a.x), y = difference(b.y, a.y);
   return sum(product(x, x), product(y, y));
 }
 
 // Of two different points.
 inline double distance(Point p, Point q) {
-  const Pair square = squared_length(p, q);
+  const DoubleDouble square = squared_length(p, q);
   if (safe(square.high)) {
-    const Pair length = root(square);
-    if (const auto result = rounded(length, PAIR_ERROR * length.high)) return *result;
+    const DoubleDouble length = root(square);
+    if (const auto result = rounded(length, DOUBLE_DOUBLE_ERROR * length.high)) return *result;
   }
   return distance_exact(p, q);
 }
@@ -137,13 +137,13 @@ inline double distance(Point p, Point q) {
 // Twice the area of a triangle, and what its error is relative to: the two products where their factors are rounded,
 // otherwise the area, for then no digits cancel but exact ones.
 struct Triangle {
-  Pair doubled;
+  DoubleDouble doubled;
   double size;
 
   Triangle(Point a, Point b, Point c) {
-    const Pair ux = difference(b.x, a.x), uy = difference(b.y, a.y);
-    const Pair vx = difference(c.x, a.x), vy = difference(c.y, a.y);
-    const Pair left = product(ux, vy), right = product(uy, vx);
+    const DoubleDouble ux = difference(b.x, a.x), uy = difference(b.y, a.y);
+    const DoubleDouble vx = difference(c.x, a.x), vy = difference(c.y, a.y);
+    const DoubleDouble left = product(ux, vy), right = product(uy, vx);
     doubled = sum(left, -right);
     const bool exact = (ux.low == 0) & (uy.low == 0) & (vx.low == 0) & (vy.low == 0);
     size = exact ? std::abs(doubled.high) : std::abs(left.high) + std::abs(right.high);
@@ -171,18 +171,19 @@ struct Triangle {
 // From p, not on the line, to the line through a and b.
 inline double distance_to_line(Point p, Point a, Point b) {
   const Triangle triangle(a, b, p);
-  const Pair square = squared_length(a, b);
+  const DoubleDouble square = squared_length(a, b);
   if (safe(triangle.size) && safe(square.high)) {
-    const Pair length = root(square);
-    const Pair height = quotient(triangle.doubled.high < 0 ? -triangle.doubled : triangle.doubled, length);
-    if (const auto result = rounded(height, PAIR_ERROR * (triangle.size / length.high))) return *result;
+    const DoubleDouble length = root(square);
+    const DoubleDouble height = quotient(triangle.doubled.high < 0 ? -triangle.doubled : triangle.doubled, length);
+    if (const auto result = rounded(height, DOUBLE_DOUBLE_ERROR * (triangle.size / length.high))) return *result;
   }
   return distance_to_line_exact(p, a, b);
 }
 
 // One coordinate of where the line through p and q crosses the segment from a to b, whose ends have it at `from` and at
 // `to`: (to at_a - from at_b) / (at_a - at_b), at_a and at_b the areas of the triangles of the line with a and with b.
-[[gnu::noinline, gnu::cold]] inline double meet_exact(Point p, Point q, Point a, Point b, double from, double to) {
+[[gnu::noinline, gnu::cold]] inline double intersection_exact(Point p, Point q, Point a, Point b, double from,
+                                                              double to) {
   const auto at_a = triangle_terms(p, q, a), at_b = triangle_terms(p, q, b);
   const auto add = [&](ExactSum<3>& sum, int weight, double value, double other) {  // weight (value at_a - other at_b)
     for (const Term& term : at_a) sum.add(+weight * term.weight, {term.first, term.second, value});
@@ -194,7 +195,7 @@ inline double distance_to_line(Point p, Point a, Point b) {
   for (const Term& term : at_a) below.add(+term.weight, {term.first, term.second});
   for (const Term& term : at_b) below.add(-term.weight, {term.first, term.second});
   if (above.sign() == 0) return 0;
-  if (above.sign() != below.sign()) return -meet_exact(p, q, a, b, -from, -to);
+  if (above.sign() != below.sign()) return -intersection_exact(p, q, a, b, -from, -to);
   const Scaled numerator = above.approximate(), denominator = below.approximate();
   const double guess = std::ldexp(numerator.mantissa / denominator.mantissa, numerator.exponent - denominator.exponent);
   return nearest_double(guess, [&](double r, double ulp) {
@@ -207,22 +208,22 @@ inline double distance_to_line(Point p, Point a, Point b) {
 }
 
 // Where the line through p and q crosses the segment from a to b, which lie on different sides of it.
-inline Point meet(Point p, Point q, Point a, Point b) {
+inline Point intersection(Point p, Point q, Point a, Point b) {
   const Triangle at_a(p, q, a), at_b(p, q, b);
   const double size = at_a.size + at_b.size;
-  const Pair whole = sum(at_a.doubled, -at_b.doubled);
-  const Pair share = quotient(at_a.doubled, whole);
+  const DoubleDouble whole = sum(at_a.doubled, -at_b.doubled);
+  const DoubleDouble share = quotient(at_a.doubled, whole);
   const double doubt = size / std::abs(whole.high);  // of the share, as a multiple of PAIR_ERROR; 1 at least
   const auto coordinate = [&](double Point::* axis) {
     const double from = a.*axis, to = b.*axis;
     if (from == to) return from;
     if (p.*axis == q.*axis) return p.*axis;
-    const Pair way = difference(to, from);
-    const Pair value = sum({from, 0}, product(share, way));
+    const DoubleDouble way = difference(to, from);
+    const DoubleDouble value = sum({from, 0}, product(share, way));
     const double bound = std::abs(way.high) * doubt + std::abs(value.high);
     if (safe(size) && safe(bound))
-      if (const auto result = rounded(value, PAIR_ERROR * bound)) return *result;
-    return meet_exact(p, q, a, b, from, to);
+      if (const auto result = rounded(value, DOUBLE_DOUBLE_ERROR * bound)) return *result;
+    return intersection_exact(p, q, a, b, from, to);
   };
   return {coordinate(&Point::x), coordinate(&Point::y)};
 }

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <optional>
 
-#include "exact.hpp"
+#include "exact_sum.hpp"
 #include "point.hpp"
 
 #ifdef __FAST_MATH__

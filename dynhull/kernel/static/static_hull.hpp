@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "interior.hpp"
-#include "sort.hpp"
-#include "threads.hpp"
+#include "../sort/by_point.hpp"
+#include "../threads.hpp"
+#include "inner_boxes.hpp"
 
 namespace dynhull {
 
@@ -142,12 +142,12 @@ class StaticHull {
 };
 
 // Whether to discard points by a sample's hull first, and to use two threads; decided by the input where not told.
-struct Means {
+struct StaticOptions {
   std::optional<bool> discard, threads;
 };
 
 // What to discard of these points; nothing where it would be too few to pay, unless told to.
-inline std::optional<Interior> interior_of(const Point* points, std::size_t count, bool always) {
+inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t count, bool always) {
   constexpr std::size_t FEW = 2048, LARGEST_SAMPLE = 4096, ONE_OF = 32;
   if (count < FEW && !always) return {};
   std::vector<Point> sample(std::min(LARGEST_SAMPLE, always ? count : count / ONE_OF));
@@ -157,26 +157,26 @@ inline std::optional<Interior> interior_of(const Point* points, std::size_t coun
   const StaticHull hull(sample, {}, false);
   if (!hull.finite()) return {};
   if (2 * hull.vertices().size() > sample.size() && !always) return {};
-  const Interior interior(hull.vertices());
-  const std::size_t kept = interior.discard(sample, sample.data());
+  const InnerBoxes inner_boxes(hull.vertices());
+  const std::size_t kept = inner_boxes.discard(sample, sample.data());
   if (sample.size() - kept < sample.size() / 8 && !always) return {};
-  return interior;
+  return inner_boxes;
 }
 
 // O(n log n), and O(n) where few points are near the hull.
-inline StaticHull static_hull(const Point* points, std::size_t count, Means means = {}) {
+inline StaticHull static_hull(const Point* points, std::size_t count, StaticOptions options = {}) {
   constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // in the same time
-  const auto threads = [&](std::size_t placed) { return means.threads.value_or(two_threads_for(placed)); };
+  const auto threads = [&](std::size_t placed) { return options.threads.value_or(two_threads_for(placed)); };
   const std::size_t half = count / 2;
   const StaticHull::Part first(points, half), second(points + half, count - half);
-  const bool may_discard = means.discard.value_or(true);
-  const auto interior = may_discard ? interior_of(points, count, means.discard.has_value()) : std::nullopt;
-  if (!interior) return StaticHull(first, second, threads(count));
+  const bool may_discard = options.discard.value_or(true);
+  const auto inner_boxes = may_discard ? inner_boxes_of(points, count, options.discard.has_value()) : std::nullopt;
+  if (!inner_boxes) return StaticHull(first, second, threads(count));
   const auto kept = std::make_unique_for_overwrite<Point[]>(count);
   std::size_t kept_first, kept_second;
   both(
-      threads(count / DISCARDED_FOR_ONE_PLACED), [&] { kept_first = interior->discard(first, kept.get()); },
-      [&] { kept_second = interior->discard(second, kept.get() + half); });
+      threads(count / DISCARDED_FOR_ONE_PLACED), [&] { kept_first = inner_boxes->discard(first, kept.get()); },
+      [&] { kept_second = inner_boxes->discard(second, kept.get() + half); });
   return StaticHull({kept.get(), kept_first}, {kept.get() + half, kept_second}, threads(kept_first + kept_second));
 }
 

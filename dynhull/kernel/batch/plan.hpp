@@ -3,7 +3,9 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
+#include "../tree/copies.hpp"
 #include "groups.hpp"
 
 namespace dynhull {
@@ -98,7 +100,7 @@ class Plan {
     *changes_end_++ = change;
   }
 
-  Buffer<Change> changes_;
+  Scratch<Change> changes_;
   Change* changes_end_;
   std::size_t added_ = 0;  // to the leaf of the last change
 };

@@ -1,6 +1,7 @@
 // Applying a small batch: one change after the other, in order.
 #pragma once
 
+#include "../tree/update.hpp"
 #include "plan.hpp"
 
 namespace dynhull {
@@ -9,7 +10,7 @@ namespace dynhull {
 inline bool apply_in_order(Nodes& nodes, std::span<const Change> changes) {
   constexpr std::size_t LOOKAHEAD = 8;  // changes whose leaf is on its way from memory
   constexpr unsigned SHARED = 4;        // how high the subtrees are that several changes share, were there one a leaf
-  Overhead overhead(nodes, SHARED + static_cast<unsigned>(std::bit_width(nodes.leaf_count() / (changes.size() + 1))));
+  Finger finger(nodes, SHARED + static_cast<unsigned>(std::bit_width(nodes.leaf_count() / (changes.size() + 1))));
   bool changed = false;
   for (std::size_t i = 0; i < changes.size(); ++i) {
     const std::size_t ahead = i + LOOKAHEAD;
@@ -17,8 +18,8 @@ inline bool apply_in_order(Nodes& nodes, std::span<const Change> changes) {
       nodes.leaf(changes[ahead].leaf).fetch();
     const Change& change = changes[i];
     const Place place = place_of(nodes, change);
-    changed |= (change.insert ? insert_point(nodes, place, change.p, overhead)
-                              : remove_point(nodes, place, change.p, overhead)) != 0;
+    changed |= (change.insert ? insert_point(nodes, place, change.p, finger)
+                              : remove_point(nodes, place, change.p, finger)) != 0;
   }
   return changed;
 }
