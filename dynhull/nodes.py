@@ -179,9 +179,7 @@ def bridge(left: Tree, right: Tree, side: int) -> Edge:
             right_cursor.go_left()
         else:
             first = first or first_point(right)
-            if sign * orientation(a, b, first) >= 0:
-                left_cursor.go_left()
-            elif sign * crossing(a, b, c, d, first) >= 0:
+            if sign * crossing(a, b, c, d, first) >= 0:
                 left_cursor.go_right()
             else:
                 right_cursor.go_left()

@@ -96,17 +96,24 @@ def dot_sign(a: Point, b: Point, c: Point, d: Point) -> int:
 
 
 def crossing(a: Point, b: Point, c: Point, d: Point, z: Point) -> int:
-    """Return the sign of height(ab) - height(cd) at the vertical line through z, turned by a convention for verticals.
+    """Return the sign of height(ab) - height(cd), where the lines through a, b and c, d cross the vertical through z.
 
-    With det(p, q, z) the determinant of `orientation`, the value is
-    det(c, d, z) * (bx - ax) - det(a, b, z) * (dx - cx), of degree three: for ax < bx and cx < dx it has the sign of the
-    line through a and b minus the line through c and d at x = zx; a vertical line stays on its side of z.
+    For a < b < z <= c < d in lexicographic order, one of the edges not vertical. A vertical edge is as steep as an
+    infinitesimal shear makes it: beside z it is infinitely high (ab) or low (cd) there, and on the vertical through z
+    it passes through z.
+
+    The value is det(c, d, z) * (bx - ax) - det(a, b, z) * (dx - cx), of degree three, where det(p, q, z) is the
+    determinant of `orientation`.
     """
     ax, ay = a
     bx, by = b
     cx, cy = c
     dx, dy = d
     zx, zy = z
+    if ax == zx:
+        return orientation(c, d, z)
+    if dx == zx:
+        return -orientation(a, b, z)
     width_ab = bx - ax
     width_cd = dx - cx
     left_ab = (ax - zx) * (by - zy)
@@ -116,7 +123,7 @@ def crossing(a: Point, b: Point, c: Point, d: Point, z: Point) -> int:
     value = (left_cd - right_cd) * width_ab - (left_ab - right_ab) * width_cd
     size_ab = abs(left_ab) + abs(right_ab) + UNDERFLOW_FACTOR
     size_cd = abs(left_cd) + abs(right_cd) + UNDERFLOW_FACTOR
-    bound = CROSSING_BOUND * (size_cd * abs(width_ab) + size_ab * abs(width_cd)) + UNDERFLOW
+    bound = CROSSING_BOUND * (size_cd * width_ab + size_ab * width_cd) + UNDERFLOW
     if value > bound:
         return 1
     if -value > bound:

@@ -173,8 +173,11 @@ inline int dot_sign(Point a, Point b, Point c, Point d) {
   return sum.sign();
 }
 
-// The sign of height(ab) - height(cd) at the vertical line through z, for a < b < z <= c < d; a vertical edge is as
-// steep as the shear makes it.
+// The sign of height(ab) - height(cd), where the lines through a, b and c, d cross the vertical through z.
+//
+// For a < b < z <= c < d in lexicographic order, one of the edges not vertical. A vertical edge is as steep as an
+// infinitesimal shear makes it: beside z it is infinitely high (ab) or low (cd) there, and on the vertical through z it
+// passes through z.
 inline int crossing(Point a, Point b, Point c, Point d, Point z) {
   if (a.x == z.x) return orientation(c, d, z);
   if (d.x == z.x) return -orientation(a, b, z);
