@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .implementation import kernel
+from ._implementation import kernel
+
+__all__ = ["Checked", "Points", "as_coordinate", "as_points", "packed_points", "plain_points"]
 
 Points = npt.NDArray[np.float64]
 

@@ -20,9 +20,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from ._exact import as_integers
+from ._predicates import EPSILON, Point, cross_sign
 from .arrays import Points, as_array, as_directions, as_points, as_rows, as_tuples, as_vector
-from .exact import as_integers
-from .predicates import EPSILON, Point, cross_sign
 from .static import convex_hull
 
 Way = tuple[Point, Point, int]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ._exact import Integers, root
 from .arrays import as_points
-from .exact import Integers, root
-from .measure.calipers import Indices, least, squared_height
+from .measure._calipers import Indices, least, squared_height
 from .static import convex_hull
 
 

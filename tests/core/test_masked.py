@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from dynhull import DynamicHull, convex_hull, orient2d, static
+from dynhull._implementation import kernel
+from dynhull._tree import HullTree
 from dynhull.convex import (
     Cloud,
     Mapped,
@@ -22,9 +24,7 @@ from dynhull.decompose import convex_pieces
 from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram, energy_above_hull_nd
 from dynhull.gjk import distance_many, intersect_many
-from dynhull.implementation import kernel
 from dynhull.margin import max_margin
-from dynhull.tree import HullTree
 
 ROWS = [[0.0, 0.5], [1.0, 0.25], [0.5, 1.0]]
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from inputs import EXTREME, ULP, point
 
 import dynhull
-from dynhull import predicates
-from dynhull.predicates import direction_sign, orientation
+from dynhull import _predicates as predicates
+from dynhull._predicates import direction_sign, orientation
 
 CASES = Path(__file__).parents[1] / "data" / "orient2d.txt"
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from inputs import cloud, point, points
 
-from dynhull import DynamicHull, _kernel, tree
+from dynhull import DynamicHull, _kernel
+from dynhull import _tree as tree
 
 
 def rows(pairs, columns=2):

@@ -8,10 +8,10 @@ from math import lcm, nan
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import Exact, as_integers, exact, root, rounded
+from .._predicates import UNDERFLOW, Point
 from ..arrays import Points
-from ..exact import Exact, as_integers, exact, root, rounded
-from ..predicates import UNDERFLOW, Point
-from .calipers import PRECISIONS, rounding
+from ._calipers import PRECISIONS, rounding
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from math import inf
 
-from ..predicates import EPSILON
-from .difference import Corner, Difference
-from .simplex import nearest
-from .vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale, subtract, unit
+from .._predicates import EPSILON
+from ._difference import Corner, Difference
+from ._simplex import nearest
+from ._vectors import ORIGIN, Vector, combine, cross, dot, length, normal, scale, subtract, unit
 
 MOST_ITERATIONS = 512
 # Relative to the size of the difference: a push of less is rounding.

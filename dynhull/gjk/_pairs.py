@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .._predicates import ORIENT_BOUND, UNDERFLOW
 from ..arrays import finite_pairs
 from ..convex import polygon
-from ..predicates import ORIENT_BOUND, UNDERFLOW
-from .contact import contact, intersect
-from .difference import SURE
+from ._contact import contact, intersect
+from ._difference import SURE
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

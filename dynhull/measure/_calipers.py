@@ -11,9 +11,9 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import Integers, as_integers
+from .._predicates import UNDERFLOW, cross_signs, dot_signs
 from ..arrays import Points
-from ..exact import Integers, as_integers
-from ..predicates import UNDERFLOW, cross_signs, dot_signs
 
 Indices = npt.NDArray[np.int64]
 Signs = npt.NDArray[np.int8]

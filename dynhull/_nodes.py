@@ -14,8 +14,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from math import inf
 
-from .predicates import Point, crossing, orientation
-from .static.monotone_chain import half_chain
+from ._predicates import Point, crossing, orientation
+from .static._monotone_chain import half_chain
 
 UPPER, LOWER = SIDES = (0, 1)
 SIGNS = (1, -1)

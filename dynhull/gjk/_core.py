@@ -1,7 +1,7 @@
 """Rounded shapes as a core and a radius: on the cores GJK ends after a few steps, on curves it only converges."""
 
+from .._hull import DynamicHull
 from ..convex import Ball, Cloud, Convex, Mapped, Sum
-from ..hull import DynamicHull
 
 
 def core(shape: Convex) -> tuple[Convex, float]:

@@ -2,9 +2,9 @@
 
 import numpy.typing as npt
 
+from .._implementation import kernel
 from ..arrays import Points, as_pairs, as_points
-from ..implementation import kernel
-from .monotone_chain import monotone_chain
+from ._monotone_chain import monotone_chain
 
 
 def convex_hull(xy: npt.ArrayLike) -> Points:

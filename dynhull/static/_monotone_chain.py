@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from .._predicates import Point, orientation
 from ..arrays import Points, as_points
-from ..predicates import Point, orientation
-from .boundary import check_collinear
+from ._boundary import check_collinear
 from .trace import Collinear, Pop, Push, Scan, Trace, Turn
 
 

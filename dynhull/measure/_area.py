@@ -6,8 +6,8 @@ from math import fsum, hypot, inf, nan
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import as_integers, exact_sum, products, rounded, safe_factors
 from ..arrays import Points
-from ..exact import as_integers, exact_sum, products, rounded, safe_factors
 
 BLOCK = 2**16  # vertices at a time: their products stay in the cache
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import rounded
+from .._hull import DynamicHull
+from .._predicates import Point, orient2d
 from ..arrays import Points, as_coordinate, as_points, as_tuples
-from ..exact import rounded
-from ..hull import DynamicHull
-from ..predicates import Point, orient2d
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
+from .._exact import Exact, Integers, doubled_triangle, exact, rounded
+from .._predicates import Point
 from ..arrays import Points
-from ..exact import Exact, Integers, doubled_triangle, exact, rounded
-from ..predicates import Point
-from .calipers import AHEAD, BEHIND, LEFT, Formula, edges, extremes, least
+from ._calipers import AHEAD, BEHIND, LEFT, Formula, edges, extremes, least
 
 
 def min_box(vertices: Points) -> Points:

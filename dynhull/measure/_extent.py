@@ -4,9 +4,9 @@ from math import nan
 
 import numpy as np
 
+from .._exact import Integers, root
 from ..arrays import Points
-from ..exact import Integers, root
-from .calipers import LEFT, edges, extremes, least, squared_height
+from ._calipers import LEFT, edges, extremes, least, squared_height
 
 
 def bounds(vertices: Points) -> tuple[float, float, float, float]:

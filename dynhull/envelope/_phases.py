@@ -8,10 +8,10 @@ from math import nan
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import rounded
+from .._hull import DynamicHull
+from .._predicates import Point
 from ..arrays import Points, as_array, as_points, as_tuples
-from ..exact import rounded
-from ..hull import DynamicHull
-from ..predicates import Point
 
 
 @dataclass(frozen=True, eq=False)

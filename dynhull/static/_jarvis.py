@@ -5,9 +5,9 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
+from .._predicates import Point, orientation
 from ..arrays import Points, as_points
-from ..predicates import Point, orientation
-from .boundary import check_collinear, with_boundary_points
+from ._boundary import check_collinear, with_boundary_points
 from .trace import Collinear, Push, Scan, Trace, Turn
 
 

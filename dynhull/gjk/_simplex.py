@@ -6,7 +6,7 @@ algorithm for faster and more reliable distance queries between convex objects" 
 
 from itertools import combinations
 
-from .vectors import Vector, cross, dot, normal, scale, subtract
+from ._vectors import Vector, cross, dot, normal, scale, subtract
 
 # Which corners carry the nearest point, and with what weights: positive, in sum one.
 Place = tuple[tuple[int, ...], tuple[float, ...]]

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
+from ._implementation import kernel
+from ._nodes import LOWER, UPPER
+from ._tree import HullTree
 from .arrays import Points, as_coordinate, as_directions, as_operations, as_pairs, as_points
-from .implementation import kernel
-from .nodes import LOWER, UPPER
-from .tree import HullTree
 
 if TYPE_CHECKING:
     from . import _kernel

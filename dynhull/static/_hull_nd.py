@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import as_integers
 from ..arrays import as_rows
-from ..exact import as_integers
-from .monotone_chain import monotone_chain
-from .quickhull import determinant_sign, independent, inverse, quickhull, whole
+from ._monotone_chain import monotone_chain
+from ._quickhull import determinant_sign, independent, inverse, quickhull, whole
 
 Rows = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]

@@ -6,9 +6,9 @@ from functools import cmp_to_key
 import numpy as np
 import numpy.typing as npt
 
+from .._predicates import Point, orientation
 from ..arrays import Points, as_points
-from ..predicates import Point, orientation
-from .boundary import check_collinear, farther_first_on_last_ray
+from ._boundary import check_collinear, farther_first_on_last_ray
 from .trace import Collinear, Pop, Push, Scan, Trace, Turn
 
 

@@ -8,9 +8,9 @@ from math import inf, nan
 import numpy as np
 import numpy.typing as npt
 
+from .._exact import doubled_triangle, exact, root, rounded, squared_length
+from .._predicates import Point, cross_sign, dot_sign, orientation
 from ..arrays import Points, as_tuples
-from ..exact import doubled_triangle, exact, root, rounded, squared_length
-from ..predicates import Point, cross_sign, dot_sign, orientation
 
 
 def distance(vertices: Points, tangents: npt.NDArray[np.float64], xy: Points) -> npt.NDArray[np.float64]:

@@ -7,7 +7,7 @@ Duplicates are dropped by each algorithm when it reads its input; what remains a
 from bisect import bisect_left
 from collections.abc import Sequence
 
-from ..predicates import Point, orientation
+from .._predicates import Point, orientation
 
 
 def check_collinear(collinear: str) -> None:

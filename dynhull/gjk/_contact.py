@@ -12,15 +12,15 @@ from typing import TypeVar
 
 import numpy as np
 
+from .._hull import DynamicHull
 from ..arrays import Points
 from ..convex import Cloud, Convex
-from ..hull import DynamicHull
 from ..static import convex_hull
-from .core import core
-from .difference import Difference, Numbers, NumbersError, Walk, walk
-from .expand import expand
-from .polygons import certainly_apart, certainly_touching, distance_of_polygons, polygons_intersect
-from .vectors import scale, unit
+from ._core import core
+from ._difference import Difference, Numbers, NumbersError, Walk, walk
+from ._expand import expand
+from ._polygons import certainly_apart, certainly_touching, distance_of_polygons, polygons_intersect
+from ._vectors import scale, unit
 
 T = TypeVar("T")
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from .._hull import DynamicHull
+from .._predicates import Point, cross_sign, direction_sign, dot_sign, orient2d
 from ..arrays import Points
-from ..hull import DynamicHull
-from ..measure.calipers import LEFT, edges, extremes
-from ..predicates import Point, cross_sign, direction_sign, dot_sign, orient2d
-from .difference import Corner, Walk
+from ..measure._calipers import LEFT, edges, extremes
+from ._difference import Corner, Walk
 
 
 def certainly_apart(seen: Walk) -> bool:

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
-from .arrays import Points, as_coordinate, as_points
-from .nodes import (
+from ._nodes import (
     HIGHEST,
     LOWER,
     LOWEST,
@@ -35,7 +34,8 @@ from .nodes import (
     tangent_to_left,
     tangent_to_right,
 )
-from .predicates import Point, direction_sign, orientation
+from ._predicates import Point, direction_sign, orientation
+from .arrays import Points, as_coordinate, as_points
 
 
 class HullTree:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._predicates import Point
 from .arrays import Points
-from .predicates import Point
 
 Exact = tuple[Fraction, Fraction]
 Integers = npt.NDArray[Any]

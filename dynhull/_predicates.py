@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import numpy.typing as npt
 
+from ._implementation import kernel
 from .arrays import Points, finite_pairs
-from .implementation import kernel
 
 Point = tuple[float, float]
 Floats = npt.NDArray[np.float64]

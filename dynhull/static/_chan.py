@@ -7,12 +7,12 @@ from math import log2
 import numpy as np
 import numpy.typing as npt
 
+from .._implementation import kernel
+from .._predicates import Point, orientation
 from ..arrays import Points, as_points
-from ..implementation import kernel
-from ..predicates import Point, orientation
-from .boundary import check_collinear, with_boundary_points
-from .jarvis import rightmost
-from .monotone_chain import half_chain
+from ._boundary import check_collinear, with_boundary_points
+from ._jarvis import rightmost
+from ._monotone_chain import half_chain
 from .trace import Collinear, Groups, Round, Rounds, Trace, Wrap
 
 Chains = tuple[list[Point], list[Point]]  # lower and upper, left to right

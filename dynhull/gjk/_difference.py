@@ -5,11 +5,11 @@ from fractions import Fraction
 from math import frexp, inf
 from typing import cast
 
+from .._hull import DynamicHull
 from ..convex import Cloud, Convex
-from ..hull import DynamicHull
-from .core import is_polytope
-from .simplex import foot, nearest
-from .vectors import ORIGIN, Vector, combine, dot, length, scale, subtract
+from ._core import is_polytope
+from ._simplex import foot, nearest
+from ._vectors import ORIGIN, Vector, combine, dot, length, scale, subtract
 
 MOST_ITERATIONS = 256  # polytopes take a few; a curve is followed to the tolerance
 # Relative to the squared distance: what a further step could still gain.
