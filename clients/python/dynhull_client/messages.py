@@ -6,9 +6,8 @@ from datetime import UTC, datetime
 import numpy as np
 import numpy.typing as npt
 
+from dynhull.arrays import Points as Points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
-
-Points = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
