@@ -1,4 +1,4 @@
-"""DynamicHull: the public face of a hull tree. Checks arguments, speaks numpy."""
+"""DynamicHull: the public class over a hull tree. Checks arguments and returns numpy arrays."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
@@ -19,11 +19,11 @@ T = TypeVar("T")
 
 
 class MissingPointError(KeyError):
-    """A delete names a point that is not there.
+    """A delete names a point that the hull does not hold.
 
     Attributes:
         point: the coordinates.
-        row: the row of the batch, None for a single delete.
+        row: the row of the batch; None for a single delete.
     """
 
     def __init__(self, point: tuple[float, float], row: int | None = None) -> None:
@@ -33,17 +33,17 @@ class MissingPointError(KeyError):
 
     def __str__(self) -> str:
         where = "" if self.row is None else f"row {self.row}: "
-        return f"{where}point {self.point} is not there to delete; nothing was changed"
+        return f"{where}point {self.point} is missing and cannot be deleted; nothing was changed"
 
 
 class DynamicHull:
     """The convex hull of a multiset of points in the plane, under inserts and deletes. Exact for every finite double.
 
     Args:
-        points: (n, 2) array-like of finite numbers, none to begin with when left out. O(n log n).
+        points: (n, 2) array-like of finite numbers; by default the hull starts empty. O(n log n).
 
     Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
-    numeric, or that no double can hold, names the first bad row, and changes nothing.
+    numeric, or not exactly representable as doubles. The message names the first bad row, and nothing changes.
 
     Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
     query.
@@ -69,32 +69,36 @@ class DynamicHull:
     # Updates
 
     def insert(self, x: float, y: float) -> bool:
-        """Add a point. True where the hull changed. O(log² n)."""
+        """Add a point. Returns whether the hull changed. O(log² n)."""
         return self._tree.insert(x, y)
 
     def delete(self, x: float, y: float) -> bool:
-        """Remove a point once. True where the hull changed; KeyError where the point is not there. O(log² n)."""
+        """Remove one copy of a point. Returns whether the hull changed. O(log² n).
+
+        Raises:
+            MissingPointError: the hull does not hold the point.
+        """
         try:
             return self._tree.delete(x, y)
         except KeyError:
             raise MissingPointError((as_coordinate(x, "x"), as_coordinate(y, "y"))) from None
 
     def insert_many(self, xy: npt.ArrayLike) -> int:
-        """Add points as one batch. Returns how many. O(log² n) each, O((n + k) log k) for k >= n."""
+        """Add k points as one batch. Returns k. O(log² n) each, O((n + k) log k) for k >= n."""
         return self._apply(+1, xy, "raise")
 
     def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
-        """Remove points as one batch. Returns how many were removed. O(log² n) each.
+        """Remove points as one batch. Returns the number of points removed. O(log² n) each.
 
         Args:
             xy: (k, 2) array-like.
-            missing: for a point that is not there (often enough): "raise" raises KeyError, which names its row, before
-                anything changes; "ignore" passes over it.
+            missing: for a row with more copies of a point than the hull holds, "raise" raises MissingPointError with
+                the row, before anything changes; "ignore" skips the row.
         """
         return self._apply(-1, xy, missing)
 
     def apply(self, ops: npt.ArrayLike, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
-        """Apply inserts and deletes as one batch. Returns how many rows were applied. O(log² n) each.
+        """Apply inserts and deletes as one batch. Returns the number of rows applied. O(log² n) each.
 
         A batch is a set: the order of its rows does not matter, and a point inserted and deleted in one batch leaves no
         trace.
@@ -117,33 +121,33 @@ class DynamicHull:
         try:
             return self._tree.apply(ops, xy, missing == "ignore")
         except KeyError as error:
-            if len(error.args) != 3:  # from within what was given as points
+            if len(error.args) != 3:  # raised by the caller's own array-like
                 raise
             x, y, row = error.args
             raise MissingPointError((x, y), row) from None
 
-    # What is there
+    # Contents
 
     def __len__(self) -> int:
-        """How many points, with multiplicity. O(1)."""
+        """The number of points, with multiplicity. O(1)."""
         return len(self._tree)
 
     @property
     def distinct(self) -> int:
-        """How many different points. O(1)."""
+        """The number of different points. O(1)."""
         return self._tree.distinct
 
     @property
     def changes(self) -> int:
-        """Grows by one with every update, single or batch, that changed the hull. O(1)."""
+        """The number of updates, single or batch, that changed the hull. O(1)."""
         return self._tree.changes
 
     def count(self, x: float, y: float) -> int:
-        """How many times the point is there. O(log n)."""
+        """The number of copies of the point. O(log n)."""
         return self._tree.count(x, y)
 
     def count_many(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """How many times each of (k, 2) points is there. O(log n) each."""
+        """(k,) numbers of copies of (k, 2) points. O(log n) each."""
         return self._tree.count_many(as_points(xy))
 
     def __contains__(self, point: tuple[float, float]) -> bool:
@@ -156,9 +160,9 @@ class DynamicHull:
         return self._tree.points()
 
     def vertices(self) -> Points:
-        """(h, 2) vertices, counter-clockwise from the lexicographically smallest; none lies between its neighbours.
+        """(h, 2) vertices, counter-clockwise from the lexicographically smallest, strictly convex. O(h log n).
 
-        O(h log n). No points: (0, 2). One point, any number of times: one vertex. All on one line: two.
+        No points: shape (0, 2). One point, in any number of copies: one vertex. All points collinear: two vertices.
         """
         return self._tree.vertices()
 
@@ -173,17 +177,17 @@ class DynamicHull:
     # Queries
 
     def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
-        """Where each of (k, 2) points is: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
+        """(k,) signs of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
         return self._tree.locate(as_points(xy))
 
     def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
+        """(k,) booleans: which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
         return self.locate(xy) >= 0
 
     def support(self, directions: npt.ArrayLike) -> Points:
-        """(k, 2) extreme vertices, one for each of (k, 2) directions, which need no unit length. Exact. O(log n) each.
+        """(k, 2) extreme vertices, one for each of (k, 2) directions of any length. Exact. O(log n) each.
 
-        Where a whole edge is extreme, its lexicographically smaller end.
+        If a whole edge is extreme, the vertex is its lexicographically smaller end.
 
         Raises:
             ValueError: a direction is (0, 0), or there are no points.
@@ -196,9 +200,9 @@ class DynamicHull:
     def tangents(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """(k, 2, 2) left and right tangent points seen from each of (k, 2) points. Exact. O(log n) each.
 
-        Seen from an outside point the hull lies between the two: none of it left of the ray to the left tangent point,
-        none of it right of the ray to the right one. Of two vertices on one such ray, the farther. NaN for points that
-        are not strictly outside, and for an empty hull.
+        Seen from an outside point, the hull is between the two: no part of it is left of the ray to the left tangent
+        point or right of the ray to the right one. Of two vertices on such a ray, the farther. NaN for points that are
+        not strictly outside, and for an empty hull.
         """
         return self._tree.tangents(as_points(xy))
 
@@ -210,26 +214,26 @@ class DynamicHull:
         return self._tree.distance(as_points(xy))
 
     def intersect_lines(self, p: npt.ArrayLike, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """(k, 2, 2) where the lines through each of (k, 2) points p and q enter and leave the hull. O(log n) each.
+        """(k, 2, 2) points where the lines through (k, 2) points p and q enter and leave the hull. O(log n) each.
 
         In the order from p to q; each coordinate is the exact value rounded once. A line that touches a vertex has it
-        twice, one along an edge has the edge's ends; NaN for a line that misses.
+        twice, a line along an edge has the edge's ends; NaN for a line that misses the hull.
 
         Raises:
-            ValueError: p and q differ in length, or are the same point in a row.
+            ValueError: p and q differ in length, or a row of p equals that of q.
         """
         starts, ends = as_points(p, "p"), as_points(q, "q")
         if len(starts) != len(ends):
             raise ValueError(f"p and q must have the same length, got {len(starts)} and {len(ends)}")
         same = np.flatnonzero((starts == ends).all(axis=1))
         if same.size:
-            raise ValueError(f"p and q row {same[0]} are the same point: no line")
+            raise ValueError(f"p and q row {same[0]} are the same point, which defines no line")
         return self._tree.intersect_lines(starts, ends)
 
-    # Measures, each computed once until the hull changes
+    # Measures, each kept until the hull changes
 
     def _measure(self, measure_of: Callable[[Points], T]) -> T:
-        """A measure of the vertices. Changes are counted first: what another thread changes meanwhile outdates it."""
+        """A measure of the vertices. Reads `changes` first, so that a concurrent update outdates the result."""
         changes = self.changes
         if self._measured[0] != changes:
             self._measured = (changes, {})
@@ -252,7 +256,7 @@ class DynamicHull:
 
     @property
     def centroid(self) -> tuple[float, float]:
-        """Centre of area, the exact value rounded once; of a segment the middle, NaN without points. O(h log n)."""
+        """Centre of area, the exact value rounded once; the middle of a segment, NaN without points. O(h log n)."""
         return self._measure(measure.centroid)
 
     @property
@@ -261,20 +265,20 @@ class DynamicHull:
         return self._measure(measure.bounds)
 
     def diameter(self) -> float:
-        """The greatest distance of two points, within one unit in the last place; 0.0 below two. O(h log n)."""
+        """The greatest distance of two points, within one unit in the last place; 0.0 for fewer. O(h log n)."""
         return self._measure(measure.diameter)
 
     def width(self) -> float:
         """The least distance of parallel lines with all points between, within one unit in the last place. O(h log n).
 
-        0.0 for points on one line, and for no points.
+        0.0 for collinear points, and for no points.
         """
         return self._measure(measure.width)
 
     def min_box(self) -> Points:
-        """(4, 2) corners of the box of least area in any direction around the points, counter-clockwise. O(h log n).
+        """(4, 2) corners, counter-clockwise, of the box of least area in any orientation. O(h log n).
 
-        Chosen exactly, each coordinate rounded once. Of points on one line the box is flat; NaN without points.
+        Chosen exactly, each coordinate rounded once. The box of collinear points is flat; NaN without points.
         """
         return self._measure(measure.min_box).copy()
 
@@ -283,7 +287,7 @@ class DynamicHull:
         return self._measure(measure.min_perimeter_box).copy()
 
     def min_circle(self) -> tuple[tuple[float, float], float]:
-        """Centre and radius of the smallest circle around the points. O(h log n), and O(h) a round, some ten rounds.
+        """Centre and radius of the smallest enclosing circle. O(h log n), and about ten rounds of O(h).
 
         The exact centre rounded once, the radius within one unit in the last place. (NaN, NaN) and 0.0 without points.
         """
@@ -312,7 +316,7 @@ class DynamicHull:
         self._measured = (changes, {})
 
     def __eq__(self, other: object) -> bool:
-        """Whether the other hull holds the same points, as often. O(n)."""
+        """Whether the other hull holds the same points with the same multiplicities. O(n)."""
         if not isinstance(other, DynamicHull):
             return NotImplemented
         return len(self) == len(other) and np.array_equal(self.points(), other.points())
@@ -321,5 +325,5 @@ class DynamicHull:
         return f"<DynamicHull of {len(self)} points, {len(self.vertices())} vertices>"
 
     def check(self) -> None:
-        """Raise AssertionError where an invariant of the tree is broken. O(n log n); for tests and bug reports."""
+        """Raise AssertionError if an invariant of the tree is broken, for tests and bug reports. O(n log n)."""
         self._tree.check()

@@ -5,9 +5,9 @@ the common tangent of its children's chains:
 
     chain(node) = chain(left) up to a, then chain(right) from b
 
-Both sides share all code: `SIGNS[side] * orientation(a, b, p) > 0` says that p lies outside the edge from a to b.
+Both sides share all code: p is outside the edge from a to b if `SIGNS[side] * orientation(a, b, p) > 0`.
 Lexicographic order is the order along x after an infinitesimal shear, so equal x need no special case. Chains are
-strict: a point between two vertices of one line is not a vertex.
+strict: a point on the segment between two others is not a vertex.
 """
 
 from bisect import bisect_left, bisect_right
@@ -35,7 +35,7 @@ class Leaf:
         self.chains = [half_chain(points, sign) for sign in SIGNS]
 
     def add(self, p: Point, side: int) -> bool:
-        """Repair one chain for p, just added to the points. True where p is on it. O(points)."""
+        """Repair one chain for p, just added to the points. True if p is on it. O(points)."""
         chain, sign = self.chains[side], SIGNS[side]
         i = k = bisect_left(chain, p)
         if 0 < i < len(chain) and sign * orientation(chain[i - 1], chain[i], p) <= 0:
@@ -48,7 +48,7 @@ class Leaf:
         return True
 
     def remove(self, p: Point, side: int) -> bool:
-        """Repair one chain for p, just removed from the points. True where p was on it. O(points)."""
+        """Repair one chain for p, just removed from the points. True if p was on it. O(points)."""
         chain = self.chains[side]
         i = bisect_left(chain, p)
         if i == len(chain) or chain[i] != p:
@@ -60,7 +60,7 @@ class Leaf:
 
 
 class Node:
-    """Two children, the point that separates them, and a bridge a side."""
+    """Two children, the point that separates them, and one bridge for each side."""
 
     __slots__ = ("bridges", "height", "left", "right", "separator")
     bridges: list[Edge]
@@ -84,8 +84,8 @@ Tree = Leaf | Node
 class Cursor:
     """A binary search along the chain of a subtree.
 
-    At every step (a, b) is an edge of the chain, and the caller says on which side of it the sought vertex lies; once
-    only one vertex is left, a is b.
+    At every step (a, b) is an edge of the chain, and the caller chooses the side of it that holds the vertex; when one
+    vertex is left, a is b.
     """
 
     __slots__ = ("_chain", "_first", "_highest", "_last", "_lowest", "_node", "_side", "a", "b")
@@ -96,7 +96,7 @@ class Cursor:
     b: Point
 
     def __init__(self, tree: Tree, side: int, lowest: Point = LOWEST, highest: Point = HIGHEST) -> None:
-        """Search the whole chain, or its part between two of its vertices."""
+        """Search the whole chain, or the part between two of its vertices."""
         self._node = tree
         self._side = side
         self._lowest = lowest
@@ -104,7 +104,7 @@ class Cursor:
         self._descend()
 
     def go_left(self) -> None:
-        """The sought vertex is a, or left of it."""
+        """Go on at a and left of it."""
         if isinstance(self._node, Leaf):
             self._last = (self._first + self._last) // 2
             self._halve()
@@ -114,7 +114,7 @@ class Cursor:
             self._descend()
 
     def go_right(self) -> None:
-        """The sought vertex is b, or right of it."""
+        """Go on at b and right of it."""
         if isinstance(self._node, Leaf):
             self._first = (self._first + self._last) // 2 + 1
             self._halve()
@@ -124,7 +124,7 @@ class Cursor:
             self._descend()
 
     def _descend(self) -> None:
-        """Pass the bridges that lie under the chain: those that reach beyond its ends."""
+        """Skip the bridges below the chain: those that reach beyond its ends."""
         node, side, lowest, highest = self._node, self._side, self._lowest, self._highest
         while isinstance(node, Node):
             self.a, self.b = a, b = node.bridges[side]
@@ -151,8 +151,8 @@ def bridge(left: Tree, right: Tree, side: int) -> Edge:
     """The edge that joins the chains of two subtrees, all of `left` before all of `right`. O(log n) orientations.
 
     With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
-    lies outside or on the line through a and b; likewise on the right. Where both edges have each other's ends inside,
-    their lines cross between the chains, and on which side of `first`, the least point of the right subtree, decides.
+    is outside or on the line through a and b; likewise on the right. If both edges have each other's ends inside, their
+    lines cross between the chains; on which side of `first`, the least point of the right subtree, decides.
     """
     sign = SIGNS[side]
     first = None
@@ -186,7 +186,7 @@ def bridge(left: Tree, right: Tree, side: int) -> Edge:
 
 
 def tangent_to_left(cursor: Cursor, p: Point, sign: int) -> Point:
-    """Where the tangent from p, right of the chain and outside of it, touches the chain; the farther of two."""
+    """The tangent point of the chain seen from p, which is right of the chain and outside it; the farther of two."""
     while cursor.a is not cursor.b:
         if sign * orientation(cursor.a, cursor.b, p) >= 0:
             cursor.go_left()
@@ -196,7 +196,7 @@ def tangent_to_left(cursor: Cursor, p: Point, sign: int) -> Point:
 
 
 def tangent_to_right(cursor: Cursor, p: Point, sign: int) -> Point:
-    """Where the tangent from p, left of the chain and outside of it, touches the chain; the farther of two."""
+    """The tangent point of the chain seen from p, which is left of the chain and outside it; the farther of two."""
     while cursor.a is not cursor.b:
         if sign * orientation(cursor.a, cursor.b, p) >= 0:
             cursor.go_right()
@@ -206,7 +206,7 @@ def tangent_to_right(cursor: Cursor, p: Point, sign: int) -> Point:
 
 
 def rotate(node: Node, *, to_right: bool) -> Node:
-    """Lift the higher child of a node out of balance; where its inner child is the higher one, that one. O(log n)."""
+    """Rotate the higher child above an unbalanced node, in a double rotation if its inner child is higher. O(log n)."""
     if to_right:
         top = node.left
         assert isinstance(top, Node)

@@ -1,8 +1,8 @@
-"""Which way three points turn, and two relatives: signs that are right for every finite double.
+"""Predicates: the orientation of three points and related signs, exact for every finite double.
 
-Each predicate first evaluates its determinant in floating point together with a bound on the rounding error
-(Shewchuk 1997, stage A, with slack for underflow). Where that cannot tell, the sign comes from integers: a double is
-an integer times a power of two, and scaling every x by one power of two and every y by another changes no sign.
+Each predicate evaluates its determinant in floating point, with a bound on the rounding error (Shewchuk 1997, stage A,
+with slack for underflow). If the bound does not decide the sign, integers do: a double is an integer times a power of
+two, and scaling every x by one power of two and every y by another changes no sign.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,16 +19,16 @@ Signs = npt.NDArray[np.int8]
 
 EPSILON = 2.0**-53
 ORIENT_BOUND = (3.0 + 16.0 * EPSILON) * EPSILON
-# Two more products and a difference than `orientation`: eight roundings at most, doubled to be safe.
+# Two products and a difference more than `orientation`: at most eight roundings, doubled for safety.
 CROSSING_BOUND = 16.0 * EPSILON
-# A product that underflows is wrong by up to 2**-1075, whatever its size; far above that, far below everything usual.
+# A product that underflows has an error of up to 2**-1075; this is far above that and far below usual values.
 UNDERFLOW = 1e-300
-# The same for a product that another difference of up to 2**1024 multiplies.
+# The same for a product that is multiplied by a difference of up to 2**1024.
 UNDERFLOW_FACTOR = 1e-280
 
 
 def orientation(a: Point, b: Point, c: Point) -> int:
-    """Return +1 where a, b, c turn left, -1 where they turn right, 0 where they lie on one line."""
+    """Return +1 if a, b, c turn left, -1 if they turn right, 0 if they are collinear."""
     ax, ay = a
     bx, by = b
     cx, cy = c
@@ -36,7 +36,7 @@ def orientation(a: Point, b: Point, c: Point) -> int:
     right = (ay - cy) * (bx - cx)
     det = left - right
     bound = ORIENT_BOUND * (abs(left) + abs(right)) + UNDERFLOW
-    # Overflow makes the bound infinite or the determinant NaN: both comparisons fail and the integers decide.
+    # On overflow the bound is infinite or the determinant is NaN: both comparisons are false, and the integers decide.
     if det > bound:
         return 1
     if -det > bound:
@@ -47,7 +47,7 @@ def orientation(a: Point, b: Point, c: Point) -> int:
 
 
 def direction_sign(d: Point, a: Point, b: Point) -> int:
-    """Return +1 where b lies further than a in direction d, -1 where it lies less far, 0 where neither."""
+    """Return +1 if b is farther than a in direction d, -1 if it is less far, 0 if neither."""
     dx, dy = d
     ax, ay = a
     bx, by = b
@@ -65,7 +65,7 @@ def direction_sign(d: Point, a: Point, b: Point) -> int:
 
 
 def cross_sign(a: Point, b: Point, c: Point, d: Point) -> int:
-    """Return the sign of (b - a) x (d - c): +1 where the way from c to d turns left of the way from a to b."""
+    """Return the sign of (b - a) x (d - c): +1 if the vector from c to d turns left of that from a to b."""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = a, b, c, d
     left = (bx - ax) * (dy - cy)
     right = (by - ay) * (dx - cx)
@@ -81,7 +81,7 @@ def cross_sign(a: Point, b: Point, c: Point, d: Point) -> int:
 
 
 def dot_sign(a: Point, b: Point, c: Point, d: Point) -> int:
-    """Return the sign of (b - a) . (d - c): +1 where the two ways lead in one direction rather than apart."""
+    """Return the sign of the dot product (b - a) . (d - c)."""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = a, b, c, d
     along = (bx - ax) * (dx - cx)
     up = (by - ay) * (dy - cy)
@@ -136,7 +136,7 @@ def crossing(a: Point, b: Point, c: Point, d: Point, z: Point) -> int:
 
 
 def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.NDArray[np.int8]:
-    """Which way a, b, c turn: +1 left (counter-clockwise), -1 right, 0 on one line. Exact for every finite double.
+    """The orientation of a, b, c: +1 left turn (counter-clockwise), -1 right turn, 0 collinear. Exact for all doubles.
 
     Args:
         a: one point (x, y), or an array of points of shape (..., 2).
@@ -150,8 +150,8 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
         ValueError: a coordinate is not finite, or a shape does not fit.
         TypeError: a coordinate is not a real number.
 
-    O(1) a triple. Floating-point filter after Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust
-    Geometric Predicates" (1997); exact integers where it cannot tell.
+    O(1) a triple. A floating-point filter after Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust
+    Geometric Predicates" (1997), and exact arithmetic if it does not decide.
 
     >>> orient2d((0, 0), (1, 0), (0, 1))
     1
@@ -195,7 +195,7 @@ def dot_signs(a: Points, b: Points, c: Points, d: Points) -> Signs:
 
 
 def _decided(left: Floats, right: Floats, exact_sign: Callable[..., int], *points: Points) -> Signs:
-    """The signs of left - right: in floats where the bound on their error tells, else by the exact predicate."""
+    """The signs of left - right: in floats if the bound on their error decides, otherwise by the exact predicate."""
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         det = left - right
         bound = ORIENT_BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
@@ -207,7 +207,7 @@ def _decided(left: Floats, right: Floats, exact_sign: Callable[..., int], *point
 
 
 def _integers(values: Iterable[float]) -> list[int]:
-    """The same numbers times one power of two that makes integers of them all."""
+    """The numbers times the least power of two that makes all of them integers."""
     ratios = [value.as_integer_ratio() for value in values]
     scale = max(denominator for _, denominator in ratios)
     return [numerator * (scale // denominator) for numerator, denominator in ratios]

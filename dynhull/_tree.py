@@ -1,8 +1,9 @@
 """HullTree: a fully dynamic planar convex hull, the readable reference.
 
-Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981), bridge-only, with fat leaves. An AVL tree
-holds the points in lexicographic order, up to LEAF of them in a leaf; `nodes.py` has its parts. An update repairs
-chains and bridges from the leaf up and stops where its point is not on the hull any more, which is early for most.
+Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981), with bridges only and fat leaves. An AVL
+tree holds the points in lexicographic order, up to LEAF of them in a leaf; `_nodes.py` has its parts. An update repairs
+chains and bridges from the leaf upwards, and stops as soon as its point is not on the hull of a subtree: for most
+updates, early.
 """
 
 from bisect import bisect_left, bisect_right
@@ -41,18 +42,18 @@ from .arrays import Points, as_coordinate, as_points
 class HullTree:
     """A multiset of points and its convex hull.
 
-    Single coordinates are checked, and the array to build from. In others coordinates are finite floats and zeros are
-    positive: callers see to it.
+    Single coordinates are checked, and so are the arrays of `__init__` and `apply`. Callers ensure that other arrays
+    hold finite floats without negative zeros.
 
     O(log² n) an update, O(log n) a query, O(n) space.
     """
 
-    LEAF = 64  # distinct points a leaf holds at most: measured, see benchmarks/tree.py
+    LEAF = 64  # the most distinct points in a leaf: measured, see benchmarks/tree.py
 
     def __init__(self, xy: npt.ArrayLike | None = None) -> None:
         """Build from an (n, 2) array-like, checked by `as_points`. O(n log n)."""
         self._root: Tree | None = None
-        self._copies: dict[Point, int] = {}  # how many, for the points that are there more than once
+        self._copies: dict[Point, int] = {}  # numbers of copies, of the points with more than one
         self._size = 0
         self._distinct = 0
         self.changes = 0
@@ -64,7 +65,7 @@ class HullTree:
 
     @property
     def distinct(self) -> int:
-        """How many different points."""
+        """The number of different points."""
         return self._distinct
 
     def clear(self) -> None:
@@ -74,11 +75,11 @@ class HullTree:
             self.changes += 1
 
     def count(self, x: float, y: float) -> int:
-        """How many times the point is there. O(log n)."""
+        """The number of copies of the point. O(log n)."""
         return self._count(_point(x, y))
 
     def count_many(self, xy: Points) -> npt.NDArray[np.int64]:
-        """How many times each row is there. O(log n) a row."""
+        """The number of copies of each row. O(log n) a row."""
         return np.array([self._count(p) for p in _tuples(xy)], dtype=np.int64)
 
     def _count(self, p: Point) -> int:
@@ -102,13 +103,13 @@ class HullTree:
     # Updates
 
     def insert(self, x: float, y: float) -> bool:
-        """Add a point. True where the hull changed. O(log² n)."""
+        """Add a point. True if the hull changed. O(log² n)."""
         changed = self._insert(_point(x, y), 1)
         self.changes += changed
         return changed
 
     def delete(self, x: float, y: float) -> bool:
-        """Remove a point once. True where the hull changed; KeyError where it is not there. O(log² n)."""
+        """Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n)."""
         changed = self._delete(_point(x, y), 1)
         self.changes += changed
         return changed
@@ -117,15 +118,15 @@ class HullTree:
         """Insert the rows with +1 and delete those with -1, as a set: the order of rows does not matter.
 
         Args:
-            ops: a number a row, or one for all.
+            ops: one number for each row, or one for all rows.
             xy: (n, 2) array-like, checked by `as_points`.
-            ignore_missing: whether to pass over rows that delete what is not there.
+            ignore_missing: whether to skip rows that delete a missing point.
 
         Returns:
-            How many rows were applied.
+            The number of rows applied.
 
         Raises:
-            KeyError: x, y and row of the first one that deletes what is not there; nothing has been applied.
+            KeyError: x, y and row of the first delete of a missing point; nothing has been applied.
         """
         points = _tuples(as_points(xy))
         ops = np.broadcast_to(ops, len(points))
@@ -206,7 +207,7 @@ class HullTree:
         return changed
 
     def _path(self, p: Point) -> tuple[list[Node], Leaf]:
-        """The nodes from the root down to the leaf where p belongs."""
+        """The nodes from the root to the leaf where p belongs, and that leaf."""
         path = []
         node = self._root
         while isinstance(node, Node):
@@ -216,7 +217,7 @@ class HullTree:
         return path, node
 
     def _climb_added(self, path: list[Node], p: Point, side: int) -> bool:
-        """Repair the bridges above p, new on its leaf's chain, as far as p is on the chain. True where to the root."""
+        """Repair the bridges above p, new on its leaf's chain, while p is on the chain. True if p reaches the root."""
         sign = SIGNS[side]
         for node in reversed(path):
             a, b = node.bridges[side]
@@ -233,7 +234,7 @@ class HullTree:
         return True
 
     def _climb_removed(self, path: list[Node], p: Point, side: int) -> bool:
-        """Repair the bridges above p, gone from its leaf's chain, as far as p was on it. True where to the root."""
+        """Repair the bridges above p, gone from its leaf's chain, while p was on it. True if p was on the root's."""
         for node in reversed(path):
             a, b = node.bridges[side]
             if p in (a, b):
@@ -242,10 +243,10 @@ class HullTree:
                 return False
         return True
 
-    # Shape of the tree
+    # Balance
 
     def _replace(self, path: list[Node], old: Tree, new: Tree) -> None:
-        """Put a subtree in another's place, below the last node of the path."""
+        """Replace a subtree below the last node of the path."""
         if not path:
             self._root = new
         elif path[-1].left is old:
@@ -254,7 +255,7 @@ class HullTree:
             path[-1].right = new
 
     def _drop(self, path: list[Node], leaf: Leaf) -> None:
-        """Take an empty leaf out; its sibling takes their parent's place."""
+        """Remove an empty leaf; its sibling replaces their parent."""
         if not path:
             self._root = None
             return
@@ -262,7 +263,7 @@ class HullTree:
         self._replace(path, parent, parent.right if parent.left is leaf else parent.left)
 
     def _merge(self, path: list[Node], leaf: Leaf) -> None:
-        """Give a small leaf's points to the leaf beside it below the same parent, where there is room."""
+        """Move a small leaf's points into the adjacent leaf below the same parent, if they fit."""
         if not path:
             return
         parent = path[-1]
@@ -271,7 +272,7 @@ class HullTree:
         neighbour = sibling
         if isinstance(sibling, Node):
             neighbour = sibling.left if on_left else sibling.right
-        assert isinstance(neighbour, Leaf)  # a leaf's sibling is one level higher at most
+        assert isinstance(neighbour, Leaf)  # the AVL condition: a leaf's sibling is at most one level higher
         if len(neighbour.points) + len(leaf.points) > self.LEAF * 3 // 4:
             return
         merged = Leaf(leaf.points + neighbour.points if on_left else neighbour.points + leaf.points)
@@ -285,7 +286,7 @@ class HullTree:
         self._rebalance(path)
 
     def _rebalance(self, path: list[Node]) -> None:
-        """Restore the AVL condition along a path, from its end up; stop where nothing changes any more."""
+        """Restore the AVL condition along a path, from its end upwards; stop at the first unchanged height."""
         while path:
             node = path.pop()
             lean = node.left.height - node.right.height
@@ -298,7 +299,7 @@ class HullTree:
             node.height = height
 
     def _build(self, counts: Counter[Point]) -> None:
-        """Start anew from distinct points and how often each is there."""
+        """Replace the contents by distinct points with their numbers of copies."""
         points = sorted(counts)
         self._copies = {p: count for p, count in counts.items() if count > 1}
         self._size = counts.total()
@@ -307,7 +308,7 @@ class HullTree:
         self._root = balanced([Leaf(points[i : i + fill]) for i in range(0, len(points), fill)])
 
     def _rebuild(self, net: Counter[Point]) -> bool:
-        """Apply a batch as large as the tree by building it anew."""
+        """Apply a batch as large as the tree by building a new tree."""
         before = self._vertices()
         counts = Counter({p: self._copies.get(p, 1) for p in self._all_points()})
         counts.update(net)
@@ -360,21 +361,21 @@ class HullTree:
     # Queries
 
     def locate(self, xy: Points) -> npt.NDArray[np.int8]:
-        """+1 inside, 0 on the boundary, -1 outside, a row each. O(log n) a row."""
+        """+1 inside, 0 on the boundary, -1 outside, for each row. O(log n) a row."""
         return np.array([self._locate(p)[0] for p in _tuples(xy)], dtype=np.int8)
 
     def support(self, directions: Points) -> Points:
-        """The vertex farthest in each direction; of two the lexicographically smaller. O(log n) a row."""
+        """The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row."""
         return _array([self._support(d) for d in _tuples(directions)])
 
     def tangents(self, xy: Points) -> npt.NDArray[np.float64]:
-        """The left and the right tangent point seen from each row, NaN where it is not outside. O(log n) a row."""
+        """The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row."""
         nothing = ((np.nan, np.nan), (np.nan, np.nan))
         rows = [self._tangents(p) or nothing for p in _tuples(xy)]
         return np.array(rows, dtype=np.float64).reshape(len(rows), 2, 2)
 
     def distance(self, xy: Points) -> npt.NDArray[np.float64]:
-        """The distance of each row to the hull, the nearest double; inf without points. O(h + log n a row)."""
+        """The distance of each row to the hull, rounded once; inf without points. O(h + log n a row)."""
         return measure.distance(self.vertices(), self.tangents(xy), xy)
 
     def intersect_lines(self, p: Points, q: Points) -> npt.NDArray[np.float64]:
@@ -382,7 +383,7 @@ class HullTree:
         return measure.intersect_lines(self.vertices(), p, q)
 
     def _locate(self, p: Point) -> tuple[int, int, Edge]:
-        """Where p is; outside, also the side and the edge it lies beyond: (p, p) where it lies before or after all."""
+        """Where p is; outside, also the side and the edge beyond which it is: (p, p) if it precedes or follows all."""
         beyond_the_ends = UPPER, (p, p)
         inside = 1
         if self._root is None:
@@ -439,9 +440,9 @@ class HullTree:
     # Verification
 
     def check(self) -> None:
-        """Raise AssertionError where an invariant is broken: every bridge and chain against its definition.
+        """Raise AssertionError if an invariant is broken: checks every bridge and chain against its definition.
 
-        O(n log n) orientations, none of them shared with the searches.
+        O(n log n) orientations, without the code of the searches.
         """
         points = list(self._all_points())
         _require(points == sorted(set(points)), "points out of order")
@@ -454,7 +455,7 @@ class HullTree:
             self._check(self._root)
 
     def _check(self, tree: Tree) -> list[Point]:
-        """The points below, after checking them."""
+        """Check a subtree; return its points."""
         if isinstance(tree, Leaf):
             _require(0 < len(tree.points) <= self.LEAF, f"a leaf of {len(tree.points)} points")
             for side, chain in enumerate(tree.chains):
@@ -480,7 +481,7 @@ def _check_edge(edge: Edge, points: Sequence[Point], side: int) -> None:
 
 
 def _require(condition: bool, what: str) -> None:
-    """An assert that python -O keeps."""
+    """Assert, also under python -O."""
     if not condition:
         raise AssertionError(what)
 

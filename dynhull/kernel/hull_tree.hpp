@@ -1,4 +1,8 @@
-// HullTree: a multiset of points and its convex hull, as in dynhull/tree.py, which explains the algorithm.
+// HullTree: a multiset of points and its convex hull. The reference in Python, dynhull/_tree.py, explains the
+// algorithm.
+//
+// Reading order: predicates/ (exact signs), tree/ (leaves, bridges, single updates), batch/ (many updates at once),
+// this file, query/. sort/ and memory/ serve them, static/ has the hulls of fixed points, python/ the bindings.
 #pragma once
 
 #include <optional>
@@ -14,8 +18,8 @@ struct Applied {
   std::int64_t first_missing;
 };
 
-// Coordinates of single points are finite and no zero is negative: callers see to it. Where an update throws, nothing
-// has changed.
+// Callers ensure that the coordinates of single points are finite and that no zero is negative. If an update throws,
+// nothing has changed.
 class HullTree {
  public:
   std::uint64_t changes = 0;
@@ -33,7 +37,7 @@ class HullTree {
 
   std::size_t size() const { return size_; }
   std::size_t distinct() const { return distinct_; }
-  std::uint64_t version() const { return version_; }  // grows whenever the hull changes
+  std::uint64_t version() const { return version_; }  // increases with every change of the hull
   const Nodes& nodes() const { return nodes_; }
   const Copies& copies() const { return copies_; }
 
@@ -52,7 +56,7 @@ class HullTree {
     changed();
   }
 
-  // True where the hull changed.
+  // True if the hull changed.
   bool insert(Point p) {
     nodes_.reserve(1);
     const Place place = find(nodes_, p);
@@ -87,9 +91,9 @@ class HullTree {
     return Removal::HULL_CHANGED;
   }
 
-  // Insert the rows with +1 and delete those with -1, as a set. With a row that deletes what is not there nothing is
-  // applied, unless missing points are to be ignored. Together or one by one, the batch decides where not told.
-  // The points are copied before anything is made of them; throws NotFinite where one is not.
+  // Inserts the rows with +1 and deletes those with -1, as a set. If a row deletes a missing point, nothing is applied,
+  // unless `ignore_missing`. `together` chooses divide and conquer or one change after the other; by default the batch
+  // decides. Copies the points first, so that other threads may change them; throws NotFinite if one is not finite.
   Applied apply(Ops ops, const Point* points, std::size_t count, bool ignore_missing,
                 std::optional<bool> together = {}) {
     if (count > 0 && nodes_.root == NONE && ops.all_insert()) return fill(points, count);
@@ -111,7 +115,7 @@ class HullTree {
     return {groups.rows_applied, groups.first_missing};
   }
 
-  // Every distinct point in order, with its number of copies.
+  // Visits every distinct point in order, with its number of copies.
   template <class Visit>
   void for_each(Visit visit) const {
     visit_points(nodes_.root, visit);
@@ -128,7 +132,7 @@ class HullTree {
   std::size_t reserved_bytes() const { return nodes_.reserved_bytes(); }
 
  private:
-  // The first points of an empty tree.
+  // Inserts the first points of an empty tree.
   Applied fill(const Point* points, std::size_t count) {
     const Distinct distinct(points, count);
     if (!distinct.finite()) throw NotFinite();
@@ -140,7 +144,7 @@ class HullTree {
     return {static_cast<std::int64_t>(count), -1};
   }
 
-  // True where the hull changed.
+  // True if the hull changed.
   bool apply(const Plan& plan, std::optional<bool> together) {
     if (plan.changes().empty()) return recount(plan), false;
     const bool as_large = plan.inserts >= distinct_;
@@ -173,13 +177,13 @@ class HullTree {
     return nodes;
   }
 
-  // Note in its leaf whether a point is there more than once.
+  // Marks in its leaf whether a point is repeated.
   void mark(const Place& place, bool repeated) {
     Mask& marks = nodes_.leaf(place.leaf).repeated;
     marks = repeated ? marks | bit(place.entry) : marks & ~bit(place.entry);
   }
 
-  // A batch as large as the tree: merge it with the points and build anew.
+  // Applies a batch as large as the tree: merges it with the points and builds a new tree.
   bool rebuild(const Plan& plan) {
     std::vector<Point> merged;
     merged.reserve(distinct_ + plan.inserts);
@@ -188,7 +192,7 @@ class HullTree {
     for_each([&](Point p, std::uint64_t) {
       for (; next != last && next->p < p; ++next) merged.push_back(next->p);
       if (next != last && next->p == p)
-        ++next;  // goes
+        ++next;  // removed
       else
         merged.push_back(p);
     });
@@ -206,7 +210,7 @@ class HullTree {
     return before[UPPER] != after[UPPER] || before[LOWER] != after[LOWER];
   }
 
-  // So that recount() cannot fail. An entry of one says that it is only room.
+  // Allocates entries so that recount() cannot fail. An entry of one is only room.
   void make_room_for_copies(Plan& plan) {
     try {
       for (Recount& entry : plan.recounts)
@@ -220,7 +224,8 @@ class HullTree {
     std::erase_if(copies_, [](const auto& entry) { return entry.second == 1; });
   }
 
-  // Before the changes are applied, once nothing can fail any more: new points are marked afterwards.
+  // Updates the numbers of copies. To be called before the changes are applied, once nothing can fail any more; new
+  // points are marked afterwards.
   void recount(const Plan& plan) {
     for (const Recount& entry : plan.recounts) {
       if (entry.after > 1)

@@ -1,11 +1,12 @@
-// Applying a batch: split it along the tree, repair each touched leaf and bridge once on the way back.
+// Large batches, by divide and conquer: split the batch along the tree, repair each touched leaf and bridge once on the
+// way back.
 //
-// A few changes that share a small subtree run one by one in it, as if it were the whole tree; a leaf with many is
-// merged and its chains computed once. Up in the tree only candidates matter: for each side, inserted points that are
-// on the new chain and deleted points that were on the old one. Candidates may include points that came and went while
-// changes ran one by one (deletes first, so that nothing of the old or new chain is missed); such a point lies below an
-// edge of the chain that has a true candidate at one end, and the two pass the same nodes, so that candidates reach the
-// root exactly when the hull changed.
+// A few changes that share a small subtree are applied one by one, as if it were the whole tree; a leaf with many
+// changes is merged with them, and its chains are computed once. Higher up only candidates matter: for each side,
+// inserted points on the new chain and deleted points that were on the old one. Candidates may include points that
+// joined and left a chain while changes ran one by one (deletes first, so that no point of the old or new chain is
+// missed). Such a point is below an edge of the chain with a true candidate at one end, and the two pass the same
+// nodes; so candidates reach the root exactly if the hull changed.
 #pragma once
 
 #include "../tree/build.hpp"
@@ -16,7 +17,7 @@ namespace dynhull {
 
 class DividedBatch {
  public:
-  // Needs room in nodes for the plan's extra leaves. All other memory is taken here; apply() cannot fail.
+  // Needs room in `nodes` for the plan's extra leaves. Allocates all other memory, so that apply() cannot fail.
   DividedBatch(Nodes& nodes, const Plan& plan)
       : nodes_(nodes), changes_(plan.changes().data()), count_(plan.changes().size()) {
     for (Side side : SIDES) candidates_[side].resize(count_);
@@ -28,7 +29,7 @@ class DividedBatch {
     small_.reserve(count_);
   }
 
-  // True where the hull changed.
+  // True if the hull changed.
   bool apply() {
     const Found found = run(nodes_.root, 0, count_);
     nodes_.root = found.tree;
@@ -39,12 +40,12 @@ class DividedBatch {
   }
 
  private:
-  // Up to so many changes run one by one in the subtree that they share.
+  // Up to this many changes in a subtree are applied one by one.
   static constexpr std::size_t FEW = LEAF * 3 / 8;
   static constexpr std::size_t LOOKAHEAD = 4;
 
-  // A subtree after its changes, detached, and how many candidates there are, a side: numbers of changes, stored in
-  // candidates_ from the place of the subtree's first change on.
+  // A detached subtree after its changes, and the number of candidates of each side. A candidate is an index into
+  // changes_; those of a subtree start at the index of its first change in candidates_.
   struct Found {
     Ref tree;
     std::size_t candidates[2] = {0, 0};
@@ -122,7 +123,7 @@ class DividedBatch {
     return found;
   }
 
-  // Join two subtrees again under the node that they had, and let pass the candidates that matter further up.
+  // Joins two subtrees again by their former parent, and keeps the candidates that matter higher up.
   Found combine(Ref v, Found left, Found right, std::size_t from, std::size_t cut) {
     const Bridges old = {{nodes_.bridge(v, UPPER), nodes_.bridge(v, LOWER)}};
     Found found{v};
@@ -174,10 +175,10 @@ class DividedBatch {
     return found;
   }
 
-  // Whether a point of a child's chain is on its parent's.
+  // Whether a point on a child's chain is on the parent's chain.
   static bool reaches(const Edge& bridge, Point p, bool on_left) { return on_left ? p <= bridge.a : p >= bridge.b; }
 
-  // Whether a bridge lost an end, or a new point lies outside of it, or on its line beyond an end.
+  // Whether a bridge lost an end, or a new point is outside it, or on its line beyond an end.
   bool broken(const Edge& edge, Side side, const Found& found, std::size_t from, std::size_t cut) const {
     for (std::size_t i = 0; i < found.candidates[side]; ++i) {
       const std::size_t number = candidates_[side][from + i];
@@ -215,10 +216,10 @@ class DividedBatch {
   const Change* changes_;
   std::size_t count_;
   std::vector<std::uint32_t> candidates_[2];
-  std::vector<Point> points_;  // of a leaf that is merged
+  std::vector<Point> points_;  // of a merged leaf
   std::vector<std::uint8_t> repeated_;
-  std::vector<Ref> leaves_;  // that it becomes, and room for their nodes
-  std::vector<Ref> small_;   // leaves to merge with their neighbours at the end
+  std::vector<Ref> leaves_;  // the leaves it becomes, and room for their nodes
+  std::vector<Ref> small_;   // leaves to merge with their neighbours in the end
 };
 
 }  // namespace dynhull

@@ -1,4 +1,4 @@
-// The rows of a batch as a set: sorted, equal points together.
+// The rows of a batch as a multiset: sorted, and grouped by point.
 #pragma once
 
 #include "../memory/scratch.hpp"
@@ -9,11 +9,11 @@ namespace dynhull {
 
 struct Group {
   Point p;
-  Ref leaf = NONE;          // where p belongs, or belonged
-  std::uint32_t first = 0;  // of its rows; the next group's is the end
+  Ref leaf = NONE;          // where p belongs, as found before the batch
+  std::uint32_t first = 0;  // the group's first row; the next group's is its end
 };
 
-// What the rows of a batch do, +1 to insert and -1 to delete: a number each, or, a step of 0, one for all.
+// The operations of a batch's rows, +1 to insert and -1 to delete: one for each row, or with step 0 one for all.
 struct Ops {
   const std::int8_t* first;
   std::size_t step = 1;
@@ -22,13 +22,13 @@ struct Ops {
   bool all_insert() const { return step == 0 && *first > 0; }
 };
 
-struct NotFinite {};  // thrown: a coordinate is not
+struct NotFinite {};  // thrown if a coordinate is not finite
 
 class Groups {
  public:
   std::int64_t rows_applied;
-  std::int64_t first_missing = -1;  // the first row that deletes what is not there
-  std::int64_t growth = 0;          // points more than before, with multiplicity
+  std::int64_t first_missing = -1;  // the first row that deletes a missing point
+  std::int64_t growth = 0;          // the change of the number of points, with multiplicity
 
   Groups(Ops ops, const Point* points, std::size_t count)
       : rows_applied(static_cast<std::int64_t>(count)), rows_(few(count)), groups_(count + 1) {
@@ -48,14 +48,14 @@ class Groups {
   std::size_t size() const { return size_; }
   const Group& operator[](std::size_t i) const { return groups_[i]; }
 
-  // Find the leaf of each group.
+  // Finds the leaf of each group.
   void descend(const Nodes& nodes) {
     if (nodes.root != NONE) descend(nodes, nodes.root, 0, size_);
   }
 
   bool new_leaf(std::size_t i) const { return i == 0 || groups_[i].leaf != groups_[i - 1].leaf; }
 
-  // How often a group's point is there after its rows; notes the deletes that find none left.
+  // The number of copies of a group's point after its rows, given the number before. Records deletes that find none.
   std::uint64_t settle(std::size_t i, std::uint64_t before) {
     const Row* const first = rows_.data() + groups_[i].first;
     const Row* const last = rows_.data() + groups_[i + 1].first;
@@ -70,7 +70,7 @@ class Groups {
   }
 
  private:
-  static constexpr std::size_t TOGETHER = 32;  // descents side by side
+  static constexpr std::size_t TOGETHER = 32;  // interleaved descents
 
   static std::size_t few(std::size_t count) {
     if (count >= NONE) throw std::bad_alloc();
@@ -78,7 +78,7 @@ class Groups {
   }
   static bool inserts(const Row& row) { return row.row % 2 == 0; }
 
-  // Of a group's deletes, the first ones find the points that are available.
+  // Records the surplus deletes of a group: its first deletes find the available points, the others none.
   void miss(const Row* row, std::uint64_t deletes, std::uint64_t available) {
     rows_applied -= static_cast<std::int64_t>(deletes - available);
     for (std::uint64_t found = 0; found <= available; ++row) found += !inserts(*row);
@@ -86,7 +86,7 @@ class Groups {
     if (first_missing < 0 || number < first_missing) first_missing = number;
   }
 
-  // Find the leaves of the groups from..to, at most TOGETHER, below `tree`: side by side, so that cache misses overlap.
+  // Finds the leaves of the groups from..to, at most TOGETHER, below `tree`: interleaved, so that cache misses overlap.
   void descend_together(const Nodes& nodes, Ref tree, std::size_t from, std::size_t to) {
     Ref at[TOGETHER];
     std::fill_n(at, to - from, tree);
@@ -101,7 +101,7 @@ class Groups {
     for (std::size_t i = from; i < to; ++i) groups_[i].leaf = at[i - from];
   }
 
-  // Find the leaf of each of the groups from..to, which belong to the subtree.
+  // Finds the leaves of the groups from..to, which all belong to the subtree.
   void descend(const Nodes& nodes, Ref tree, std::size_t from, std::size_t to) {
     while (to - from > TOGETHER && !is_leaf(tree)) {
       const Point separator = nodes.node(tree).separator;

@@ -1,4 +1,4 @@
-// Applying a small batch: one change after the other, in order.
+// Small batches: one change after the other, in sorted order.
 #pragma once
 
 #include "../tree/update.hpp"
@@ -6,10 +6,10 @@
 
 namespace dynhull {
 
-// True where the hull changed. Needs room in nodes for the plan's extra leaves.
+// True if the hull changed. Needs room in `nodes` for the plan's extra leaves.
 inline bool apply_in_order(Nodes& nodes, std::span<const Change> changes) {
-  constexpr std::size_t LOOKAHEAD = 8;  // changes whose leaf is on its way from memory
-  constexpr unsigned SHARED = 4;        // how high the subtrees are that several changes share, were there one a leaf
+  constexpr std::size_t LOOKAHEAD = 8;  // changes whose leaf is being prefetched
+  constexpr unsigned SHARED = 4;  // the height of subtrees that several changes share, if changes were spread evenly
   Finger finger(nodes, SHARED + static_cast<unsigned>(std::bit_width(nodes.leaf_count() / (changes.size() + 1))));
   bool changed = false;
   for (std::size_t i = 0; i < changes.size(); ++i) {

@@ -1,5 +1,5 @@
-// What a batch amounts to: read the tree, change nothing. What remains are points that are new, points that go, and
-// points that only change their number.
+// The net effect of a batch: points to add, points to remove, and points whose number of copies changes. Reads the tree
+// and changes nothing.
 #pragma once
 
 #include <span>
@@ -14,11 +14,11 @@ namespace dynhull {
 struct Change {
   Point p;
   Ref leaf;
-  std::uint8_t entry, size;  // in the leaf, and of it
+  std::uint8_t entry, size;  // the entry's index, and the size of the leaf
   bool insert;
 };
 
-// The place now. While changes are applied in order, those before it have moved it, and none of the points after it.
+// The change's present place. If changes are applied in order, the earlier ones have moved it, but no point after it.
 inline Place place_of(const Nodes& nodes, const Change& change) {
   const Leaf& leaf = nodes.leaf(change.leaf);
   const unsigned entry = leaf.size - (change.size - change.entry);
@@ -26,21 +26,21 @@ inline Place place_of(const Nodes& nodes, const Change& change) {
   return find_near(nodes, change.leaf, change.p);
 }
 
-// A point that is there more than once before or after.
+// A point with more than one copy before or after the batch, whose number of copies changes.
 struct Recount {
   Point p;
-  Place place;  // before
+  Place place;  // before the batch
   std::uint64_t before, after;
-  std::uint64_t* copies;  // the entry, where there is one
+  std::uint64_t* copies;  // the entry of the point in Copies, if it has one
 };
 
 class Plan {
  public:
   std::size_t inserts = 0;  // changes that insert
-  std::size_t leaves = 0;   // in which something changes
-  // The changes need at most so many more: one where all goes before something comes, one for each leaf that overflows,
-  // and one for half a leaf's worth of inserts, which it takes to split again what a split has made. Where a merge has
-  // made what splits, it gave a leaf back.
+  std::size_t leaves = 0;   // leaves with a change
+  // The changes need at most this many new leaves: one if everything is removed before something is inserted, one for
+  // each leaf that overflows, and one for every half leaf of inserts, the least that splits a leaf from a split again.
+  // A leaf from a merge may split too, but the merge has given a leaf back.
   std::size_t extra_leaves = 1;
   std::vector<Recount> recounts;
 
@@ -52,14 +52,14 @@ class Plan {
 
   std::span<const Change> changes() const { return {changes_.data(), changes_end_}; }
 
-  // Whether so many changes share a leaf that they are better applied together: measured, see docs/performance.md.
+  // Whether enough changes share a leaf that divide and conquer is faster: measured, see docs/performance.md.
   bool crowded() const { return changes().size() >= LEAF / 2 * leaves; }
 
  private:
   static constexpr std::size_t BLOCK = 16;
-  static constexpr std::size_t LOOKAHEAD = 12;  // groups whose leaf is on its way from memory
+  static constexpr std::size_t LOOKAHEAD = 12;  // groups whose leaf is being prefetched
 
-  // First of all groups of a block the searches in x, which branch nowhere, so that they overlap.
+  // Reads a block of groups. First does all searches in x, which are branch-free, so that they overlap.
   void read(const Nodes& nodes, Copies& copies, Groups& groups, std::size_t from, std::size_t to) {
     const bool empty = nodes.root == NONE;
     unsigned entries[BLOCK] = {};
@@ -102,7 +102,7 @@ class Plan {
 
   Scratch<Change> changes_;
   Change* changes_end_;
-  std::size_t added_ = 0;  // to the leaf of the last change
+  std::size_t added_ = 0;  // inserts into the leaf of the last change
 };
 
 }  // namespace dynhull

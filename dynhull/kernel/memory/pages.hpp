@@ -1,4 +1,4 @@
-// Memory for plain records.
+// Allocation of plain memory, in whole pages where it is large.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace dynhull {
 
 #ifdef DYNHULL_FAIL_ALLOCATIONS
-bool allocation_fails();  // the fuzzer's
+bool allocation_fails();  // defined by the fuzzer
 #else
 constexpr bool allocation_fails() { return false; }
 #endif
@@ -23,7 +23,7 @@ namespace memory {
 
 constexpr std::size_t PAGE = 4096;
 
-// Memory of this size or more comes from the system, where that can move it, and goes back there at once.
+// Blocks of this size or more are mapped from the system where it can move them (mremap), and unmapped when released.
 constexpr std::size_t LARGE = std::size_t{1} << 22;
 
 inline std::size_t whole_pages(std::size_t bytes) { return bytes > PAGE ? (bytes + PAGE - 1) / PAGE * PAGE : bytes; }
@@ -31,7 +31,7 @@ inline std::size_t whole_pages(std::size_t bytes) { return bytes > PAGE ? (bytes
 #ifdef __linux__
 constexpr std::size_t HUGE_PAGE = std::size_t{1} << 21;
 
-// Below, the C library's heap; otherwise whole pages of our own, aligned so that huge pages fit.
+// Smaller blocks come from the C library's heap. Larger ones are mapped, and aligned for huge pages.
 inline bool mapped(std::size_t bytes) { return bytes >= LARGE; }
 
 inline void* map_aligned(std::size_t bytes) {
@@ -47,7 +47,7 @@ inline void* map_aligned(std::size_t bytes) {
 }
 #endif
 
-// Both sizes are multiples of a page where they are mapped.
+// Sizes of mapped blocks are multiples of a page.
 inline void* resize(void* old, std::size_t old_bytes, std::size_t bytes) {
   if (allocation_fails()) throw std::bad_alloc();
 #ifdef __linux__

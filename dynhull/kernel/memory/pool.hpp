@@ -1,4 +1,4 @@
-// A growing array of plain records whose memory moves without being copied where the system can do that.
+// A growing array of plain records. Its memory moves without a copy where the system supports that.
 #pragma once
 
 #include <type_traits>
@@ -8,7 +8,7 @@
 
 namespace dynhull {
 
-// Slots are handed out by number, freed ones first; `reserve` may throw, nothing else does.
+// Hands out slots by number, freed ones first. Only `reserve` and the copy constructor throw.
 template <class Record>
 class Pool {
   static_assert(std::is_trivially_copyable_v<Record> && sizeof(Record) >= sizeof(std::uint32_t));
@@ -31,8 +31,8 @@ class Pool {
   Record& operator[](std::uint32_t i) { return data_[i]; }
   const Record& operator[](std::uint32_t i) const { return data_[i]; }
 
-  // Room for `extra` more records: take() will not throw that many times. Grows by an eighth at least; while it is
-  // small, to half as much again as is needed, because memory that moves costs more than memory that is not touched.
+  // Makes room for `extra` more records, so that as many calls of take() succeed. Grows by at least an eighth. A small
+  // pool grows to half as much again as needed, because moving memory costs more than untouched memory.
   void reserve(std::size_t extra) {
     const std::size_t needed = used_ + extra;
     if (needed <= capacity_ + freed_) return;

@@ -1,4 +1,4 @@
-// Memory that a batch or a build needs for a moment.
+// Temporary memory for a batch or a build.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@ struct Block {
   std::size_t bytes;
 };
 
-// Blocks that a thread has had a use for, for its next batch: the C library gives free memory of some size back to the
-// system, which hands it out again page by page, zeroed. That was a tenth of the cost of a large batch.
+// Blocks that a thread keeps for its next batch. The C library would return free memory of this size to the system,
+// which hands it out again page by page, zeroed: a tenth of the cost of a large batch.
 class BlockCache {
  public:
   static Block take(std::size_t bytes) {
@@ -40,7 +40,7 @@ class BlockCache {
     return spares;
   }
 
-  // A block, or a new one.
+  // The smallest kept block of this size or more, or a new one.
   Block smallest_with(std::size_t bytes) {
     Block* best = nullptr;
     for (Block& block : blocks_)
@@ -50,7 +50,7 @@ class BlockCache {
     return std::exchange(*best, {});
   }
 
-  // Keeps the block instead of the smallest one, where it is larger. Returns what is left over.
+  // Keeps the block if it is larger than the smallest one. Returns the block that is not kept.
   Block replace_smallest(Block block) {
     Block* smallest = &blocks_[0];
     for (Block& kept : blocks_)
@@ -59,10 +59,10 @@ class BlockCache {
     return block;
   }
 
-  std::array<Block, 4> blocks_ = {};  // a batch needs so many at once
+  std::array<Block, 4> blocks_ = {};  // as many as a batch uses at a time
 };
 
-// A fixed number of plain records, not initialised.
+// A fixed number of plain records, uninitialised.
 template <class Record>
 class Scratch {
  public:

@@ -1,5 +1,4 @@
-// Signs of sums of products of doubles, exact for every finite double: a fixed-point number as wide as the exponent
-// range.
+// Exact signs of sums of products of doubles: a fixed-point number as wide as the range of exponents.
 #pragma once
 
 #include <array>
@@ -10,21 +9,22 @@
 
 namespace dynhull {
 
-// mantissa 2^exponent, the mantissa 0 or of size 0.5 to 1.
+// mantissa 2^exponent; the absolute value of the mantissa is 0 or in [0.5, 1).
 struct Scaled {
   double mantissa;
   int exponent;
 };
 
 // A sum of products of FACTORS doubles each. Every product is an integer times 2^(-1074 FACTORS) and below
-// 2^(1024 FACTORS). Limbs have 32 bits and room for a sign and 2^31 carries, which are settled in the end.
+// 2^(1024 FACTORS). A limb is 32 bits wide and stored in 64, which leaves room for a sign and
+// 2^31 carries; sign() and approximate() propagate them.
 template <int FACTORS>
 class ExactSum {
  public:
-  // Some small integer times the product.
+  // Adds a small integer times the product.
   void add(int weight, std::array<double, FACTORS> factors) {
     std::uint32_t product[2 * FACTORS + 1] = {1};
-    int position = 0;  // of the product's lowest bit, counted from 2^(-1074 FACTORS)
+    int position = 0;  // of the product's lowest bit, where bit 0 is 2^(-1074 FACTORS)
     for (int f = 0; f < FACTORS; ++f) {
       const auto bits = std::bit_cast<std::uint64_t>(factors[f]);
       const int exponent = static_cast<int>(bits >> 52) & 0x7ff;

@@ -1,4 +1,4 @@
-// Points and their order.
+// Points in lexicographic order, edges, and the two sides of a hull.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@ struct Point {
   double x, y;
 };
 
-inline bool operator==(Point p, Point q) { return (p.x == q.x) & (p.y == q.y); }  // & on purpose: no branch
+inline bool operator==(Point p, Point q) { return (p.x == q.x) & (p.y == q.y); }  // & rather than &&: no branch
 
-// The lexicographic order. The branch is foreseen, as few points of an input share their x.
+// The branch is predictable: few points of an input share their x.
 inline bool operator<(Point p, Point q) {
   if (p.x == q.x) [[unlikely]]
     return p.y < q.y;
@@ -33,13 +33,13 @@ struct Edge {
   Point a, b;
 };
 
-// Makes points what trees hold: no zero is negative, so that equal points are the same; and sees whether all are
-// finite.
+// Turns points into the form that trees store, without negative zeros, so that equal points have equal bits. Records
+// whether all of them were finite.
 class Plain {
  public:
   Point operator()(Point p) {
     const Point plain = {p.x + 0.0, p.y + 0.0};
-    strange_.x += plain.x - plain.x;  // 0, or NaN where it is not finite
+    strange_.x += plain.x - plain.x;  // 0, or NaN if not finite
     strange_.y += plain.y - plain.y;
     return plain;
   }
@@ -49,7 +49,7 @@ class Plain {
   Point strange_ = {0, 0};
 };
 
-// Both sides share all code: turned(side, orientation(a, b, p)) > 0 says that p lies outside the edge from a to b.
+// Both sides share all code: p is outside the edge from a to b if turned(side, orientation(a, b, p)) > 0.
 enum Side : int { UPPER = 0, LOWER = 1 };
 constexpr Side SIDES[] = {UPPER, LOWER};
 inline int turned(Side side, int sign) { return side == UPPER ? sign : -sign; }

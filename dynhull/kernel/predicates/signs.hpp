@@ -1,8 +1,8 @@
-// Which way three points turn, and its relatives: signs that are right for every finite double.
+// Predicates: the orientation of three points and related signs, exact for every finite double.
 //
-// Each first evaluates its determinant in floating point together with a bound on the rounding error (Shewchuk 1997,
-// stage A, with slack for underflow), and where that cannot tell, exactly. Compile with -ffp-contract=off: the bounds
-// hold for the operations as they are written.
+// Each predicate evaluates its determinant in floating point, with a bound on the rounding error (Shewchuk 1997, stage
+// A, with slack for underflow). If the bound does not decide the sign, an exact sum does. Compile with
+// -ffp-contract=off: the bounds hold for the operations as written.
 #pragma once
 
 #include <cmath>
@@ -19,38 +19,38 @@ namespace dynhull {
 
 constexpr double EPSILON = 0x1p-53;
 constexpr double ORIENT_BOUND = (3.0 + 16.0 * EPSILON) * EPSILON;
-// Two more products and a difference than an orientation: eight roundings at most, doubled to be safe.
+// Two products and a difference more than an orientation: at most eight roundings, doubled for safety.
 constexpr double CROSSING_BOUND = 16.0 * EPSILON;
-// A product that underflows is wrong by up to 2^-1075, whatever its size; far above that, far below everything usual.
+// A product that underflows has an error of up to 2^-1075; this is far above that and far below usual values.
 constexpr double UNDERFLOW_SLACK = 1e-300;
-// The same for a product that another difference of up to 2^1024 multiplies.
+// The same for a product that is multiplied by a difference of up to 2^1024.
 constexpr double UNDERFLOW_FACTOR = 1e-280;
-// Above this, the rounding error of a product is a double.
+// Above this, a double represents the rounding error of a product exactly.
 constexpr double EXACT_ERROR = 1e-250;
 
 inline int sign_of(double value) { return (value > 0) - (value < 0); }
 
-// Whether the rounded difference is a - b itself.
+// Whether the rounded difference equals a - b.
 inline bool exact_difference(double a, double b, double difference) {
   const double b_part = a - difference;
   const double a_part = difference + b_part;
   return (a - a_part) + (b_part - b) == 0;
 }
 
-// A product of two coordinates, as a part of a sum.
+// A weighted product of two coordinates: one term of a determinant.
 struct Term {
   int weight;
   double first, second;
 };
 
-// Twice the area of a triangle, positive where it turns left.
+// Twice the signed area of a triangle, positive if it turns left.
 inline std::array<Term, 6> triangle_terms(Point a, Point b, Point c) {
   return {{{+1, a.x, b.y}, {-1, a.x, c.y}, {-1, c.x, b.y}, {-1, a.y, b.x}, {+1, a.y, c.x}, {+1, c.y, b.x}}};
 }
 
-// The sign of ux vy - uy vx, where the rounding errors of the products can be had.
+// The sign of ux vy - uy vx, if the rounding errors of the products are doubles.
 inline std::optional<int> determinant_sign(double ux, double uy, double vx, double vy) {
-  const double left = ux * vy, right = uy * vx;  // rounding never turns an order round
+  const double left = ux * vy, right = uy * vx;  // rounding is monotone
   if (left != right && std::isfinite(left) && std::isfinite(right)) return sign_of(left - right);
   if (left == right && std::abs(left) > EXACT_ERROR && std::isfinite(left))
     return sign_of(std::fma(ux, vy, -left) - std::fma(uy, vx, -right));
@@ -68,24 +68,24 @@ inline std::optional<int> determinant_sign(double ux, double uy, double vx, doub
   return sum.sign();
 }
 
-// As in the filters: each product is rounded, then their difference.
+// With three roundings, as in the filters.
 inline double difference_of_products(double a, double b, double c, double d) {
   const double left = a * b;
   const double right = c * d;
   return left - right;
 }
 
-// The sign of the turn, or 0 where floating point cannot tell.
+// The sign of the orientation, or 0 if floating point does not decide it.
 inline int orientation_filter(Point a, Point b, Point c) {
   const double left = (a.x - c.x) * (b.y - c.y);
   const double right = (a.y - c.y) * (b.x - c.x);
   const double det = left - right;
-  // Overflow makes the bound infinite or the determinant NaN: both comparisons fail.
+  // On overflow the bound is infinite or the determinant is NaN, and both comparisons are false.
   const double bound = ORIENT_BOUND * (std::abs(left) + std::abs(right)) + UNDERFLOW_SLACK;
   return (det > bound) - (-det > bound);
 }
 
-// The filter for many points and one line, from a to b: how far outside of it they lie, as a multiple of any size.
+// The filter for one line, from a to b, and many points: their distances outside it, up to a common factor.
 class Chord {
  public:
   struct Distance {
@@ -107,13 +107,13 @@ class Chord {
   double width_, rise_;
 };
 
-// +1 where a, b, c turn left, -1 where they turn right, 0 where they lie on one line.
+// +1 if a, b, c turn left, -1 if they turn right, 0 if they are collinear.
 inline int orientation(Point a, Point b, Point c) {
   const int sign = orientation_filter(a, b, c);
   return sign != 0 ? sign : orientation_exact(a, b, c);
 }
 
-// +1 where b lies further than a in direction d, -1 where it lies less far, 0 where neither.
+// +1 if b is farther than a in direction d, -1 if it is less far, 0 if neither.
 inline int direction_sign(Point d, Point a, Point b) {
   const double along = d.x * (b.x - a.x);
   const double up = d.y * (b.y - a.y);
@@ -143,7 +143,7 @@ inline int direction_sign(Point d, Point a, Point b) {
   return sum.sign();
 }
 
-// The sign of (b - a) x (d - c): +1 where the way from c to d turns left of the way from a to b.
+// The sign of the cross product (b - a) x (d - c): +1 if the vector from c to d turns left of that from a to b.
 inline int cross_sign(Point a, Point b, Point c, Point d) {
   const double left = (b.x - a.x) * (d.y - c.y);
   const double right = (b.y - a.y) * (d.x - c.x);
@@ -154,12 +154,12 @@ inline int cross_sign(Point a, Point b, Point c, Point d) {
   return cross_exact(a, b, c, d);
 }
 
-// The sign of (b - a) . (d - c): +1 where the two ways lead in one direction rather than apart.
+// The sign of the dot product (b - a) . (d - c).
 inline int dot_sign(Point a, Point b, Point c, Point d) {
-  return cross_sign(a, b, {-c.y, c.x}, {-d.y, d.x});  // the second way, turned left
+  return cross_sign(a, b, {-c.y, c.x}, {-d.y, d.x});  // the second vector, rotated left
 }
 
-// det(c, d, z) (b.x - a.x) - det(a, b, z) (d.x - c.x), of degree three.
+// The sign of det(c, d, z) (b.x - a.x) - det(a, b, z) (d.x - c.x), of degree three.
 [[gnu::noinline, gnu::cold]] inline int crossing_exact(Point a, Point b, Point c, Point d, Point z) {
   ExactSum<3> sum;
   for (const Term& term : triangle_terms(c, d, z)) {

@@ -93,7 +93,7 @@ class Hull {
   SignArray locate(const Rows& rows) {
     const std::size_t count = rows.shape(0);
     const Output<std::int8_t> output(count);
-    flatten_for(count);
+    refresh_index_for(count);
     {
       const ReadLock lock(lock_, count);
       if (index_.fresh(tree_)) {
@@ -155,7 +155,7 @@ class Hull {
 
   EdgeArray intersect_lines(const Rows& p, const Rows& q) {
     const std::size_t count = p.shape(0);
-    if (q.shape(0) != count) throw nb::value_error("p and q differ in length");
+    if (q.shape(0) != count) throw nb::value_error("p and q must have the same length");
     const Output<double, 2, 2> output(count);
     {
       const ReadLock lock(lock_, count);
@@ -191,7 +191,7 @@ class Hull {
                      std::optional<bool> together) {
     const Rows rows = rows_of(xy);
     const std::size_t count = rows.shape(0);
-    if (ops.step > 0 && ops_count != count) throw nb::value_error("ops and xy differ in length");
+    if (ops.step > 0 && ops_count != count) throw nb::value_error("ops and xy must have the same length");
     const std::optional<Applied> applied = [&]() -> std::optional<Applied> {
       const WriteLock lock(lock_, count);
       try {
@@ -209,7 +209,7 @@ class Hull {
     return applied->rows;
   }
 
-  // The tree for a moment under the GIL: to read, or to write.
+  // The tree, to read or to write while the caller holds the GIL.
   const HullTree& settled() {
     lock_.await_readable();
     return tree_;
@@ -219,8 +219,8 @@ class Hull {
     return tree_;
   }
 
-  // Refresh the flat chains where that pays for the queries since the hull last changed.
-  void flatten_for(std::size_t queries) {
+  // Refreshes the index if that pays for the queries since the hull last changed.
+  void refresh_index_for(std::size_t queries) {
     if (settled().version() != asked_version_) queries_ = 0;
     asked_version_ = tree_.version();
     queries_ += queries;

@@ -1,8 +1,8 @@
-// Many readers or one writer of a hull, among Python threads.
+// A read-write lock for Python threads: many readers or one writer of a hull.
 //
-// Everything here happens under the GIL, which is what guards the counters: single updates run under it from end to
-// end and only look, and a batch notes what it does before it lets go of it. Waiting threads let go of it too. A batch
-// of few rows keeps it: to get it back from a busy thread would take longer than the work.
+// The GIL guards the lock's counters. A single update holds the GIL throughout and only waits for the lock; a batch
+// takes the lock, then releases the GIL. Waiting threads release the GIL too. A batch of few rows keeps it, because
+// taking it back from a busy thread would take longer than the work.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -18,7 +18,7 @@ constexpr std::size_t FEW_ROWS = 64, ALL_ROWS = std::numeric_limits<std::size_t>
 
 class ReadWriteLock {
  public:
-  // Wait until nobody writes, or until nobody reads or writes.
+  // Wait until there is no writer, or until there is neither reader nor writer.
   void await_readable() {
     if (writing_) wait([this] { return !writing_; });
   }
@@ -26,7 +26,7 @@ class ReadWriteLock {
     if (writing_ || readers_ > 0) await_as_writer([this] { return !writing_ && readers_ == 0; });
   }
 
-  // Before a fork, wait until no batch runs in any hull and let none begin; the child's hulls are whole.
+  // Before a fork, waits until no batch runs in any hull and lets none start, so that the child's hulls are whole.
   static void before_fork() {
     ++forking_;
     wait([] { return running_ == 0; });
@@ -36,7 +36,7 @@ class ReadWriteLock {
     wake();
   }
   static void after_fork_in_child() {
-    signal_ = new Signal;  // some thread of the parent may hold the old one
+    signal_ = new Signal;  // a thread of the parent may hold the old mutex
     waiting_ = 0;
     ++this_process_;
     forking_ = 0;
@@ -51,7 +51,7 @@ class ReadWriteLock {
     std::condition_variable changed;
   };
 
-  // Readers that come after a waiting writer wait for it, unless it waits in the process that this one was forked from.
+  // New readers wait for a waiting writer, unless that writer waits in the process from which this one was forked.
   template <class Holds>
   void await_as_writer(Holds holds) {
     if (!writer_waits()) writers_waiting_ = 0;
@@ -59,11 +59,11 @@ class ReadWriteLock {
     ++writers_waiting_;
     wait(holds);
     --writers_waiting_;
-    wake();  // those who let it go first
+    wake();  // readers that waited for this writer
   }
   bool writer_waits() const { return writers_waiting_ > 0 && process_ == this_process_; }
 
-  // The mutex is taken before the GIL is let go of, so that no signal is missed, and never held while taking the GIL.
+  // Takes the mutex before releasing the GIL, so that no signal is missed, and never holds it while taking the GIL.
   template <class Holds>
   static void wait(Holds holds) {
     while (!holds()) {
@@ -91,10 +91,10 @@ class ReadWriteLock {
   static inline Signal* signal_ = new Signal;
   static inline int waiting_ = 0, running_ = 0;
   static inline int forking_ = 0;
-  static inline int this_process_ = 0;  // one more in each forked child
+  static inline int this_process_ = 0;  // incremented in each forked child
 };
 
-// A batch that reads, with the GIL let go of.
+// Held by a batch that reads, without the GIL if it has many rows.
 class ReadLock {
  public:
   explicit ReadLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
@@ -116,7 +116,7 @@ class ReadLock {
   std::optional<nanobind::gil_scoped_release> release_;
 };
 
-// A batch that writes, with the GIL let go of.
+// Held by a batch that writes, without the GIL if it has many rows.
 class WriteLock {
  public:
   explicit WriteLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {

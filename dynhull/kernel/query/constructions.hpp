@@ -1,8 +1,8 @@
-// Distances, and where lines cross: the double nearest to the exact value, of two the even one.
+// Distances and intersections, rounded once: the double nearest to the exact value, ties to even.
 //
-// Each is computed as a pair of doubles first (Dekker 1971; Joldes, Muller, Popescu 2017), with a bound on the error.
-// Where both ends of what that leaves open round to one double, that is it (Ziv 1991). Otherwise exact signs say
-// between which of the points halfway between two doubles the value lies.
+// Each value is first computed in double-double arithmetic (Dekker 1971; Joldes, Muller, Popescu 2017) with a bound on
+// the error. If both ends of the error interval round to the same double, that is the result (Ziv 1991). Otherwise a
+// search among the doubles compares the value exactly with their midpoints.
 #pragma once
 
 #include <algorithm>
@@ -18,12 +18,12 @@ struct DoubleDouble {
   DoubleDouble operator-() const { return {-high, -low}; }
 };
 
-// An operation on pairs is off by 2^-102 of its result at most, and so is a difference of coordinates by nothing; a
-// value here has less than 2^4 operations. The rest is for the roundings of the bound itself.
+// The relative error of a double-double operation is at most 2^-102, and a difference of coordinates is exact. A value
+// here takes fewer than 2^4 operations; the rest covers the rounding of the bound itself.
 constexpr double DOUBLE_DOUBLE_ERROR = 0x1p-96;
 
-// Whether a bound relative to something of this size holds: no part of the value overflows, and what underflows is
-// far below the bound.
+// Whether a relative error bound holds for values of this size: nothing overflows, and underflow is far below the
+// bound.
 inline bool safe(double size) { return size > 0x1p-500 && size < 0x1p500; }
 
 inline DoubleDouble fast_sum(double large, double small) {
@@ -54,17 +54,17 @@ inline DoubleDouble root(DoubleDouble square) {
   return fast_sum(high, (std::fma(-high, high, square.high) + square.low) / (2 * high));
 }
 
-// The double nearest to a value that is off by an error at most, where that is beyond doubt.
+// The double nearest to a value known up to an error, if the error leaves only one.
 inline std::optional<double> rounded(DoubleDouble value, double error) {
   const double least = value.high + (value.low - error), most = value.high + (value.low + error);
   return least == most ? std::optional(least) : std::nullopt;
 }
 
-// The double nearest to a value > 0, or infinity. `compare(r, ulp)` is the sign of the value minus r + ulp / 2; the
-// guess may be any number that is not negative, and is looked at first.
+// The double nearest to a value > 0, or infinity. `compare(r, ulp)` returns the sign of the value minus (r + ulp / 2).
+// The search starts at the guess, any number >= 0.
 template <class Compare>
 double nearest_double(double guess, Compare compare) {
-  constexpr std::uint64_t INFINITE_BITS = std::uint64_t{0x7ff} << 52;  // doubles > 0 are in the order of their bits
+  constexpr std::uint64_t INFINITE_BITS = std::uint64_t{0x7ff} << 52;  // positive doubles are ordered as their bits
   const auto reached = [&](std::uint64_t bits) {
     if (bits == INFINITE_BITS) return true;
     const int exponent = std::max(static_cast<int>(bits >> 52), 1);
@@ -100,7 +100,7 @@ ExactSum<2> exact_sum(const std::array<Term, COUNT>& terms) {
   return sum;
 }
 
-// Of a value >= 0.
+// The square root of a value >= 0.
 inline Scaled root(Scaled square) {
   if (square.exponent % 2 != 0) return {std::sqrt(2 * square.mantissa), (square.exponent - 1) / 2};
   return {std::sqrt(square.mantissa), square.exponent / 2};
@@ -124,7 +124,7 @@ inline DoubleDouble squared_length(Point a, Point b) {
   return sum(product(x, x), product(y, y));
 }
 
-// Of two different points.
+// The distance of two different points.
 inline double distance(Point p, Point q) {
   const DoubleDouble square = squared_length(p, q);
   if (safe(square.high)) {
@@ -134,8 +134,8 @@ inline double distance(Point p, Point q) {
   return distance_exact(p, q);
 }
 
-// Twice the area of a triangle, and what its error is relative to: the two products where their factors are rounded,
-// otherwise the area, for then no digits cancel but exact ones.
+// Twice the signed area of a triangle, and the size that its error is relative to: the two products if their factors
+// are rounded; the area itself if the factors are exact, because then only exact digits cancel.
 struct Triangle {
   DoubleDouble doubled;
   double size;
@@ -168,7 +168,7 @@ struct Triangle {
   });
 }
 
-// From p, not on the line, to the line through a and b.
+// The distance from p to the line through a and b, which p is not on.
 inline double distance_to_line(Point p, Point a, Point b) {
   const Triangle triangle(a, b, p);
   const DoubleDouble square = squared_length(a, b);
@@ -180,8 +180,9 @@ inline double distance_to_line(Point p, Point a, Point b) {
   return distance_to_line_exact(p, a, b);
 }
 
-// One coordinate of where the line through p and q crosses the segment from a to b, whose ends have it at `from` and at
-// `to`: (to at_a - from at_b) / (at_a - at_b), at_a and at_b the areas of the triangles of the line with a and with b.
+// One coordinate of the intersection of the line through p and q with the segment from a to b, whose ends have the
+// coordinates `from` and `to`: (to at_a - from at_b) / (at_a - at_b), where at_a and at_b are the signed areas of the
+// triangles p, q, a and p, q, b.
 [[gnu::noinline, gnu::cold]] inline double intersection_exact(Point p, Point q, Point a, Point b, double from,
                                                               double to) {
   const auto at_a = triangle_terms(p, q, a), at_b = triangle_terms(p, q, b);
@@ -207,13 +208,13 @@ inline double distance_to_line(Point p, Point a, Point b) {
   });
 }
 
-// Where the line through p and q crosses the segment from a to b, which lie on different sides of it.
+// The intersection of the line through p and q with the segment from a to b, whose ends are on different sides of it.
 inline Point intersection(Point p, Point q, Point a, Point b) {
   const Triangle at_a(p, q, a), at_b(p, q, b);
   const double size = at_a.size + at_b.size;
   const DoubleDouble whole = sum(at_a.doubled, -at_b.doubled);
   const DoubleDouble share = quotient(at_a.doubled, whole);
-  const double doubt = size / std::abs(whole.high);  // of the share, as a multiple of PAIR_ERROR; 1 at least
+  const double doubt = size / std::abs(whole.high);  // of the share, as a multiple of DOUBLE_DOUBLE_ERROR; at least 1
   const auto coordinate = [&](double Point::* axis) {
     const double from = a.*axis, to = b.*axis;
     if (from == to) return from;

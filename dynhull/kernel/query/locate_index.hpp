@@ -1,5 +1,5 @@
-// The two chains in flat arrays under a grid in x, and before them boxes that tell of most points that they are inside:
-// for many queries between two changes of the hull.
+// An index for many point locations between two changes of the hull: both chains in flat arrays with a grid in x, and
+// inner boxes that settle most of the points inside.
 #pragma once
 
 #include <memory>
@@ -14,8 +14,8 @@ class LocateIndex {
  public:
   bool fresh(const HullTree& tree) const { return version_ == tree.version(); }
 
-  // Whether so many queries since the hull's last change pay for a refresh: chains cost about as much as a query a
-  // vertex, boxes as much as BOXES_PAY queries.
+  // Whether the number of queries since the hull's last change pays for a refresh. The chains cost about as much as one
+  // query for each vertex, the boxes as much as BOXES_PAY queries.
   bool stale(const HullTree& tree, std::uint64_t queries) const {
     return fresh(tree) ? !inner_boxes_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
   }
@@ -44,9 +44,9 @@ class LocateIndex {
   static constexpr std::uint64_t BOXES_PAY = 10'000;
   static constexpr std::size_t BLOCK = 32;  // queries whose memory accesses overlap
   static constexpr std::size_t CELLS_LIMIT = std::size_t{1} << 30;
-  static constexpr std::uint32_t SCAN = 8;  // vertices of a cell to look through one by one
+  static constexpr std::uint32_t SCAN = 8;  // cells with at most this many vertices are searched linearly
 
-  // For each side how many vertices lie in cells before this one.
+  // For each side the number of vertices in the cells before this one.
   struct Cell {
     std::uint32_t before[2];
   };
@@ -67,7 +67,7 @@ class LocateIndex {
   std::size_t cell(double x) const { return static_cast<std::size_t>((x - least_) * scale_); }
 
   void locate_block(const HullTree& tree, const Point* points, std::size_t count, std::int8_t* where) const {
-    std::uint8_t rest[BLOCK];  // the queries that are left
+    std::uint8_t rest[BLOCK];  // the undecided queries
     std::size_t left_over = 0;
     for (std::size_t i = 0; i < count; ++i) {
       where[i] = 1;
@@ -96,7 +96,7 @@ class LocateIndex {
     }
   }
 
-  // +1 or -1 where floating point can tell, otherwise 0.
+  // +1 inside, -1 outside, 0 if floating point does not decide it.
   int filter(Point p, std::size_t cell, const std::uint32_t (&left)[2]) const {
     int inside = 1;
     for (Side side : SIDES) {

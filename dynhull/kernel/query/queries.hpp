@@ -1,4 +1,4 @@
-// Queries on a tree, one point or direction at a time. O(log n) each, exact.
+// Exact queries, one point, direction or line at a time. O(log n) each.
 #pragma once
 
 #include <optional>
@@ -8,16 +8,16 @@
 
 namespace dynhull {
 
-// Where a point is: +1 inside, 0 on the boundary, -1 outside; then also the side and the edge that it lies beyond,
-// unless it lies before or after all points.
+// +1 inside, 0 on the boundary, -1 outside. Outside, also the side and the edge beyond which the point is, unless it
+// precedes or follows all points of the hull.
 struct Location {
   int where;
   Side side = UPPER;
   std::optional<Edge> edge = std::nullopt;
 };
 
-// The edge of a chain below or above p: strictly between its ends in the order. Otherwise p itself twice where it is a
-// vertex, and nothing where it lies before or after all.
+// The edge of a chain above or below p, whose ends p is strictly between in lexicographic order. If p is a vertex, p
+// twice; if p precedes or follows all points, none.
 inline std::optional<Edge> edge_at(const Nodes& nodes, Side side, Point p) {
   Ref tree = nodes.root;
   while (!is_leaf(tree)) {
@@ -47,7 +47,7 @@ inline Location locate(const Nodes& nodes, Point p) {
   return {inside};
 }
 
-// The vertex farthest in a direction; of two the lexicographically smaller.
+// The farthest vertex in a direction, the lexicographically smaller of two.
 inline Point support(const Nodes& nodes, Point direction) {
   const bool up = direction.y > 0 || (direction.y == 0 && direction.x < 0);
   Cursor cursor(nodes, nodes.root, up ? UPPER : LOWER);
@@ -60,7 +60,7 @@ inline Point support(const Nodes& nodes, Point direction) {
   return cursor.a;
 }
 
-// The left and the right tangent point seen from p, unless p is not strictly outside.
+// The left and the right tangent point seen from p, if p is strictly outside.
 inline std::optional<Edge> tangents(const Nodes& nodes, Point p) {
   const Location at = locate(nodes, p);
   const Ref root = nodes.root;
@@ -77,8 +77,9 @@ inline std::optional<Edge> tangents(const Nodes& nodes, Point p) {
               tangent_to_left(Cursor(nodes, root, UPPER), p, UPPER)};
 }
 
-// What is nearest to p, outside, of a side that p sees: an edge, where the nearest point lies between its ends, or a
-// vertex, twice. Along what p sees the distance falls, then rises; what it does not see lies beyond.
+// The part of a side nearest to p, which is outside and sees the side: an edge if the nearest point is between its
+// ends, otherwise a vertex, twice. The distance first falls and then rises along the visible edges, and the hidden
+// edges are beyond them.
 inline Edge nearest(Cursor cursor, Side side, Point p) {
   while (!cursor.single) {
     const Point a = cursor.a, b = cursor.b;
@@ -98,20 +99,20 @@ inline double distance(Point p, Edge edge) {
   return edge.a == edge.b ? distance(p, edge.a) : distance_to_line(p, edge.a, edge.b);
 }
 
-// The double nearest to the distance of p from the hull: 0 inside, infinite without points.
+// The distance from p to the hull, rounded once: 0 inside, infinite without points.
 inline double distance(const Nodes& nodes, Point p) {
   if (nodes.root == NONE) return INFINITE;
   const Location at = locate(nodes, p);
   if (at.where >= 0) return 0;
   const Edge one = nearest(Cursor(nodes, nodes.root, at.side), at.side, p);
   if (at.edge || !(one.a == one.b)) return distance(p, one);
-  // p lies before or after all points and may see both sides: one of the vertices is their common end, at least.
+  // p precedes or follows all points and may see both sides; at least one of the vertices is their common end.
   const Edge other = nearest(Cursor(nodes, nodes.root, LOWER), LOWER, p);
   if (!(other.a == other.b)) return distance(p, other);
   return distance(p, p < one.a ? std::max(one.a, other.a) : std::min(one.a, other.a));
 }
 
-// The vertex of a side that is farthest from the line through p and q, p < q, on that side of it; or an edge.
+// The vertex of a side farthest from the line through p and q (p < q) on that side of the line; or an edge.
 inline Edge farthest(Cursor cursor, Side side, Point p, Point q) {
   while (!cursor.single) {
     const int turn = turned(side, cross_sign(p, q, cursor.a, cursor.b));
@@ -121,7 +122,8 @@ inline Edge farthest(Cursor cursor, Side side, Point p, Point q) {
   return {cursor.a, cursor.a};
 }
 
-// Where the line through p and q crosses a part of a chain that begins on the line's side `sign` and ends on the other.
+// The intersection of the line through p and q with a part of a chain that starts on the line's side `sign` and ends on
+// the other.
 inline Point crossing_point(Cursor cursor, Point p, Point q, int sign) {
   while (true) {
     const Point a = cursor.a, b = cursor.b;
@@ -138,8 +140,8 @@ inline Point crossing_point(Cursor cursor, Point p, Point q, int sign) {
   }
 }
 
-// Where the line through p and q, p < q, enters and leaves the hull, each coordinate the nearest double. It has a
-// vertex that it touches twice, and an edge's ends where it lies along the edge.
+// Where the line through p and q (p < q) enters and leaves the hull, each coordinate rounded once. A line that touches
+// a vertex has it twice; a line along an edge has the edge's ends.
 inline std::optional<Edge> chord(const Nodes& nodes, Point p, Point q) {
   const Ref root = nodes.root;
   if (root == NONE) return std::nullopt;

@@ -1,4 +1,4 @@
-// Sorting rows by their point.
+// Stable sort of rows by their point.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace dynhull {
 
-// A row of a batch.
+// A row of a batch: a point and a number that sorting carries along.
 struct Row {
   Point p;
   std::int64_t row;
@@ -20,7 +20,7 @@ struct Row {
 inline Point point(Point p) { return p; }
 inline Point point(const Row& row) { return row.p; }
 
-// Linear for rows that are almost in order.
+// O(n) for rows that are almost in order.
 template <class R>
 void insertion_sort(R* first, R* last) {
   for (R* next = first + (first < last); next < last; ++next) {
@@ -47,11 +47,11 @@ struct Range {
   }
 };
 
-// Sort by a key of two digits, stably.
+// Stable radix sort by a key of two digits.
 template <class R, class Key>
 [[gnu::noinline]] void counting_sort(R* rows, R* scratch, std::size_t count, unsigned digit, Key key) {
   constexpr unsigned MOST = 11;
-  std::array<std::uint32_t, 1 << MOST> low, high;  // how many have this digit, then where the next of them goes
+  std::array<std::uint32_t, 1 << MOST> low, high;  // counts of each digit, then the place of its next row
   const std::uint32_t digits = std::uint32_t{1} << digit;
   std::fill_n(low.begin(), digits, 0);
   std::fill_n(high.begin(), digits, 0);
@@ -72,8 +72,8 @@ template <class R, class Key>
 template <class R>
 void sort_by_point(R* rows, R* scratch, std::size_t count);
 
-// Rows whose keys grow, from rows whose keys only never fall: the few runs of one key that are out of order are sorted.
-// False where most have one key.
+// Finishes rows that are sorted by key: sorts each run of equal keys that is out of order. False if one run is more
+// than half of the rows.
 template <class R, class Key>
 bool sort_runs(R* rows, R* scratch, std::size_t count, Key key) {
   for (std::size_t i = 1; i < count; ++i) {
@@ -88,7 +88,7 @@ bool sort_runs(R* rows, R* scratch, std::size_t count, Key key) {
   return true;
 }
 
-// Sort by one coordinate, and where that is equal by point. False where it is too unevenly spread.
+// Sorts by one coordinate, ties by point. False if the coordinates are too unevenly spread.
 template <double Point::* AXIS, class R>
 bool sort_along(R* rows, R* scratch, std::size_t count, Range range) {
   constexpr unsigned MOST = 11, SPARE = 6;
@@ -100,9 +100,9 @@ bool sort_along(R* rows, R* scratch, std::size_t count, Range range) {
   return sort_runs(rows, scratch, count, key);
 }
 
-// Stable sort by point. Two counting passes over x, mapped affinely to many more keys than there are rows, leave few
-// runs of equal keys; long ones (clusters, columns) are mapped again, or compared. O(n) on most inputs, O(n log n) on
-// all.
+// Stable sort by point. Two counting passes over x, mapped affinely to many more keys than rows, leave few runs of
+// equal keys. Long runs (clusters, columns) are mapped again or sorted by comparison. O(n) on most inputs, O(n log n)
+// on all.
 template <class R>
 void sort_by_point(R* rows, R* scratch, std::size_t count) {
   constexpr std::size_t SMALL = 24;

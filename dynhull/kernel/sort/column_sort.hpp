@@ -1,5 +1,4 @@
-// Sorting many points, by two threads or one: in columns of x, each of which fits the processor's cache while it is
-// sorted.
+// Sorting many points with one or two threads: in columns of x, each small enough to be sorted in the cache.
 #pragma once
 
 #include "../memory/scratch.hpp"
@@ -8,8 +7,8 @@
 
 namespace dynhull {
 
-// From one place into another, in which negative zeros become positive. The result is in order even where another
-// thread changes the points meanwhile.
+// Copies points in order, without negative zeros. The result is in order even if another thread changes the points
+// meanwhile.
 class ColumnSort {
  public:
   ColumnSort(const Point* from, Point* to, std::size_t count, bool threads)
@@ -23,19 +22,19 @@ class ColumnSort {
     if (finite()) sort();
   }
 
-  bool finite() const { return parts_[0].finite && parts_[1].finite; }        // false: a coordinate is not, and no more
+  bool finite() const { return parts_[0].finite && parts_[1].finite; }        // if false, nothing else holds
   bool repeated() const { return parts_[0].repeated || parts_[1].repeated; }  // whether some points are equal
 
  private:
   static constexpr std::size_t MOST = 256, A_COLUMN = 2048;
 
-  // For one thread: half of the points as they come in, then the columns with about half of them.
+  // The share of one thread: half of the points as given, then the columns with about half of them.
   struct Part {
     const Point* points;
     std::size_t count;
     Range range = {};
     Scratch<std::uint16_t> columns{count};    // of each point
-    std::array<std::size_t, MOST> next = {};  // how many points each column has, then where its next one goes
+    std::array<std::size_t, MOST> next = {};  // counts of each column, then the place of its next point
     bool finite = true, repeated = false;
   };
 
@@ -81,7 +80,7 @@ class ColumnSort {
     parts_[0].repeated = std::adjacent_find(to_, end) != end;
   }
 
-  // Whether the columns are. Not where another thread has changed points between a look at their x and their copy.
+  // Whether the columns are in order. They are not if another thread changed a point between the two reads.
   bool in_order() const {
     for (unsigned column = 1; column < width_; ++column) {
       const std::size_t start = starts_[column];
@@ -90,7 +89,7 @@ class ColumnSort {
     return true;
   }
 
-  // Sort each of the columns first..last. Whether some points are equal: those are in one column.
+  // Sorts each of the columns first..last. Returns whether some points are equal; equal points share a column.
   bool sort(unsigned first, unsigned last) const {
     const auto size = [&](unsigned column) { return starts_[column + 1] - starts_[column]; };
     std::size_t most = 0;

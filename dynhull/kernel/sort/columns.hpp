@@ -1,4 +1,4 @@
-// Columns of equal width.
+// A monotone map from coordinates to columns of equal width.
 #pragma once
 
 #include <cmath>
@@ -7,9 +7,8 @@
 
 namespace dynhull {
 
-// Which of `count` columns of equal width a coordinate lies in. Never falls where the coordinate grows, because no
-// rounding turns an order round. All are in column 0 where the width is no usable number: one coordinate only, or
-// farther apart than any double.
+// Maps a coordinate to one of `count` columns. Monotone, because rounding is. If the width is not a positive finite
+// number (all coordinates are equal, or their difference overflows), every coordinate is in column 0.
 class Columns {
  public:
   Columns() = default;
@@ -20,7 +19,7 @@ class Columns {
 
   bool usable() const { return scale_ > 0; }
 
-  // Any double will do, NaN as well.
+  // Accepts any double, including NaN.
   unsigned operator()(double x) const {
     double column = (x - least_) * scale_;
     column = column > 0 ? column : 0;

@@ -1,4 +1,4 @@
-// The distinct among some points.
+// The distinct points among many, with multiplicities.
 #pragma once
 
 #include <span>
@@ -12,7 +12,7 @@ struct Repeated {
   std::uint64_t copies;
 };
 
-// Sorted, each once, and which of them are there more than once.
+// The sorted distinct points, and the number of copies of the repeated ones.
 class Distinct {
  public:
   Distinct(const Point* points, std::size_t count)
@@ -22,14 +22,14 @@ class Distinct {
     if (sort.repeated()) count_copies();
   }
 
-  bool finite() const { return finite_; }  // false: a coordinate is not, and nothing else holds
+  bool finite() const { return finite_; }  // if false, nothing else holds
   const Point* data() const { return points_.data(); }
   std::size_t size() const { return size_; }
   std::size_t count() const { return count_; }  // with copies
   std::span<const Repeated> repeated() const { return {repeated_.data(), repeated_size_}; }
 
  private:
-  // Without branches, because copies are as good as random: what is not to stay is written over.
+  // Branch-free, because repetitions are unpredictable: the next entry overwrites those that do not stay.
   void count_copies() {
     const Point* const end = points_.data() + count_;
     std::uint64_t copies = 0;

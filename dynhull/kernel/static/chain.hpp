@@ -1,4 +1,4 @@
-// Convex chains from points in order.
+// Convex chains of sorted points.
 #pragma once
 
 #include <span>
@@ -7,8 +7,8 @@
 
 namespace dynhull {
 
-// A chain of left turns, pushed into memory that the caller has: a hull's lower chain from left to right, its upper one
-// from right to left.
+// A chain of strict left turns, built in memory of the caller: a hull's lower chain from left to right, or its upper
+// chain from right to left.
 class Chain {
  public:
   explicit Chain(Point* memory) : memory_(memory) {}

@@ -1,4 +1,4 @@
-// Chan's algorithm (1996): hulls of small groups, wrapped as one. What dynhull.static.chan does, round by round.
+// Chan's algorithm (1996): hulls of small groups, wrapped as one. The rounds are those of chan() in Python.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ struct Ring {
   Point upper(std::size_t i) const { return points[i == 0 ? 0 : size - i]; }
 };
 
-// The first index from `first` on to `last` where `holds`, which once true stays true; `last` where nowhere before.
+// The first index in first..last for which the monotone predicate `holds`; `last` if there is none before it.
 template <class Holds>
 std::size_t first_where(std::size_t first, std::size_t last, Holds holds) {
   while (first < last) {
@@ -33,7 +33,7 @@ std::size_t first_where(std::size_t first, std::size_t last, Holds holds) {
   return first;
 }
 
-// The same in O(log distance) from `first`, or from `last`: tangent points mostly lie next to where the search begins.
+// The same by exponential search from `first`, or from `last`: O(log distance). Most tangent points are near the start.
 template <class Holds>
 std::size_t first_where_from_first(std::size_t first, std::size_t last, Holds holds) {
   for (std::size_t step = 1; first < last; step *= 2) {
@@ -59,8 +59,8 @@ std::size_t first_where_from_last(std::size_t first, std::size_t last, Holds hol
   return first_where(first, last, holds);
 }
 
-// The ring's point that has all of the ring on or to the left of the ray from p; the farthest of several. p is a vertex
-// of the hull of all rings. p where the ring is p alone. O(log size).
+// The point of the ring such that all of the ring is on or to the left of the ray from p to it; the farthest of
+// several. p is a vertex of the hull of all rings; if the ring is p alone, returns p. O(log size).
 inline Point tangent(Point p, const Ring& ring) {
   const auto rightward = [&](std::size_t first) {  // to the lower chain from index `first` on
     const std::size_t last = ring.lower_size() - 1;
@@ -81,7 +81,7 @@ inline Point tangent(Point p, const Ring& ring) {
 
 class Chan {
  public:
-  // A guess, the number of groups, the vertices found before the round closed or was thrown away, and which of these.
+  // The guess, the number of groups, the number of vertices found, and whether they closed the hull.
   struct Round {
     std::uint64_t guess, groups, steps;
     bool closed;
@@ -108,7 +108,7 @@ class Chan {
   std::vector<Round> rounds;
 
  private:
-  // Replace each `count` rings in succession by their hull. The hull of a group is that of its subgroups' vertices.
+  // Replaces every `count` successive rings by their hull: the hull of a group is the hull of its subgroups' vertices.
   void merge(std::uint64_t count) {
     Point* free = points_.data();
     std::size_t groups = 0;
@@ -133,7 +133,7 @@ class Chan {
     return {first, static_cast<std::size_t>(end - first), turning};
   }
 
-  // Gift wrapping from the least point. Whether the hull closes in `limit` vertices.
+  // Gift wrapping from the least point. Returns whether the hull closes within `limit` vertices.
   bool wrap(Point start, std::size_t limit) {
     vertices = {start};
     while (true) {

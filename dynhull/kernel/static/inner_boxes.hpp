@@ -1,5 +1,4 @@
-// Which points are certainly inside, and so no vertices: a part of the inside of a hull, as one box for each column of
-// x.
+// Boxes inside a hull, one for each column of x: a fast test that settles most of the points inside.
 #pragma once
 
 #include <algorithm>
@@ -12,12 +11,12 @@
 
 namespace dynhull {
 
-// How high and wide a box is comes from rounded arithmetic; whether it lies in the hull is decided exactly, corner by
-// corner, and a box that does not is left out. A hull that contains the corners contains the box, and a point in the
-// open box is no vertex. The points of a column lie between two x that are in other columns.
+// Rounded arithmetic chooses the box; exact orientations verify that each corner is in the hull, and a box that fails
+// is dropped. A hull that contains the corners contains the box, so a point in the open box is no vertex. The box
+// reaches into both neighbouring columns, so that it covers all points of its own column in x.
 class InnerBoxes {
  public:
-  // Of a hull given by its vertices, counter-clockwise from the least.
+  // For a hull given by its vertices, counter-clockwise from the least.
   explicit InnerBoxes(std::span<const Point> vertices) {
     if (vertices.empty()) return;
     const auto greatest = std::max_element(vertices.begin(), vertices.end());
@@ -25,19 +24,19 @@ class InnerBoxes {
     upper.insert(upper.end(), vertices.rbegin(), std::make_reverse_iterator(greatest));
     lay_boxes({vertices.begin(), greatest + 1}, upper);
   }
-  // Of a hull given by its chains, from left to right.
+  // For a hull given by its chains, from left to right.
   InnerBoxes(std::span<const Point> lower, std::span<const Point> upper) { lay_boxes(lower, upper); }
 
-  // False also where it cannot tell.
+  // True only for points strictly inside the hull; false for some of them too.
   bool holds(Point p) const {
     const Box& box = boxes_[columns_(p.x)];
     return (box.low < p.y) & (p.y < box.high);
   }
 
-  // How many of the points it does not hold; they go to `outside`, which has room for all. Those with coordinates that
-  // are not finite are among them.
+  // Copies the points that no box holds to `outside`, which has room for all, and returns their number. They include
+  // all points that are not finite.
   std::size_t discard(std::span<const Point> points, Point* outside) const {
-    const Columns columns = columns_;  // a copy that `outside` cannot overlap stays in registers
+    const Columns columns = columns_;  // a local copy, which cannot alias `outside`, stays in registers
     std::size_t count = 0;
     for (Point p : points) {
       const Box& box = boxes_[columns(p.x)];
@@ -48,8 +47,8 @@ class InnerBoxes {
 
  private:
   static constexpr unsigned COLUMNS = 1024;
-  static constexpr double OVERLAP = 0x1p-6;  // of columns, in widths, for rounding
-  static constexpr double MARGIN = 0x1p-20;  // of a box, in heights, for rounding
+  static constexpr double OVERLAP = 0x1p-6;  // of adjacent columns, as a part of their width, to cover rounding
+  static constexpr double MARGIN = 0x1p-20;  // of a box, as a part of its height, to cover rounding
   struct Box {
     double low, high;
   };
@@ -84,7 +83,7 @@ class InnerBoxes {
     }
   }
 
-  // A chain's edge at growing x, strictly between the chain's ends.
+  // The edge of a chain at an increasing x, strictly between the chain's ends.
   struct Walk {
     explicit Walk(std::span<const Point> chain) : edge(chain.data()) {}
     void advance(double x) {

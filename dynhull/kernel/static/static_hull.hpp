@@ -1,8 +1,8 @@
-// The hull of points that stay: discard, sort, chain.
+// The hull of a fixed set of points: discard, sort, chain.
 //
-// The hull of a sample tells of most points that they are no vertices. What is left goes into columns of x, above and
-// below the line through the ends apart; each column is sorted and chained (Andrew 1979) with exact orientations. Two
-// threads share each pass over the points, and then take a chain each.
+// Boxes inside the hull of a sample discard most points (in the manner of Akl and Toussaint 1978). The others go into
+// columns of x, separately above and below the line through the extreme points; each column is sorted and chained
+// (Andrew 1979) with exact orientations. Two threads share each pass over the points, and then build one chain each.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@
 
 namespace dynhull {
 
-// The hull of points in two parts. It stays in its bounds even where the points change meanwhile.
+// The hull of points in two parts. Stays within its memory even if another thread changes the points meanwhile.
 class StaticHull {
  public:
   using Part = std::span<const Point>;
@@ -29,14 +29,14 @@ class StaticHull {
     both(
         threads_, [&] { lower_end = chain(0, least_, greatest_); },
         [&] { upper_end = chain(width_, greatest_, least_); });
-    // Both have both ends.
+    // Both chains include both ends.
     if (lower_end > memory_.get() + 1) lower_end = std::copy(memory_.get() + starts_[width_], upper_end - 1, lower_end);
     vertices_ = {memory_.get(), lower_end};
   }
 
-  bool finite() const { return finite_; }  // false: a coordinate is not, and there is no hull
+  bool finite() const { return finite_; }  // if false, there is no hull
 
-  // Counter-clockwise from the least; at the beginning of memory with room for more points.
+  // Counter-clockwise from the least. They are at the start of memory with room for room() points.
   std::span<const Point> vertices() const { return vertices_; }
   std::size_t room() const { return room_; }
   std::unique_ptr<Point[]> take_memory() { return std::move(memory_); }
@@ -67,15 +67,15 @@ class StaticHull {
     greatest_ = positive_zeros(std::max(greatest[some], greatest[other]));
   }
 
-  // Put the points in columns, those below the line through the ends from left to right, then those above it from right
-  // to left. Those on the line are no vertices.
+  // Puts the points into columns: those below the line through the ends from left to right, then those above it from
+  // right to left. Points on the line are no vertices.
   void place() {
     constexpr std::size_t MOST_COLUMNS = 1024, A_COLUMN = 512;
     width_ = static_cast<unsigned>(std::min(std::bit_ceil(size() / A_COLUMN + 1), MOST_COLUMNS));
     const Columns columns(least_.x, greatest_.x, width_);
     const unsigned none = 2 * width_;
     std::unique_ptr<std::uint16_t[]> keys[2];
-    std::vector<std::size_t> next[2];  // at first how many points each column has, then where its next one goes
+    std::vector<std::size_t> next[2];  // counts of each column, then the place of its next point
     const auto count = [&](int part) {
       next[part].assign(none + 1, 0);
       keys[part] = std::make_unique_for_overwrite<std::uint16_t[]>(parts_[part].size());
@@ -83,7 +83,7 @@ class StaticHull {
       for (Point p : parts_[part]) {
         const int side = orientation(least_, greatest_, p);
         const unsigned mirror = (none - 1) * static_cast<unsigned>(side > 0);
-        const unsigned column = side == 0 ? none : columns(p.x) ^ mirror;  // no branch: sides are as good as random
+        const unsigned column = side == 0 ? none : columns(p.x) ^ mirror;  // branch-free: sides are unpredictable
         ++next[part][column];
         *key++ = static_cast<std::uint16_t>(column);
       }
@@ -93,7 +93,7 @@ class StaticHull {
     starts_.resize(none + 1);
     std::size_t total = 0;
     for (unsigned column = 0; column <= none; ++column) {
-      if (column % width_ == 0) total += column == 0 ? 1 : 2;  // room for the ends, which go into both chains
+      if (column % width_ == 0) total += column == 0 ? 1 : 2;  // room for the ends, which are in both chains
       starts_[column] = total;
       for (auto& part : next) total += std::exchange(part[column], total);
     }
@@ -109,8 +109,8 @@ class StaticHull {
     both(threads_, [&] { put(0); }, [&] { put(1); });
   }
 
-  // Sort column by column and chain, from the first column of one side on. The chain overwrites what it has read, from
-  // the place before. Returns its end.
+  // Sorts and chains the columns of one side, from its first column. The chain overwrites points already read, from the
+  // slot before them. Returns the chain's end.
   Point* chain(unsigned first, Point from, Point to) {
     const auto end = [&](unsigned column) { return starts_[column + 1] - (column + 1 == first + width_ ? 2 : 0); };
     std::size_t most = 0;
@@ -141,19 +141,19 @@ class StaticHull {
   std::span<const Point> vertices_;
 };
 
-// Whether to discard points by a sample's hull first, and to use two threads; decided by the input where not told.
+// Whether to discard points by a sample's hull first, and whether to use two threads; by default the input decides.
 struct StaticOptions {
   std::optional<bool> discard, threads;
 };
 
-// What to discard of these points; nothing where it would be too few to pay, unless told to.
+// Boxes that discard points; none if they would discard too few to pay, unless `always`.
 inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t count, bool always) {
   constexpr std::size_t FEW = 2048, LARGEST_SAMPLE = 4096, ONE_OF = 32;
   if (count < FEW && !always) return {};
   std::vector<Point> sample(std::min(LARGEST_SAMPLE, always ? count : count / ONE_OF));
   const std::size_t stride = count / std::max<std::size_t>(sample.size(), 1);
   for (std::size_t i = 0; i < sample.size(); ++i)
-    sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, to follow no pattern of the input
+    sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, against patterns in the input
   const StaticHull hull(sample, {}, false);
   if (!hull.finite()) return {};
   if (2 * hull.vertices().size() > sample.size() && !always) return {};
@@ -163,9 +163,9 @@ inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t
   return inner_boxes;
 }
 
-// O(n log n), and O(n) where few points are near the hull.
+// O(n log n), and O(n) if few points are near the hull.
 inline StaticHull static_hull(const Point* points, std::size_t count, StaticOptions options = {}) {
-  constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // in the same time
+  constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // at the same cost
   const auto threads = [&](std::size_t placed) { return options.threads.value_or(two_threads_for(placed)); };
   const std::size_t half = count / 2;
   const StaticHull::Part first(points, half), second(points + half, count - half);

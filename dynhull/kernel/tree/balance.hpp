@@ -1,4 +1,4 @@
-// The shape of a tree: balance, splits and merges, with the bridges that they need.
+// AVL balance: rotations, joins, splits and merges of leaves, with the bridges that they change.
 #pragma once
 
 #include "search.hpp"
@@ -9,13 +9,13 @@ inline Edge bridge_of(const Nodes& nodes, Ref left, Ref right, Side side, Point 
   return find_bridge(Cursor(nodes, left, side), Cursor(nodes, right, side), side, separator);
 }
 
-// Recompute a node's height from its children.
+// Recomputes a node's height from its children.
 inline void refresh_height(Nodes& nodes, Ref v) {
   Node& node = nodes.node(v);
   node.height = 1 + std::max(nodes.height(node.child[0]), nodes.height(node.child[1]));
 }
 
-// Recompute a node's height and bridges from its children. O(log n).
+// Recomputes a node's height and bridges from its children. O(log n).
 inline void refresh(Nodes& nodes, Ref v) {
   const Node& node = nodes.node(v);
   for (Side side : SIDES) nodes.bridge(v, side) = bridge_of(nodes, node.child[0], node.child[1], side, node.separator);
@@ -27,10 +27,10 @@ inline int lean(const Nodes& nodes, Ref v) {
   return static_cast<int>(nodes.height(node.child[0])) - static_cast<int>(nodes.height(node.child[1]));
 }
 
-// Lift child `up` of v into its place; v's parent is the caller's to tell. Returns that child.
+// Rotates child `up` of v above v and returns it. The caller links it to v's old parent.
 //
-// The chain of the whole stays as it is, so where its edge across v's separator does not span the inner grandchild, the
-// two bridges change places; where it does, it is the new top's, and v needs another.
+// The chain of the whole subtree does not change. If its edge across v's separator does not end in the inner
+// grandchild, the two nodes swap bridges; otherwise the new top keeps its bridge, and v gets a new one.
 inline Ref rotate_once(Nodes& nodes, Ref v, int up) {
   const Ref top = nodes.node(v).child[up];
   const Ref inner = nodes.node(top).child[1 - up];
@@ -51,7 +51,7 @@ inline Ref rotate_once(Nodes& nodes, Ref v, int up) {
   return top;
 }
 
-// Restore the AVL condition at v, whose children differ in height by two. Returns what takes its place.
+// Restores the AVL condition at v, whose children differ in height by two. Returns the node that replaces v.
 inline Ref rotate(Nodes& nodes, Ref v) {
   const Ref parent = nodes.node(v).parent;
   const int up = lean(nodes, v) > 0 ? 0 : 1;
@@ -63,7 +63,7 @@ inline Ref rotate(Nodes& nodes, Ref v) {
   return top;
 }
 
-// Restore the AVL condition from v up; stop where nothing changes any more.
+// Restores the AVL condition from v upwards; stops at the first height that does not change.
 inline void rebalance(Nodes& nodes, Ref v) {
   while (v != NONE) {
     const unsigned height = nodes.node(v).height;
@@ -76,7 +76,7 @@ inline void rebalance(Nodes& nodes, Ref v) {
   }
 }
 
-// Join two detached subtrees of any heights under v, all of the left < v's separator <= all of the right.
+// Joins two detached subtrees of any heights by v, where all of the left < v's separator <= all of the right.
 // O(difference of heights) bridges.
 inline Ref join(Nodes& nodes, Ref left, Ref right, Ref v) {
   const int difference = static_cast<int>(nodes.height(left)) - static_cast<int>(nodes.height(right));
@@ -87,7 +87,7 @@ inline Ref join(Nodes& nodes, Ref left, Ref right, Ref v) {
     nodes.node(v).parent = NONE;
     return v;
   }
-  const int inner = difference > 0 ? 1 : 0;  // the higher one's child that the lower one joins
+  const int inner = difference > 0 ? 1 : 0;  // the child of the higher tree that the lower tree joins
   const Ref top = difference > 0 ? left : right;
   const Ref child = nodes.node(top).child[inner];
   nodes.link(top, inner, difference > 0 ? join(nodes, child, right, v) : join(nodes, left, child, v));
@@ -95,13 +95,13 @@ inline Ref join(Nodes& nodes, Ref left, Ref right, Ref v) {
   nodes.node(top).parent = NONE;
   if (std::abs(lean(nodes, top)) <= 1) return top;
   const Ref root = nodes.root;
-  const Ref result = rotate(nodes, top);  // says so to the root, as it has no parent
+  const Ref result = rotate(nodes, top);  // sets nodes.root, as top has no parent
   nodes.root = root;
   return result;
 }
 
-// Cut a full leaf in two. The chain stays as it is, and its edge across the cut is the new node's bridge. Returns the
-// new leaf, to the right.
+// Splits a full leaf in two. The chain does not change, and its edge across the cut becomes the new node's bridge.
+// Returns the new leaf, on the right.
 inline Ref split(Nodes& nodes, Ref left) {
   const Ref right = nodes.take_leaf(), v = nodes.take_node();
   Leaf& low = nodes.leaf(left);
@@ -132,7 +132,7 @@ inline Ref split(Nodes& nodes, Ref left) {
   return right;
 }
 
-// Take an empty leaf out; its sibling takes their parent's place. Returns the node above, to rebalance from.
+// Removes an empty leaf; its sibling replaces their parent. Returns the node above, from which to rebalance.
 inline Ref drop(Nodes& nodes, Ref tree) {
   const Ref parent = nodes.leaf(tree).parent;
   nodes.give_back(tree);
@@ -146,7 +146,7 @@ inline Ref drop(Nodes& nodes, Ref tree) {
   return above;
 }
 
-// Give a small leaf's points to the leaf beside it below the same parent, where there is room.
+// Moves a small leaf's points into the adjacent leaf below the same parent, if they fit.
 inline void merge(Nodes& nodes, Ref small) {
   const Ref parent = nodes.leaf(small).parent;
   if (parent == NONE) return;

@@ -1,4 +1,4 @@
-// Building from sorted points.
+// Bulk construction from sorted points.
 #pragma once
 
 #include "../threads.hpp"
@@ -8,24 +8,25 @@ namespace dynhull {
 
 inline std::size_t leaves_for(std::size_t points) { return points <= LEAF ? 1 : (points + FILL - 1) / FILL; }
 
-// A balanced tree over sorted distinct points. Its leaves and nodes are taken first, and two threads may fill them.
+// Builds a balanced tree over sorted distinct points. Takes all leaves and nodes first, so that two threads can fill
+// them.
 class Building {
  public:
-  // `refs` has room for twice leaves_for(count), and nodes have for as many leaves; the leaves come first.
+  // `refs` has room for 2 leaves_for(count) entries, the leaves first; `nodes` has room for leaves_for(count) leaves.
   Building(Nodes& nodes, const Point* points, std::size_t count, Ref* refs)
       : nodes_(nodes), points_(points), count_(count), parts_(leaves_for(count)), leaves_(refs), inner_(refs + parts_) {
     for (std::size_t i = 0; i < parts_; ++i) refs[i] = nodes.take_leaf();
     for (std::size_t i = 1; i < parts_; ++i) refs[parts_ + i] = nodes.take_node();
   }
 
-  // The whole, detached. O(n).
+  // The whole tree, detached. O(n).
   Ref tree(bool threads = false) const {
     const Ref whole = subtree(0, parts_, threads);
     nodes_.set_parent(whole, NONE);
     return whole;
   }
 
-  // Note in its leaf, once that is built, that a point is there more than once.
+  // Marks a point as repeated in its leaf, once the leaf is built.
   void mark_repeated(std::size_t point) const {
     const std::size_t leaf = ((point + 1) * parts_ - 1) / count_;
     nodes_.leaf(leaves_[leaf]).repeated |= bit(static_cast<unsigned>(point - start(leaf)));

@@ -1,4 +1,4 @@
-// Multiplicities: how often a point is in the tree, for those that are in it more than once.
+// Multiplicities: the number of copies of each point that the tree holds more than once.
 #pragma once
 
 #include <unordered_map>
@@ -15,10 +15,9 @@ struct PointHash {
   }
 };
 
-// How often, for the points that are there more than once.
 using Copies = std::unordered_map<Point, std::uint64_t, PointHash>;
 
-// The number of a point that is there more than once, or nullptr.
+// The number of copies of the point at a place, or nullptr if it is not repeated.
 inline std::uint64_t* copies_at(const Nodes& nodes, Copies& copies, const Place& place) {
   const Leaf& leaf = nodes.leaf(place.leaf);
   const bool repeated = place.there & (leaf.repeated >> place.entry & 1);

@@ -1,11 +1,12 @@
-// What lies over one part of a tree after the other, for updates in order: they share most of what they would climb.
+// Finger search: remembers the ancestors above the current part of the tree, so that updates in sorted order do not
+// climb the same nodes again.
 #pragma once
 
 #include "nodes.hpp"
 
 namespace dynhull {
 
-// Of a single update.
+// For a single update, which has nothing to remember.
 struct NoFinger {
   Ref over(Point) { return NONE; }
   bool clear(Side, double, double) { return false; }
@@ -15,11 +16,11 @@ struct NoFinger {
 
 class Finger {
  public:
-  // The nodes of this height or more.
+  // Remembers ancestors of this height or more.
   Finger(const Nodes& nodes, unsigned height) : nodes_(nodes), height_(height) {}
 
-  // The lowest of them over p, or NONE: also where to ask did not pay of late. No p may lie before an earlier one. O(1)
-  // amortized where updates are dense.
+  // The lowest remembered ancestor of p, or NONE; also NONE while recent calls did not pay. Successive p must not
+  // decrease. O(1) amortized if updates are dense.
   Ref over(Point p) {
     if (credit_ == 0) return NONE;
     --credit_;
@@ -29,22 +30,22 @@ class Finger {
     return here().parent;
   }
 
-  // Whether none of their bridges over the last p shares some x with the part from `left` to `right` of the chain.
+  // Whether no remembered bridge above the last p overlaps [left, right] in x.
   bool clear(Side side, double left, double right) {
     const bool is_clear = here().left[side] < left && right < here().right[side];
     if (is_clear) earn();
     return is_clear;
   }
-  // A climb has been spared, or would have been. It pays for a few questions.
+  // Records that a climb was saved, or would have been; each one pays for a few more calls of over().
   void earn() { credit_ = std::min(credit_ + 4, 64u); }
 
-  // Their links or bridges have changed.
+  // To be called after links or bridges of the remembered ancestors have changed.
   void forget() { steps_ = 0; }
 
  private:
-  static constexpr std::size_t MOST = 64;  // steps: the height of any tree that fits into memory is less
+  static constexpr std::size_t MOST = 64;  // steps: more than the height of any tree that fits in memory
 
-  // From one of the nodes down to a subtree: where that ends, and for each side the x between which no bridge lies.
+  // One step down: the subtree, where it ends, and for each side the interval of x that no bridge above overlaps.
   struct Step {
     Ref parent, tree;
     Point end;

@@ -1,4 +1,4 @@
-// A leaf: a few points in order, and for each side the set of those that are on the chain of the leaf's own hull.
+// A leaf: up to LEAF points in order, and for each side a mask of those on the chain of the leaf's own hull.
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,10 @@
 namespace dynhull {
 
 constexpr unsigned LEAF = DYNHULL_LEAF;
-static_assert(4 <= LEAF && LEAF < 64);                  // a bit of a mask an entry, and one past the end
+static_assert(4 <= LEAF && LEAF < 64);                  // one bit of a mask for each entry, and one past the end
 constexpr unsigned FILL = LEAF * 26 / 32;               // entries of a leaf built in bulk: fuller ones split at once
 constexpr unsigned LOW = std::max(2u, LEAF * 25 / 64);  // a leaf with fewer entries is merged with its neighbour
-constexpr unsigned MERGE_STEP = 4;                      // a try at every fourth size: its neighbour may be full
+constexpr unsigned MERGE_STEP = 4;                      // tried at every fourth size: the neighbour may be full
 constexpr std::uint32_t NONE = ~std::uint32_t{0};
 
 using Mask = std::uint64_t;
@@ -42,8 +42,8 @@ struct Leaf {
   std::uint32_t parent;
   std::uint32_t size;
   Mask chain[2];
-  Mask repeated;            // points that are there more than once: the tree knows how often
-  double x[LEAF], y[LEAF];  // past the end, x is infinite: a search need not know the size
+  Mask repeated;            // points with more than one copy: the tree counts them
+  double x[LEAF], y[LEAF];  // x is infinite past the end: a search ignores the size
 
   Point operator[](unsigned i) const { return {x[i], y[i]}; }
   Point first() const { return (*this)[0]; }
@@ -55,8 +55,8 @@ struct Leaf {
     for (unsigned i = 0; i < offsetof(Leaf, y); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
   }
 
-  // The first entry whose x is not less, of all LEAF, without branches: halves, and in the end quarters, whose three
-  // comparisons do not wait for each other.
+  // The first of all LEAF entries whose x is not less. Branch-free: halves, and in the end quarters, whose three
+  // comparisons are independent.
   template <unsigned REST = LEAF>
   unsigned find_x(double least, std::size_t from = 0) const {
     constexpr unsigned PARTS = REST > 15 ? 2 : 4, PART = REST / PARTS + 1;
@@ -66,14 +66,14 @@ struct Leaf {
     if constexpr (PART > 1) return find_x<PART - 1>(least, from);
     return static_cast<unsigned>(from);
   }
-  // The first entry that is not less than p, from the first whose x is not less: y decides between equal x.
+  // The first entry not less than p, given the first entry whose x is not less: y decides between equal x.
   unsigned find_y(unsigned from, Point p) const {
-    while (from < size && int{x[from] == p.x} + int{y[from] < p.y} > 1) ++from;  // one branch, foreseen
+    while (from < size && int{x[from] == p.x} + int{y[from] < p.y} > 1) ++from;  // one predictable branch
     return from;
   }
   unsigned find(Point p) const { return find_y(find_x(p.x), p); }
   bool holds(unsigned i, Point p) const { return i < size && (*this)[i] == p; }
-  // Whether p is entry i or belongs there, between two others.
+  // Whether p is entry i, or belongs there between two entries.
   bool has_place(unsigned i, Point p) const { return 0 < i && i < size && (*this)[i - 1] < p && p <= (*this)[i]; }
 
   void assign(const Point* points, unsigned count) {
@@ -87,7 +87,7 @@ struct Leaf {
     for (Side side : SIDES) chain[side] = scan(side, 0, count - 1);
   }
 
-  // Add p as entry i. Returns the sides on whose chain it is, as bits.
+  // Adds p as entry i. Returns the sides on whose chain p is, as bits.
   unsigned add(unsigned i, Point p) {
     std::copy_backward(x + i, x + size, x + size + 1);
     std::copy_backward(y + i, y + size, y + size + 1);
@@ -103,7 +103,7 @@ struct Leaf {
     return sides;
   }
 
-  // Remove entry i. Returns the sides on whose chain it was, as bits.
+  // Removes entry i. Returns the sides on whose chain it was, as bits.
   unsigned remove(unsigned i) {
     unsigned sides = 0;
     for (Side side : SIDES)
@@ -123,7 +123,7 @@ struct Leaf {
     return sides;
   }
 
-  // The vertices before and after entry i, itself on the chain; infinite where there is none.
+  // The vertices before and after entry i, which is on the chain; infinite at the chain's ends.
   Edge neighbours(Side side, unsigned i) const {
     const Mask before = chain[side] & below(i), after = chain[side] & ~below(i + 1);
     return {before ? (*this)[highest(before)] : LOWEST, after ? (*this)[lowest(after)] : HIGHEST};
@@ -152,8 +152,8 @@ struct Leaf {
   static Mask opened(Mask mask, unsigned i) { return (mask & below(i)) | (mask & ~below(i)) << 1; }
   static Mask closed(Mask mask, unsigned i) { return (mask & below(i)) | ((mask >> 1) & ~below(i)); }
 
-  // The entries between two, but for those that lie inside the chord or inside the triangle of the chord and the entry
-  // farthest outside: as far as floating point can tell, which costs no branch.
+  // The entries between two, without those certainly inside the chord or inside the triangle of the chord and the entry
+  // farthest outside it. A floating-point filter, branch-free.
   Mask perhaps_vertices(Side side, unsigned from, unsigned to) const {
     const Point a = (*this)[from], b = (*this)[to];
     const Chord chord(side, a, b);
@@ -176,7 +176,7 @@ struct Leaf {
     return kept;
   }
 
-  // Put entry i on the chain where it lies outside, and take off what it covers.
+  // Puts entry i on the chain if it is outside, and removes the vertices that it covers.
   bool cover(Side side, unsigned i) {
     const Point p = (*this)[i];
     Mask before = chain[side] & below(i), after = chain[side] & ~below(i + 1);

@@ -1,4 +1,4 @@
-// The parts of a tree: leaves, inner nodes, and their links, by number in growing arrays.
+// Leaves, inner nodes and their links, addressed by number in growing pools.
 #pragma once
 
 #include "../memory/pool.hpp"
@@ -6,14 +6,14 @@
 
 namespace dynhull {
 
-// A subtree: the number of a node, or of a leaf with the highest bit set; NONE for no points.
+// A subtree: the number of a node, or of a leaf with the highest bit set; NONE if empty.
 using Ref = std::uint32_t;
 constexpr Ref LEAF_BIT = Ref{1} << 31;
 inline bool is_leaf(Ref tree) { return tree >= LEAF_BIT; }
 inline Ref leaf_ref(std::uint32_t leaf) { return leaf | LEAF_BIT; }
 inline std::uint32_t leaf_number(Ref tree) { return tree & ~LEAF_BIT; }
 
-// What a descent reads: left < separator <= right. Two nodes a cache line.
+// The fields that a descent reads; left < separator <= right. Two nodes fill a cache line.
 struct Node {
   Ref child[2];
   Point separator;
@@ -22,7 +22,7 @@ struct Node {
 };
 static_assert(sizeof(Node) == 32);
 
-// What a climb reads: for each side the bridge, the common tangent of the children's chains.
+// The fields that a climb reads: for each side the bridge, the common tangent of the children's chains.
 struct Bridges {
   Edge side[2];
 };
@@ -62,14 +62,14 @@ class Nodes {
     return leaf(tree)[leaf(tree).size - 1];
   }
 
-  // Which child of its parent a subtree is.
+  // The index of a subtree among its parent's children.
   int rank(Ref parent, Ref tree) const { return node(parent).child[1] == tree; }
 
   void link(Ref parent, int rank, Ref tree) {
     node(parent).child[rank] = tree;
     set_parent(tree, parent);
   }
-  // Put a subtree, or NONE, in another's place below `parent`, or at the root.
+  // Puts a subtree, or NONE, in place of another below `parent`, or at the root.
   void replace(Ref parent, Ref old, Ref tree) {
     if (parent != NONE) {
       link(parent, rank(parent, old), tree);
@@ -79,13 +79,13 @@ class Nodes {
     }
   }
 
-  // Room for so many more leaves and nodes; the rest of this class never throws.
+  // Makes room for `extra` more leaves and nodes; no other method throws.
   void reserve(std::size_t extra) {
     leaves_.reserve(extra);
     nodes_.reserve(extra);
     bridges_.reserve(extra);
   }
-  // What is taken is not written to, and has no parent until it is linked or put in a place.
+  // A new leaf or node is uninitialised, and has no parent until it is linked or put in a place.
   Ref take_leaf() { return leaf_ref(leaves_.take()); }
   Ref take_node() {
     bridges_.take();

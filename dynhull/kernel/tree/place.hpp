@@ -5,7 +5,7 @@
 
 namespace dynhull {
 
-// Where a point is, or belongs.
+// The place of a point, or the place where it belongs.
 struct Place {
   Ref leaf;
   unsigned entry;
@@ -25,7 +25,7 @@ inline Place find(const Nodes& nodes, Point p) {
   return find_in(nodes, tree, p);
 }
 
-// The same, faster where `guess`, a leaf that may be gone by now, has points on both sides of p.
+// The same, faster if the leaf `guess` has points on both sides of p. The leaf may have been given back.
 inline Place find_near(const Nodes& nodes, Ref guess, Point p) {
   const Leaf& leaf = nodes.leaf(guess);
   if (leaf.size > 0 && leaf.first() <= p && p <= leaf[leaf.size - 1]) return find_in(nodes, guess, p);

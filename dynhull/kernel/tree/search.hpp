@@ -1,12 +1,12 @@
-// Searches along chains: a cursor, the bridge of two subtrees, tangents from a point.
+// Searches along chains: the cursor, tangents from a point, the bridge of two subtrees.
 #pragma once
 
 #include "nodes.hpp"
 
 namespace dynhull {
 
-// A binary search along the chain of a subtree, or its part between two of its vertices. At every step (a, b) is an
-// edge of the chain, and the caller says on which side of it the sought vertex lies; once one vertex is left, it is a.
+// A binary search along the chain of a subtree, or along the part between two of its vertices. At every step (a, b) is
+// an edge of the chain, and the caller chooses the side of it that holds the vertex; when one vertex is left, it is a.
 class Cursor {
  public:
   Point a, b;
@@ -39,7 +39,7 @@ class Cursor {
   }
 
  private:
-  // Pass the edges that do not lie between the two ends: at inner nodes, they are bridges under the chain.
+  // Skips the edges that are not between the two ends: at inner nodes, bridges below the chain.
   void descend() {
     if (lowest_ == highest_) return settle(lowest_);
     while (!is_leaf(tree_)) {
@@ -59,7 +59,7 @@ class Cursor {
     chain_ = leaf.chain[side_];
     halve();
   }
-  // Halve what is left of a leaf's chain by entries, not by vertices: that needs no list of them.
+  // Halves the rest of a leaf's chain by entries rather than by vertices, which needs no list of vertices.
   void halve() {
     const Leaf& leaf = nodes_.leaf(tree_);
     while (several(chain_)) {
@@ -84,10 +84,10 @@ class Cursor {
   Side side_;
   Ref tree_;
   Point lowest_, highest_;
-  Mask chain_, before_;  // of a leaf: what is left of its chain, and the part up to a
+  Mask chain_, before_;  // of a leaf: the rest of its chain, and the part up to a
 };
 
-// Where the tangent from p, right of the chain and outside of it, touches the chain; the farther of two.
+// The tangent point of the chain seen from p, which is right of the chain and outside it; the farther of two.
 inline Point tangent_to_left(Cursor cursor, Point p, Side side) {
   while (!cursor.single) {
     if (turned(side, orientation(cursor.a, cursor.b, p)) >= 0)
@@ -98,7 +98,7 @@ inline Point tangent_to_left(Cursor cursor, Point p, Side side) {
   return cursor.a;
 }
 
-// Where the tangent from p, left of the chain and outside of it, touches the chain; the farther of two.
+// The tangent point of the chain seen from p, which is left of the chain and outside it; the farther of two.
 inline Point tangent_to_right(Cursor cursor, Point p, Side side) {
   while (!cursor.single) {
     if (turned(side, orientation(cursor.a, cursor.b, p)) >= 0)
@@ -112,7 +112,7 @@ inline Point tangent_to_right(Cursor cursor, Point p, Side side) {
 // The edge that joins two chains, all of the left one < separator <= all of the right one. O(log n) orientations.
 //
 // With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
-// lies outside or on the line through a and b; likewise on the right. Where both edges have each other's ends inside,
+// is outside or on the line through a and b; likewise on the right. If both edges have each other's ends inside,
 // their lines cross between the chains, and the side of the separator on which they do decides.
 inline Edge find_bridge(Cursor left, Cursor right, Side side, Point separator) {
   while (true) {

@@ -1,4 +1,4 @@
-// Updates one by one, on the tree at nodes.root: repair the leaf, then climb while the hull changes.
+// Single updates of the tree at nodes.root: repair the leaf, then climb while the hull changes.
 #pragma once
 
 #include "balance.hpp"
@@ -7,17 +7,17 @@
 
 namespace dynhull {
 
-// One branch, which goes the same way almost always, where || makes two that each go either way.
+// One predictable branch, where || compiles to two unpredictable ones.
 inline bool either(bool first, bool second) { return first + second != 0; }
 
-// The way up from a chain that has changed around p, past bridges that share no x with what has changed: they stand.
+// Climbs from a chain that has changed around p, and skips bridges that do not overlap the change in x: they stay.
 template <class Over>
 class Climb {
  public:
   Climb(const Nodes& nodes, Point p, Side side, Over& finger)
       : nodes_(nodes), side_(side), finger_(finger), known_(finger.over(p)) {}
 
-  // From v up, the first node whose bridge shares some x with the part from `left` to `right`, or NONE.
+  // The first node from v upwards whose bridge overlaps [left, right] in x, or NONE.
   Ref first_near(Ref v, double left, double right) {
     v = first_near(v, known_, left, right);
     if (v != known_) return v;
@@ -30,7 +30,7 @@ class Climb {
     return first_near(v, NONE, left, right);
   }
 
-  // The bridge of the last node has to change.
+  // To be called if the bridge of the last node changes.
   void changes() {
     stood_ = false;
     if (known_ == NONE) finger_.forget();
@@ -48,14 +48,15 @@ class Climb {
   const Nodes& nodes_;
   Side side_;
   Over& finger_;
-  Ref known_;  // the first node that the overhead knows of; NONE from there on
+  Ref known_;  // the lowest node that the finger remembers; NONE once the climb has passed it
   bool stood_ = true;
 };
 
-// Repair the bridges from v up for p, new on the chain below, as far as p is on the chain. True where to the root.
+// Repairs the bridges from v upwards after p joined the chain below, as long as p is on the chain. True if p reaches
+// the root's chain.
 //
-// `neighbours` are those of p on the chain, infinite where p is its end. With one of them between p and the bridge, the
-// chain turns before it gets there, and p lies inside the bridge's line.
+// `neighbours` are p's neighbours on the chain, infinite at its ends. If one of them is between p and the bridge, the
+// chain turns before the bridge, and p is inside the bridge's line.
 template <class Over>
 bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& finger) {
   Climb climb(nodes, p, side, finger);
@@ -82,9 +83,9 @@ bool climb_added(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over&
   return true;
 }
 
-// The bridge of v anew, after `gone`, one of its ends, left its child's chain; `neighbours` are those it had there.
-// That chain has sunk below the old bridge, between them only: its new end lies there too, and at its other end the
-// bridge stays or moves towards the separator.
+// The new bridge of v, after `gone`, an end of the old one, left its child's chain, where `neighbours` were beside it.
+// That chain has sunk below the old bridge only between the neighbours, so the bridge's new end is there too; its other
+// end stays or moves towards the separator.
 inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone, Edge neighbours) {
   const Node& node = nodes.node(v);
   const Edge& old = nodes.bridge(v, side);
@@ -95,9 +96,10 @@ inline Edge bridge_after(const Nodes& nodes, Ref v, Side side, Point gone, Edge 
                      Cursor(nodes, node.child[1], side, right.a, right.b), side, node.separator);
 }
 
-// Repair the bridges from v up for p, gone from the chain below, as far as p was on it. True where to the root.
+// Repairs the bridges from v upwards after p left the chain below, as long as p was on the chain. True if p was on the
+// root's chain.
 //
-// `neighbours` are those of p on the chain, infinite where p was its end.
+// `neighbours` were p's neighbours on the chain, infinite at its ends.
 template <class Over>
 bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Over& finger) {
   Climb climb(nodes, p, side, finger);
@@ -117,8 +119,8 @@ bool climb_removed(Nodes& nodes, Ref v, Point p, Side side, Edge neighbours, Ove
   return true;
 }
 
-// Insert a point that is not there. Returns the sides, as bits, on which the hull changed.
-// Needs room for one more leaf and node. `overhead` is that of a batch in order.
+// Inserts a missing point. Returns the sides, as bits, on which the hull changed. Needs room for one more leaf and
+// node. `finger` is that of a batch in sorted order.
 template <class Over = NoFinger>
 unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& finger = Over()) {
   if (place.leaf == NONE) {
@@ -141,7 +143,7 @@ unsigned insert_point(Nodes& nodes, Place place, Point p, Over&& finger = Over()
   return changed;
 }
 
-// Remove a point that is there. Returns the sides, as bits, on which the hull changed.
+// Removes a present point. Returns the sides, as bits, on which the hull changed.
 template <class Over = NoFinger>
 unsigned remove_point(Nodes& nodes, Place place, Point p, Over&& finger = Over()) {
   Leaf& leaf = nodes.leaf(place.leaf);
