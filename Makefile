@@ -1,10 +1,10 @@
 # One word for each thing people do here. Everything runs in .venv, made on first use.
 PYTHON ?= python3
 BIN := .venv/bin
-KERNEL := $(wildcard dynhull/kernel/*)
+KERNEL := $(shell find dynhull/kernel -name "*.?pp")
 DAY ?= 2013-03-08
 
-.PHONY: demo test check docs proto contract fuzz fuzz-reference fuzz-server robustness simulate clean
+.PHONY: demo test check docs stub proto contract fuzz fuzz-reference fuzz-server robustness simulate clean
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
@@ -32,6 +32,9 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp
 	$(BIN)/mypy
+	$(STUB) -o build/_kernel.pyi
+	diff build/_kernel.pyi dynhull/_kernel.pyi || (echo 'run `make stub`'; exit 1)
+	$(BIN)/stubtest dynhull._kernel --allowlist dynhull/kernel/python/stubtest.txt
 	$(BIN)/lint-imports
 	$(BIN)/buf lint
 	$(BIN)/buf format --diff --exit-code
@@ -42,6 +45,11 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
+
+STUB = mkdir -p build && $(BIN)/python -m nanobind.stubgen -q -m dynhull._kernel
+
+stub: .venv/.check  ## regenerate dynhull/_kernel.pyi, the types of the kernel
+	$(STUB) -o dynhull/_kernel.pyi
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py

@@ -22,12 +22,12 @@ from sklearn.svm import SVC
 
 import dynhull
 from dynhull import DynamicHull, measure
+from dynhull._tree import HullTree
 from dynhull.convex import Cloud
 from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram, energy_above_hull_nd
 from dynhull.gjk import contact, distance_many, intersect_many
 from dynhull.margin import max_margin
-from dynhull.tree import HullTree
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from judges import fcl_body

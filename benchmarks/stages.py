@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from steps import circle, increasing, replaced, tuples, uniform
 
-from dynhull import predicates
-from dynhull.predicates import EPSILON, ORIENT_BOUND, UNDERFLOW, Point
-from dynhull.tree import HullTree
+from dynhull import _predicates as predicates
+from dynhull._predicates import EPSILON, ORIENT_BOUND, UNDERFLOW, Point
+from dynhull._tree import HullTree
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from killers import KILLERS

@@ -23,7 +23,7 @@ from scipy.spatial import ConvexHull
 
 import dynhull
 from dynhull import static
-from dynhull.implementation import kernel
+from dynhull._implementation import kernel
 
 
 def in_disk(random: np.random.Generator, n: int) -> np.ndarray:

@@ -15,8 +15,9 @@ from itertools import islice
 
 import numpy as np
 
-from dynhull import nodes, tree
-from dynhull.tree import HullTree
+from dynhull import _nodes as nodes
+from dynhull import _tree as tree
+from dynhull._tree import HullTree
 
 Point = tuple[float, float]
 Update = tuple[Point, Point]  # delete, insert

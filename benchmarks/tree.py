@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from sortedcontainers import SortedList
 
-from dynhull.tree import HullTree
+from dynhull._tree import HullTree
 
 Point = tuple[float, float]
 

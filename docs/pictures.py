@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from dynhull import DynamicHull, convex_hull, static
+from dynhull._nodes import UPPER, Leaf, bridge
+from dynhull._predicates import ORIENT_BOUND, UNDERFLOW, orient2d
 from dynhull.convex import ball, convex_combination, minkowski_sum, polygon
 from dynhull.decompose import convex_pieces
 from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram
 from dynhull.gjk import contact, intersect
 from dynhull.margin import max_margin
-from dynhull.nodes import UPPER, Leaf, bridge
-from dynhull.predicates import ORIENT_BOUND, UNDERFLOW, orient2d
 from dynhull.trace import Begin, Descent, TracedTree, View, Visit
 
 ROOT = Path(__file__).parents[1]

@@ -1,9 +1,11 @@
 """A fully dynamic planar convex hull with exact answers."""
 
-from . import static
-from .hull import DynamicHull, MissingPointError
-from .implementation import KERNEL
-from .predicates import orient2d
+from sys import modules as _modules
+
+from . import _hull, static
+from ._hull import DynamicHull, MissingPointError
+from ._implementation import KERNEL
+from ._predicates import orient2d
 from .static import convex_hull
 
 __all__ = ["KERNEL", "DynamicHull", "MissingPointError", "__version__", "convex_hull", "orient2d", "static"]
@@ -17,3 +19,8 @@ def __getattr__(name: str) -> str:
 
         return version("dynhull")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+for _public in (DynamicHull, MissingPointError):
+    _public.__module__ = "dynhull"
+_modules["dynhull._hull"] = _hull  # where pickles of version 0.1 look for the classes

@@ -1,43 +1,137 @@
-"""The kernel's types: see dynhull/kernel/bindings.cpp."""
+"""The hull tree in C++, with the same results as the one in Python."""
 
-from typing import Any, Self
+from typing import Annotated, overload
 
-import numpy as np
-import numpy.typing as npt
+import numpy
+from numpy.typing import NDArray
 
-Point = tuple[float, float]
-Points = npt.NDArray[np.float64]
 
 class HullTree:
-    changes: int
-    def __init__(self, xy: Points | None = None) -> None: ...
-    def __len__(self) -> int: ...
-    @property
-    def distinct(self) -> int: ...
-    @property
-    def memory(self) -> tuple[int, int]: ...
-    def clear(self) -> None: ...
-    def copy(self) -> Self: ...
-    def count(self, x: float, y: float) -> int: ...
-    def count_many(self, xy: Points) -> npt.NDArray[np.int64]: ...
-    def insert(self, x: float, y: float) -> bool: ...
-    def delete(self, x: float, y: float) -> bool: ...
-    def apply(self, ops: npt.NDArray[np.int8], xy: Points, ignore_missing: bool) -> tuple[int, int]: ...
-    def points(self) -> Points: ...
-    def vertices(self) -> Points: ...
-    def chain(self, side: int) -> Points: ...
-    def locate(self, xy: Points) -> npt.NDArray[np.int8]: ...
-    def support(self, directions: Points) -> Points: ...
-    def tangents(self, xy: Points) -> npt.NDArray[np.float64]: ...
-    def distance(self, xy: Points) -> npt.NDArray[np.float64]: ...
-    def intersect_lines(self, p: Points, q: Points) -> npt.NDArray[np.float64]: ...
-    def check(self) -> None: ...
+    """
+    A multiset of points and its convex hull: see dynhull's tree in Python.
+    """
 
-def plain_points(xy: npt.NDArray[Any]) -> Points | None: ...
-def convex_hull(xy: Points, discard: bool | None = None, threads: bool | None = None) -> Points | None: ...
-def chan(xy: Points) -> tuple[Points, list[tuple[int, int, int, bool]]]: ...
-def orientation(a: Point, b: Point, c: Point) -> int: ...
-def orientations(a: Points, b: Points, c: Points) -> npt.NDArray[np.int8]: ...
-def direction_sign(d: Point, a: Point, b: Point) -> int: ...
-def crossing(a: Point, b: Point, c: Point, d: Point, z: Point) -> int: ...
-def plain_difference_of_products(a: float, b: float, c: float, d: float) -> float: ...
+    def __init__(self, xy: object | None = None) -> None: ...
+
+    def __len__(self) -> int: ...
+
+    @property
+    def distinct(self) -> int:
+        """The number of different points."""
+
+    @property
+    def changes(self) -> int:
+        """The number of updates that changed the hull."""
+
+    @changes.setter
+    def changes(self, arg: int, /) -> None: ...
+
+    def count(self, x: float, y: float) -> int:
+        """The number of copies of the point. O(log n)."""
+
+    def count_many(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
+        """The number of copies of each point. O(log n) a row."""
+
+    def insert(self, x: float, y: float) -> bool:
+        """Add a point. True if the hull changed. O(log² n)."""
+
+    def delete(self, x: float, y: float) -> bool:
+        """
+        Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).
+        """
+
+    def clear(self) -> None:
+        """Remove every point."""
+
+    @overload
+    def apply(self, op: int, xy: object, ignore_missing: bool, together: bool | None = None) -> int:
+        """Insert all rows (+1) or delete all rows (-1)."""
+
+    @overload
+    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], xy: object, ignore_missing: bool, together: bool | None = None) -> int:
+        """
+        Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and conquer (True) or one change after the other (False); by default the batch decides.
+        """
+
+    def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """All points in lexicographic order, with multiplicity. O(n)."""
+
+    def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The hull's vertices, counter-clockwise from the least. O(h log n)."""
+
+    def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The upper (0) or lower (1) chain from left to right. O(h log n)."""
+
+    def locate(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
+        """For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row."""
+
+    def support(self, directions: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """
+        The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row.
+        """
+
+    def tangents(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2, 2))]:
+        """
+        The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row.
+        """
+
+    def distance(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        The distance of each row to the hull, rounded once; infinite without points. O(log n) a row.
+        """
+
+    def intersect_lines(self, p: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], q: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2, 2))]:
+        """
+        Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. O(log n) a row.
+        """
+
+    def copy(self) -> HullTree:
+        """An independent tree of the same points. O(n)."""
+
+    def check(self) -> None:
+        """Raise AssertionError if an invariant is broken. O(n log n)."""
+
+    @property
+    def memory(self) -> tuple[int, int]:
+        """The bytes that the tree uses, and the bytes that it reserves."""
+
+def orientation(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> int:
+    """
+    +1 if the three points turn left, -1 if they turn right, 0 if they are collinear.
+    """
+
+def direction_sign(d: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> int:
+    """
+    +1 if b is farther than a in direction d, -1 if it is less far, 0 if neither.
+    """
+
+def crossing(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float], z: tuple[float, float]) -> int:
+    """The sign of height(ab) - height(cd) at z, for a < b < z <= c < d."""
+
+def orientations(a: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], c: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
+    """`orientation` of each row of three arrays."""
+
+def plain_difference_of_products(a: float, b: float, c: float, d: float) -> float:
+    """
+    a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.
+    """
+
+def plain_points(xy: object) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))] | None:
+    """
+    A copy of an (n, 2) array of finite doubles without negative zeros; None for any other argument.
+    """
+
+def packed_points(packed: bytes) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))] | None:
+    """
+    The points whose coordinates are these doubles, without negative zeros; None if one is not finite.
+    """
+
+def convex_hull(xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], discard: bool | None = None, threads: bool | None = None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))] | None:
+    """
+    The static hull's vertices, counter-clockwise from the least; None if a coordinate is not finite. `discard` drops points inside a sample's hull first, `threads` uses two threads; by default the input decides. O(n log n).
+    """
+
+def chan(xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))], list[tuple[int, int, int, bool]]]:
+    """
+    The same by Chan's algorithm, with its rounds (guess, groups, steps, closed). O(n log h).
+    """

@@ -1,4 +1,4 @@
-"""Arrays of points as they come in: converted when that is exact, refused with the first bad row when it is not."""
+"""Input arrays: converted to float64 if that is exact, otherwise refused with an error that names the first bad row."""
 
 import math
 import sys
@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._implementation import kernel
 from ._sources import coordinates_of
-from .implementation import kernel
+
+__all__ = ["Checked", "Points", "as_coordinate", "as_points", "packed_points", "plain_points"]
 
 Points = npt.NDArray[np.float64]
 
@@ -20,10 +22,12 @@ MOST_AXES = 64  # of an array: no list is nested deeper
 
 
 class Checked:
-    """Points that have been checked already, as those of a request: checking them again takes as long as locating some.
+    """Points that `as_points` returns unchanged, so that a request's points are checked only once.
+
+    A check costs about as much as locating the points.
 
     Args:
-        points: what `as_points` or `packed_points` has returned.
+        points: an array that `as_points` or `packed_points` returned.
     """
 
     __slots__ = ("points",)
@@ -45,10 +49,11 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     """Return `xy` as a C-contiguous float64 array of shape (n, 2) with finite entries and no negative zeros.
 
     Raises:
-        ValueError: the shape is not (n, 2), an entry is not finite, or is no double (an integer beyond 2**53, say).
+        ValueError: the shape is not (n, 2), an entry is not finite, or no double has its value (an integer beyond
+            2**53, say).
         TypeError: an entry is not a real number.
 
-    The message names the first bad row. `Checked` points are taken as they are.
+    The message names the first bad row. O(n); `Checked` points are not copied.
     """
     if type(xy) is Checked:
         return xy.points
@@ -58,9 +63,9 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
 
 
 def as_pairs(xy: npt.ArrayLike, name: str = "points") -> Points:
-    """Return `xy` like `as_points` but for what stands in it: entries need not be finite, zeros may be negative.
+    """Return `xy` like `as_points`, but allow entries that are not finite and negative zeros.
 
-    An array that is like that already is not copied.
+    A contiguous float64 array is not copied.
     """
     pairs = _as_pairs(xy, name)
     return pairs if pairs.flags.c_contiguous and pairs.flags.aligned else pairs.copy(order="C")
@@ -77,7 +82,7 @@ def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
 
 
 def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
-    """Return (k, dimension) directions, checked like `as_points`; none of them is zero."""
+    """Return (k, dimension) directions, checked like `as_points`, none of them zero."""
     vectors = as_rows(directions, "directions")
     if len(vectors) and vectors.shape[1] != dimension:
         raise ValueError(f"directions must have shape (k, {dimension}), got {vectors.shape}")
@@ -88,15 +93,15 @@ def as_directions(directions: npt.ArrayLike, dimension: int) -> Points:
 
 
 def as_array(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
-    """Return what numpy makes of the values, without a masked array among them."""
+    """Return `np.asarray(values)`; refuse masked arrays."""
     refuse_masked(values, name)
     return np.asarray(values)
 
 
 def refuse_masked(values: Any, name: str) -> None:
-    """Raise ValueError for a masked array and for lists of them: numpy would take what is hidden for values.
+    """Raise ValueError for a masked array and for lists of masked arrays: numpy would use the hidden entries as values.
 
-    Also where nothing is hidden, as scipy does: whether a call works does not depend on which data are missing today.
+    Also if nothing is hidden, as scipy does: whether a call works must not depend on which data are missing today.
     """
     entries = [values]
     for _ in range(MOST_AXES):
@@ -105,7 +110,7 @@ def refuse_masked(values: Any, name: str) -> None:
             return
         if any(issubclass(kind, np.ma.MaskedArray) for kind in kinds):
             raise ValueError(
-                f"{name} must not be or hold a masked array: give np.ma.compress_rows(...), which leaves out the rows "
+                f"{name} must not be or contain a masked array: pass np.ma.compress_rows(...), which drops the rows "
                 "with hidden entries, or the array's .filled(value)"
             )
         lists = tuple(kind for kind in kinds if issubclass(kind, (list, tuple)))
@@ -115,7 +120,7 @@ def refuse_masked(values: Any, name: str) -> None:
 
 
 def as_tuples(points: Points) -> list[tuple[float, float]]:
-    """The rows of an (n, 2) array, for code that looks at one point at a time."""
+    """The rows of an (n, 2) array as tuples, for code that reads one point at a time."""
     return [(x, y) for x, y in points.tolist()]
 
 
@@ -138,7 +143,12 @@ def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
 
 
 def as_coordinate(value: Any, name: str) -> float:
-    """Return one coordinate as a finite float, converted when exact."""
+    """Return one coordinate as a finite float, converted if that is exact.
+
+    Raises:
+        ValueError: the value is not finite, or no double has it.
+        TypeError: the value is not a real number.
+    """
     if type(value) is float:
         double = value
     else:
@@ -191,7 +201,7 @@ def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:
 
 
 def _first_not_a_number(xy: Any) -> int:
-    """The row that made numpy choose a text, date or record type."""
+    """The row because of which numpy chose a text, date or record type."""
     for row, entry in enumerate(xy):
         values = entry if hasattr(entry, "__len__") and not isinstance(entry, str | bytes) else [entry]
         if not all(isinstance(value, Number) for value in values):
@@ -200,7 +210,7 @@ def _first_not_a_number(xy: Any) -> int:
 
 
 def _as_double(array: npt.NDArray[Any], name: str) -> Points:
-    """Convert an (n, 2) array to float64, refusing the first row that would not keep its value."""
+    """Convert an (n, 2) array to float64; refuse the first row whose value would change."""
     if array.dtype == np.float64:
         return array
     kind = array.dtype.kind
@@ -209,7 +219,7 @@ def _as_double(array: npt.NDArray[Any], name: str) -> Points:
     if kind in "iu":
         large = (array > LARGEST_EXACT_INTEGER) | (array < -LARGEST_EXACT_INTEGER)
         doubtful = np.flatnonzero(large.any(axis=1))
-    elif kind in "fc":  # wider than a double, or complex: right where it comes back the same
+    elif kind in "fc":  # wider than a double, or complex: exact if it survives a round trip
         with np.errstate(over="ignore"):
             same = (array.real.astype(np.float64) == array) | np.isnan(array)
         doubtful = np.flatnonzero(~same.all(axis=1))
@@ -240,10 +250,9 @@ def _as_double_scalar(value: Any, name: str) -> float:
 
 
 def plain_points(xy: npt.NDArray[Any]) -> Points | None:
-    """What `as_points` makes of an (n, 2) array of finite doubles; None of anything else."""
+    """The copy that `as_points` returns for an (n, 2) array of finite doubles; None for any other array."""
     if kernel is not None:
-        points: Points | None = kernel.plain_points(xy)
-        return points
+        return kernel.plain_points(xy)
     if xy.dtype != np.float64 or xy.ndim != 2 or xy.shape[1] != 2:
         return None
     copy = _copy(xy)
@@ -251,10 +260,9 @@ def plain_points(xy: npt.NDArray[Any]) -> Points | None:
 
 
 def packed_points(packed: bytes) -> Points | None:
-    """The points whose coordinates are these little-endian doubles; None where one is not finite."""
+    """The points whose coordinates are these little-endian doubles; None if one is not finite."""
     if kernel is not None and sys.byteorder == "little":
-        points: Points | None = kernel.packed_points(packed)
-        return points
+        return kernel.packed_points(packed)
     return plain_points(np.frombuffer(packed, "<f8").astype(np.float64, copy=False).reshape(-1, 2))
 
 
@@ -268,7 +276,7 @@ def _finite(array: Points, name: str) -> Points:
 
 
 def _copy(array: Points) -> Points:
-    """A copy, which no other thread writes to, without negative zeros: -0.0 and 0.0 are the same coordinate."""
+    """A copy without negative zeros, because -0.0 and 0.0 are the same coordinate; no other thread writes to it."""
     return np.ascontiguousarray(array + 0.0)
 
 

@@ -21,9 +21,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from ._exact import Integers, as_integers, root
+from ._predicates import EPSILON, Point, cross_sign
 from .arrays import Points, as_array, as_directions, as_points, as_rows, as_tuples, as_vector
-from .exact import Integers, as_integers, root
-from .predicates import EPSILON, Point, cross_sign
 from .static import convex_hull
 
 Way = tuple[Point, Point, int]

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ._predicates import Point, dot_sign, orient2d, orientation
 from .arrays import Points, as_points, as_tuples
-from .predicates import Point, dot_sign, orient2d, orientation
 
 Ring = list[int]
 

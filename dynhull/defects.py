@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ._exact import Integers, root
 from ._value import Value
 from .arrays import as_points
-from .exact import Integers, root
-from .measure.calipers import Indices, least, squared_height
+from .measure._calipers import Indices, least, squared_height
 from .static import convex_hull
 
 

@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy.typing as npt
 
-from .nodes import SIDES, Edge, Leaf, Node, Tree, bridge, chain_of
-from .predicates import Point
-from .tree import HullTree
+from ._nodes import SIDES, Edge, Leaf, Node, Tree, bridge, chain_of
+from ._predicates import Point
+from ._tree import HullTree
 
 
 @dataclass(frozen=True, slots=True)

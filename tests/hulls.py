@@ -3,9 +3,9 @@
 from itertools import product
 
 from dynhull import DynamicHull, convex_hull, static
+from dynhull._implementation import kernel
+from dynhull._tree import HullTree
 from dynhull.arrays import as_points
-from dynhull.implementation import kernel
-from dynhull.tree import HullTree
 
 
 class PythonHull(DynamicHull):

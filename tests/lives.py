@@ -20,7 +20,7 @@ from hulls import PythonHull
 from inputs import CIRCLE, EXTREME
 
 from dynhull import MissingPointError
-from dynhull.tree import HullTree
+from dynhull._tree import HullTree
 
 LIVES_A_TASK = 20
 TASKS_AHEAD = 4

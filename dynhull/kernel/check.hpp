@@ -1,16 +1,16 @@
-// Verification: every invariant of a tree against its definition, sharing nothing with the searches.
+// Verification: every invariant of a tree against its definition, without the searches' code.
 #pragma once
 
 #include <stdexcept>
 #include <string>
 
-#include "tree.hpp"
+#include "hull_tree.hpp"
 
 namespace dynhull {
 
 class Check {
  public:
-  // Throws std::logic_error where an invariant is broken. O(n log n) orientations.
+  // Throws std::logic_error if an invariant is broken. O(n log n) orientations.
   explicit Check(const HullTree& tree) : nodes_(tree.nodes()) {
     std::size_t repeats = 0;
     std::size_t repeated = 0;
@@ -34,7 +34,7 @@ class Check {
     if (!holds) throw std::logic_error(message);
   }
 
-  // Check a subtree whose points begin at next_. Returns where they end.
+  // Checks a subtree whose points begin at next_. Returns their end.
   std::size_t subtree(Ref tree) {
     if (is_leaf(tree)) return leaf(nodes_.leaf(tree));
     const Node& node = nodes_.node(tree);
@@ -46,8 +46,10 @@ class Check {
     require(left <= right + 1 && right <= left + 1, "out of balance");
     for (Side side : SIDES) {
       const Edge& edge = nodes_.bridge(tree, side);
-      require(std::binary_search(points_.begin() + from, points_.begin() + middle, edge.a), "a bridge from nowhere");
-      require(std::binary_search(points_.begin() + middle, points_.begin() + to, edge.b), "a bridge to nowhere");
+      require(std::binary_search(points_.begin() + from, points_.begin() + middle, edge.a),
+              "a bridge starts outside the left subtree");
+      require(std::binary_search(points_.begin() + middle, points_.begin() + to, edge.b),
+              "a bridge ends outside the right subtree");
       supports(edge, side, from, to);
     }
     return to;
@@ -71,7 +73,7 @@ class Check {
     return next_;
   }
 
-  // An edge of the chain of the points from..to: none outside, and on its line only between its ends.
+  // Requires that no point of from..to is outside the edge, or on its line beyond its ends.
   void supports(const Edge& edge, Side side, std::size_t from, std::size_t to) const {
     for (std::size_t i = from; i < to; ++i) {
       const Point p = points_[i];

@@ -4,11 +4,11 @@ O(h log h) at most. Choices between vertices and edges are exact: most are made 
 error, and exact integers decide the rest.
 """
 
-from .area import area, centroid, perimeter
-from .box import min_box, min_perimeter_box
-from .circle import min_circle
-from .extent import bounds, diameter, width
-from .lines import distance, intersect_lines
+from ._area import area, centroid, perimeter
+from ._box import min_box, min_perimeter_box
+from ._circle import min_circle
+from ._extent import bounds, diameter, width
+from ._lines import distance, intersect_lines
 
 __all__ = [
     "area",

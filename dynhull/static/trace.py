@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from ..predicates import Point
+from .._predicates import Point
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,5 +98,5 @@ def test_bad_input(ask, message):
 
 
 def test_a_point_that_is_not_there():
-    with pytest.raises(KeyError, match="is not there to delete"):
+    with pytest.raises(KeyError, match="is missing and cannot be deleted"):
         Frontier([[1, 1]]).remove(1, 2)

@@ -116,5 +116,5 @@ def test_bad_input(ask, message):
 
 
 def test_an_entry_that_is_not_there():
-    with pytest.raises(KeyError, match="is not there to delete"):
+    with pytest.raises(KeyError, match="is missing and cannot be deleted"):
         PhaseDiagram([[0, 0]]).remove(0, 1)

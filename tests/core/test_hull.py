@@ -203,7 +203,7 @@ def test_both_zeros_are_one_point(make):
 @both
 def test_delete_missing(make):
     hull = make(EXAMPLE)
-    with pytest.raises(KeyError, match=r"point \(9\.0, 9\.0\) is not there"):
+    with pytest.raises(KeyError, match=r"point \(9\.0, 9\.0\) is missing"):
         hull.delete(9, 9)
     with pytest.raises(KeyError, match=r"row 2: point \(4\.0, 4\.0\)"):
         hull.delete_many([[4, 4], [0, 0], [4, 4]])

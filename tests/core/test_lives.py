@@ -7,7 +7,7 @@ from pathlib import Path
 import lives
 import pytest
 
-from dynhull.tree import HullTree
+from dynhull._tree import HullTree
 
 
 def test_random_lives():

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from dynhull import DynamicHull, convex_hull, orient2d, static
+from dynhull._implementation import kernel
+from dynhull._tree import HullTree
 from dynhull.convex import (
     Cloud,
     Mapped,
@@ -22,9 +24,7 @@ from dynhull.decompose import convex_pieces
 from dynhull.defects import convexity_defects
 from dynhull.envelope import Frontier, PhaseDiagram, energy_above_hull_nd
 from dynhull.gjk import distance_many, intersect_many
-from dynhull.implementation import kernel
 from dynhull.margin import max_margin
-from dynhull.tree import HullTree
 
 ROWS = [[0.0, 0.5], [1.0, 0.25], [0.5, 1.0]]
 
@@ -99,14 +99,14 @@ TAKE_VALUES = {
 @pytest.mark.parametrize("row", [1, None], ids=["a row hidden", "nothing hidden"])
 @pytest.mark.parametrize("take", TAKE_POINTS.values(), ids=TAKE_POINTS)
 def test_points(take, row):
-    with pytest.raises(ValueError, match=r"must not be or hold a masked array.*np\.ma\.compress_rows"):
+    with pytest.raises(ValueError, match=r"must not be or contain a masked array.*np\.ma\.compress_rows"):
         take(masked(ROWS, row))
 
 
 @pytest.mark.parametrize("row", [1, None], ids=["an entry hidden", "nothing hidden"])
 @pytest.mark.parametrize("take", TAKE_VALUES.values(), ids=TAKE_VALUES)
 def test_values(take, row):
-    with pytest.raises(ValueError, match="must not be or hold a masked array"):
+    with pytest.raises(ValueError, match="must not be or contain a masked array"):
         take(masked([1.0, 1.0], row))
 
 
@@ -123,7 +123,7 @@ def test_values(take, row):
 )
 def test_within_lists(rows):
     hull = DynamicHull([[5, 5]])
-    with pytest.raises(ValueError, match="points must not be or hold a masked array"):
+    with pytest.raises(ValueError, match="points must not be or contain a masked array"):
         hull.insert_many(rows)
     assert hull.points().tolist() == [[5, 5]]
 
@@ -132,7 +132,7 @@ def test_within_lists(rows):
 def test_coordinates(method):
     hull = DynamicHull([[0, 0]])
     for value in (np.ma.masked, np.ma.array(0.0)):
-        with pytest.raises(ValueError, match="y must not be or hold a masked array"):
+        with pytest.raises(ValueError, match="y must not be or contain a masked array"):
             getattr(hull, method)(0, value)
     assert len(hull) == 1
 

@@ -148,7 +148,7 @@ def test_known_values(make):
 @both
 def test_bad_lines(make):
     hull = make([[0, 0]])
-    with pytest.raises(ValueError, match="p and q row 1 are the same point: no line"):
+    with pytest.raises(ValueError, match="p and q row 1 are the same point, which defines no line"):
         hull.intersect_lines([[0, 0], [1, 1]], [[0, 1], [1, 1]])
     with pytest.raises(ValueError, match="p and q must have the same length, got 1 and 2"):
         hull.intersect_lines([[0, 0]], [[0, 1], [1, 1]])

@@ -6,7 +6,7 @@ from bisect import insort
 import oracle
 import pytest
 
-from dynhull.nodes import SIDES
+from dynhull._nodes import SIDES
 from dynhull.trace import Begin, Climb, Descent, End, Reshape, TracedTree, View, Visit
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dynhull.implementation import kernel
+from dynhull._implementation import kernel
 
 HERE = Path(__file__).parent
 COMPILER = os.environ.get("CXX") or shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")

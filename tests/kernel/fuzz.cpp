@@ -13,7 +13,7 @@
 #include <random>
 
 #include "../../dynhull/kernel/check.hpp"
-#include "../../dynhull/kernel/queries.hpp"
+#include "../../dynhull/kernel/query/queries.hpp"
 
 namespace {
 
@@ -315,7 +315,7 @@ class Life {
     for (const auto& [a, b] : around) {
       const int at_a = orientation(p, q, a), at_b = orientation(p, q, b);
       if (at_a == 0) meets(a);
-      if (at_a * at_b < 0) meets({meet_exact(p, q, a, b, a.x, b.x), meet_exact(p, q, a, b, a.y, b.y)});
+      if (at_a * at_b < 0) meets({intersection_exact(p, q, a, b, a.x, b.x), intersection_exact(p, q, a, b, a.y, b.y)});
     }
     const std::optional<Edge> ends = intersect_line(tree_.nodes(), p, q), back = intersect_line(tree_.nodes(), q, p);
     require(ends.has_value() == !met.empty(), "a line misses, or does not");

@@ -12,8 +12,8 @@
 #include <random>
 #include <set>
 
-#include "../../dynhull/kernel/chan.hpp"
-#include "../../dynhull/kernel/static_hull.hpp"
+#include "../../dynhull/kernel/static/chan.hpp"
+#include "../../dynhull/kernel/static/static_hull.hpp"
 
 namespace {
 
@@ -73,9 +73,9 @@ class Input {
     if (below(8) == 0) std::sort(points.begin(), points.end());
     const Vertices expected = expected_of(points);
     for (int choice = 0; choice < 4; ++choice) {
-      const Means means = {choice % 2 == 1, choice / 2 == 1};
+      const StaticOptions options = {choice % 2 == 1, choice / 2 == 1};
       with_failures([&] {
-        const StaticHull hull = static_hull(points.data(), count, means);
+        const StaticHull hull = static_hull(points.data(), count, options);
         const Vertices vertices(hull.vertices().begin(), hull.vertices().end());
         require(hull.finite() && same(vertices, expected), "a static hull is wrong");
       });
@@ -97,8 +97,8 @@ class Input {
     static const double NOT_FINITE[] = {NAN, INFINITY, -INFINITY};
     (below(2) == 0 ? points[below(count)].x : points[below(count)].y) = NOT_FINITE[below(3)];
     for (int choice = 0; choice < 4; ++choice) {
-      const Means means = {choice % 2 == 1, choice / 2 == 1};
-      require(!static_hull(points.data(), count, means).finite(), "a coordinate that is not finite was not found");
+      const StaticOptions options = {choice % 2 == 1, choice / 2 == 1};
+      require(!static_hull(points.data(), count, options).finite(), "a coordinate that is not finite was not found");
     }
   }
 

@@ -41,7 +41,7 @@ def test_the_build_forbids_fusing(compiler, tmp_path):
     flags = options.group(1).split()
     source = tmp_path / "filter.cpp"
     source.write_text(
-        f'#include "{ROOT}/dynhull/kernel/predicates.hpp"\n'
+        f'#include "{ROOT}/dynhull/kernel/predicates/signs.hpp"\n'
         "int filter(dynhull::Point a, dynhull::Point b, dynhull::Point c) { return orientation_filter(a, b, c); }"
     )
     able = ["-mfma"] if platform.machine() in ("x86_64", "AMD64") else []

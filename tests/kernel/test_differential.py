@@ -1,7 +1,6 @@
 """The kernel and the reference live the same lives and answer the same, to the last bit."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 import oracle
@@ -11,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from inputs import cloud, point, points
 
-from dynhull import DynamicHull, _kernel, predicates, tree
+from dynhull import DynamicHull, _kernel
+from dynhull import _tree as tree
 
 
 def rows(pairs, columns=2):
@@ -218,17 +218,3 @@ def test_orientation(a, b, c):
 def test_direction_sign(d, a, b):
     difference = oracle.dot(d, b) - oracle.dot(d, a)
     assert _kernel.direction_sign(d, a, b) == (difference > 0) - (difference < 0)
-
-
-@given(st.lists(point, min_size=5, max_size=5))
-def test_crossing(five):
-    a, b, z, c, d = sorted((x + 0.0, y + 0.0) for x, y in five)
-    # What the search asks: both edges have a width, and the line through z comes between them.
-    if a[0] < b[0] < z[0] <= c[0] < d[0]:
-        assert _kernel.crossing(a, b, c, d, z) == predicates.crossing(a, b, c, d, z)
-        slope_ab, slope_cd = (
-            (Fraction(q[1]) - Fraction(p[1])) / (Fraction(q[0]) - Fraction(p[0])) for p, q in ((a, b), (c, d))
-        )
-        x = Fraction(z[0])
-        gap = Fraction(a[1]) + slope_ab * (x - Fraction(a[0])) - Fraction(c[1]) - slope_cd * (x - Fraction(c[0]))
-        assert _kernel.crossing(a, b, c, d, z) == (gap > 0) - (gap < 0)

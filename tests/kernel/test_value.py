@@ -47,7 +47,7 @@ def test_pickles_pass_between_implementations(hull, tmp_path):
         "path = pathlib.Path(sys.argv[1])\n"
         "hull = pickle.loads(path.read_bytes())\n"
         "assert dynhull.KERNEL == 'python'\n"
-        "assert type(hull._tree).__module__ == 'dynhull.tree'\n"
+        "assert type(hull._tree).__module__ == 'dynhull._tree'\n"
         "hull.insert(7, 7)\n"
         "path.write_bytes(pickle.dumps(hull))\n"
     )

@@ -3,10 +3,7 @@
 import json
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
-Points = npt.NDArray[np.float64]
+from dynhull_client import Points as Points
 
 
 @dataclass(frozen=True, slots=True)

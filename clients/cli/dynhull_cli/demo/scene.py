@@ -4,10 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
-Points = npt.NDArray[np.float64]
+from dynhull.arrays import Points as Points
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,11 @@ from itertools import islice
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
+
+from dynhull.arrays import Points as Points
 
 CHUNK_ROWS = 8192
 
-Points = npt.NDArray[np.float64]
 Position = tuple[float, float]
 Row = TypeVar("Row")
 

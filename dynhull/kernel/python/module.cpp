@@ -1,0 +1,163 @@
+// dynhull._kernel: HullTree, the predicates and the static hulls for Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "../static/chan.hpp"
+#include "../static/static_hull.hpp"
+#include "hull.hpp"
+
+using namespace nanobind::literals;
+
+namespace dynhull {
+namespace {
+
+SignArray orientations(const Rows& a, const Rows& b, const Rows& c) {
+  const std::size_t count = a.shape(0);
+  if (b.shape(0) != count || c.shape(0) != count) throw nb::value_error("a, b and c must have the same length");
+  const Output<std::int8_t> output(count);
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < count; ++i)
+      output.data()[i] = static_cast<std::int8_t>(orientation(points_of(a)[i], points_of(b)[i], points_of(c)[i]));
+  }
+  return output.array();
+}
+
+std::optional<PointArray> convex_hull(const Rows& xy, std::optional<bool> discard, std::optional<bool> threads) {
+  std::optional<StaticHull> hull;
+  {
+    nb::gil_scoped_release release;
+    hull.emplace(static_hull(points_of(xy), xy.shape(0), {discard, threads}));
+  }
+  if (!hull->finite()) return std::nullopt;
+  const std::span<const Point> vertices = hull->vertices();
+  const std::size_t count = vertices.size();
+  if (2 * count <= hull->room()) return array_of({vertices.begin(), vertices.end()});
+  Point* const memory = hull->take_memory().release();  // from here on the capsule owns it
+  const nb::capsule owner(memory, [](void* points) noexcept { delete[] static_cast<Point*>(points); });
+  return PointArray(reinterpret_cast<double*>(memory), {count, 2}, owner);
+}
+
+using ChanRound = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, bool>;
+
+std::pair<PointArray, std::vector<ChanRound>> chan(const Rows& xy) {
+  const Chan hull = [&] {
+    nb::gil_scoped_release release;
+    return Chan(points_of(xy), xy.shape(0));
+  }();
+  std::vector<ChanRound> rounds;
+  for (const Chan::Round& round : hull.rounds)
+    rounds.emplace_back(round.guess, round.groups, round.steps, round.closed);
+  return {array_of(hull.vertices), std::move(rounds)};
+}
+
+void translate_broken_invariant(const std::exception_ptr& error, void*) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::logic_error& broken) {
+    PyErr_SetString(PyExc_AssertionError, broken.what());
+  }
+}
+
+void add_hull_tree(nb::module_& module) {
+  nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull's tree in Python.")
+      .def(
+          "__init__", [](Hull* hull, nb::object xy) { new (hull) Hull(xy.is_none() ? HullTree() : tree_of(xy)); },
+          "xy"_a = nb::none())
+      .def("__len__", &Hull::size)
+      .def_prop_ro("distinct", &Hull::distinct, "The number of different points.")
+      .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "The number of updates that changed the hull.")
+      .def("count", &Hull::count, nb::sig("def count(self, x: float, y: float) -> int"), "x"_a.none(), "y"_a.none(),
+           "The number of copies of the point. O(log n).")
+      .def("count_many", &Hull::count_many, "xy"_a, "The number of copies of each point. O(log n) a row.")
+      .def("insert", &Hull::insert, nb::sig("def insert(self, x: float, y: float) -> bool"), "x"_a.none(), "y"_a.none(),
+           "Add a point. True if the hull changed. O(log² n).")
+      .def("delete", &Hull::remove, nb::sig("def delete(self, x: float, y: float) -> bool"), "x"_a.none(), "y"_a.none(),
+           "Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).")
+      .def("clear", &Hull::clear, "Remove every point.")
+      .def("apply", &Hull::apply_all, "op"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+           "Insert all rows (+1) or delete all rows (-1).")
+      .def("apply", &Hull::apply_each, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+           "Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that "
+           "deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and "
+           "conquer (True) or one change after the other (False); by default the batch decides.")
+      .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
+      .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
+      .def("chain", &Hull::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
+      .def("locate", &Hull::locate, "xy"_a, "For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row.")
+      .def("support", &Hull::support, "directions"_a,
+           "The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row.")
+      .def("tangents", &Hull::tangents, "xy"_a,
+           "The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row.")
+      .def("distance", &Hull::distance, "xy"_a,
+           "The distance of each row to the hull, rounded once; infinite without points. O(log n) a row.")
+      .def("intersect_lines", &Hull::intersect_lines, "p"_a, "q"_a,
+           "Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. "
+           "O(log n) a row.")
+      .def("copy", &Hull::copy, "An independent tree of the same points. O(n).")
+      .def("check", &Hull::check, "Raise AssertionError if an invariant is broken. O(n log n).")
+      .def_prop_ro("memory", &Hull::memory, "The bytes that the tree uses, and the bytes that it reserves.");
+}
+
+void add_predicates(nb::module_& module) {
+  module.def(
+      "orientation",
+      [](nb::handle a, nb::handle b, nb::handle c) { return orientation(point_of(a), point_of(b), point_of(c)); },
+      nb::sig("def orientation(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> int"), "a"_a,
+      "b"_a, "c"_a, "+1 if the three points turn left, -1 if they turn right, 0 if they are collinear.");
+  module.def(
+      "direction_sign",
+      [](nb::handle d, nb::handle a, nb::handle b) { return direction_sign(point_of(d), point_of(a), point_of(b)); },
+      nb::sig("def direction_sign(d: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> int"),
+      "d"_a, "a"_a, "b"_a, "+1 if b is farther than a in direction d, -1 if it is less far, 0 if neither.");
+  module.def(
+      "crossing",
+      [](nb::handle a, nb::handle b, nb::handle c, nb::handle d, nb::handle z) {
+        return crossing(point_of(a), point_of(b), point_of(c), point_of(d), point_of(z));
+      },
+      nb::sig("def crossing(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], "
+              "d: tuple[float, float], z: tuple[float, float]) -> int"),
+      "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
+  module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` of each row of three arrays.");
+  module.def("plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
+             "a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.");
+}
+
+void add_arrays_and_static_hulls(nb::module_& module) {
+  module.def("plain_points", &plain_points, "xy"_a,
+             "A copy of an (n, 2) array of finite doubles without negative zeros; None for any other argument.");
+  module.def("packed_points", &packed_points, "packed"_a,
+             "The points whose coordinates are these doubles, without negative zeros; None if one is not finite.");
+  module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),
+             "The static hull's vertices, counter-clockwise from the least; None if a coordinate is not finite. "
+             "`discard` drops points inside a sample's hull first, `threads` uses two threads; by default the input "
+             "decides. O(n log n).");
+  module.def("chan", &chan, "xy"_a,
+             "The same by Chan's algorithm, with its rounds (guess, groups, steps, closed). O(n log h).");
+}
+
+void add_fork_hooks(nb::module_& module) {
+  module.def("_before_fork", &ReadWriteLock::before_fork);
+  module.def("_after_fork_in_parent", &ReadWriteLock::after_fork_in_parent);
+  module.def("_after_fork_in_child", &ReadWriteLock::after_fork_in_child);
+  const nb::module_ os = nb::module_::import_("os");
+  if (nb::hasattr(os, "register_at_fork"))
+    os.attr("register_at_fork")("before"_a = module.attr("_before_fork"),
+                                "after_in_parent"_a = module.attr("_after_fork_in_parent"),
+                                "after_in_child"_a = module.attr("_after_fork_in_child"));
+}
+
+}  // namespace
+}  // namespace dynhull
+
+NB_MODULE(_kernel, module) {
+  module.doc() = "The hull tree in C++, with the same results as the one in Python.";
+  nanobind::register_exception_translator(dynhull::translate_broken_invariant);
+  dynhull::add_hull_tree(module);
+  dynhull::add_predicates(module);
+  dynhull::add_arrays_and_static_hulls(module);
+  dynhull::add_fork_hooks(module);
+}

@@ -1,0 +1,141 @@
+// A read-write lock for Python threads: many readers or one writer of a hull.
+//
+// The GIL guards the lock's counters. A single update holds the GIL throughout and only waits for the lock; a batch
+// takes the lock, then releases the GIL. Waiting threads release the GIL too. A batch of few rows keeps it, because
+// taking it back from a busy thread would take longer than the work.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <condition_variable>
+#include <limits>
+#include <mutex>
+#include <optional>
+
+namespace dynhull {
+
+constexpr std::size_t FEW_ROWS = 64, ALL_ROWS = std::numeric_limits<std::size_t>::max();
+
+class ReadWriteLock {
+ public:
+  // Wait until there is no writer, or until there is neither reader nor writer.
+  void await_readable() {
+    if (writing_) wait([this] { return !writing_; });
+  }
+  void await_writable() {
+    if (writing_ || readers_ > 0) await_as_writer([this] { return !writing_ && readers_ == 0; });
+  }
+
+  // Before a fork, waits until no batch runs in any hull and lets none start, so that the child's hulls are whole.
+  static void before_fork() {
+    ++forking_;
+    wait([] { return running_ == 0; });
+  }
+  static void after_fork_in_parent() {
+    --forking_;
+    wake();
+  }
+  static void after_fork_in_child() {
+    signal_ = new Signal;  // a thread of the parent may hold the old mutex
+    waiting_ = 0;
+    ++this_process_;
+    forking_ = 0;
+  }
+
+ private:
+  friend class ReadLock;
+  friend class WriteLock;
+
+  struct Signal {
+    std::mutex mutex;
+    std::condition_variable changed;
+  };
+
+  // New readers wait for a waiting writer, unless that writer waits in the process from which this one was forked.
+  template <class Holds>
+  void await_as_writer(Holds holds) {
+    if (!writer_waits()) writers_waiting_ = 0;
+    process_ = this_process_;
+    ++writers_waiting_;
+    wait(holds);
+    --writers_waiting_;
+    wake();  // readers that waited for this writer
+  }
+  bool writer_waits() const { return writers_waiting_ > 0 && process_ == this_process_; }
+
+  // Takes the mutex before releasing the GIL, so that no signal is missed, and never holds it while taking the GIL.
+  template <class Holds>
+  static void wait(Holds holds) {
+    while (!holds()) {
+      ++waiting_;
+      {
+        std::unique_lock lock(signal_->mutex);
+        nanobind::gil_scoped_release release;
+        signal_->changed.wait(lock);
+        lock.unlock();
+      }
+      --waiting_;
+    }
+  }
+
+  static void wake() {
+    if (waiting_ == 0) return;
+    const std::lock_guard lock(signal_->mutex);
+    signal_->changed.notify_all();
+  }
+
+  bool writing_ = false;
+  int readers_ = 0, writers_waiting_ = 0;
+  int process_ = 0;
+
+  static inline Signal* signal_ = new Signal;
+  static inline int waiting_ = 0, running_ = 0;
+  static inline int forking_ = 0;
+  static inline int this_process_ = 0;  // incremented in each forked child
+};
+
+// Held by a batch that reads, without the GIL if it has many rows.
+class ReadLock {
+ public:
+  explicit ReadLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
+    ReadWriteLock::wait([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && !lock.writer_waits(); });
+    ++lock.readers_;
+    ++ReadWriteLock::running_;
+    if (rows > FEW_ROWS) release_.emplace();
+  }
+  ~ReadLock() {
+    release_.reset();
+    --lock_.readers_;
+    --ReadWriteLock::running_;
+    ReadWriteLock::wake();
+  }
+  ReadLock(const ReadLock&) = delete;
+
+ private:
+  ReadWriteLock& lock_;
+  std::optional<nanobind::gil_scoped_release> release_;
+};
+
+// Held by a batch that writes, without the GIL if it has many rows.
+class WriteLock {
+ public:
+  explicit WriteLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
+    lock.await_as_writer([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && lock.readers_ == 0; });
+    lock.writing_ = true;
+    ++ReadWriteLock::running_;
+    if (rows > FEW_ROWS) release_.emplace();
+  }
+  ~WriteLock() {
+    release_.reset();
+    lock_.writing_ = false;
+    --ReadWriteLock::running_;
+    ReadWriteLock::wake();
+  }
+  WriteLock(const WriteLock&) = delete;
+
+ private:
+  ReadWriteLock& lock_;
+  std::optional<nanobind::gil_scoped_release> release_;
+};
+
+}  // namespace dynhull

@@ -1,0 +1,183 @@
+// The hull of a fixed set of points: discard, sort, chain.
+//
+// Boxes inside the hull of a sample discard most points (in the manner of Akl and Toussaint 1978). The others go into
+// columns of x, separately above and below the line through the extreme points; each column is sorted and chained
+// (Andrew 1979) with exact orientations. Two threads share each pass over the points, and then build one chain each.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "../sort/by_point.hpp"
+#include "../threads.hpp"
+#include "inner_boxes.hpp"
+
+namespace dynhull {
+
+// The hull of points in two parts. Stays within its memory even if another thread changes the points meanwhile.
+class StaticHull {
+ public:
+  using Part = std::span<const Point>;
+
+  StaticHull(Part first, Part second, bool threads) : threads_(threads), parts_{first, second} {
+    find_ends();
+    if (!finite_ || size() == 0) return;
+    place();
+    Point *lower_end, *upper_end;
+    both(
+        threads_, [&] { lower_end = chain(0, least_, greatest_); },
+        [&] { upper_end = chain(width_, greatest_, least_); });
+    // Both chains include both ends.
+    if (lower_end > memory_.get() + 1) lower_end = std::copy(memory_.get() + starts_[width_], upper_end - 1, lower_end);
+    vertices_ = {memory_.get(), lower_end};
+  }
+
+  bool finite() const { return finite_; }  // if false, there is no hull
+
+  // Counter-clockwise from the least. They are at the start of memory with room for room() points.
+  std::span<const Point> vertices() const { return vertices_; }
+  std::size_t room() const { return room_; }
+  std::unique_ptr<Point[]> take_memory() { return std::move(memory_); }
+
+ private:
+  std::size_t size() const { return parts_[0].size() + parts_[1].size(); }
+
+  void find_ends() {
+    Point least[2] = {}, greatest[2] = {};
+    bool finite[2] = {true, true};
+    const auto find = [&](int part) {
+      if (parts_[part].empty()) return;
+      Point low = parts_[part].front(), high = low;
+      bool all_finite = true;
+      for (Point p : parts_[part]) {
+        all_finite &= (p.x - p.x == 0) & (p.y - p.y == 0);
+        if (p.x <= low.x && p < low) low = p;
+        if (p.x >= high.x && p > high) high = p;
+      }
+      least[part] = low;
+      greatest[part] = high;
+      finite[part] = all_finite;
+    };
+    both(threads_, [&] { find(0); }, [&] { find(1); });
+    finite_ = finite[0] && finite[1];
+    const int some = parts_[0].empty() ? 1 : 0, other = parts_[1].empty() ? 0 : 1;
+    least_ = positive_zeros(std::min(least[some], least[other]));
+    greatest_ = positive_zeros(std::max(greatest[some], greatest[other]));
+  }
+
+  // Puts the points into columns: those below the line through the ends from left to right, then those above it from
+  // right to left. Points on the line are no vertices.
+  void place() {
+    constexpr std::size_t MOST_COLUMNS = 1024, A_COLUMN = 512;
+    width_ = static_cast<unsigned>(std::min(std::bit_ceil(size() / A_COLUMN + 1), MOST_COLUMNS));
+    const Columns columns(least_.x, greatest_.x, width_);
+    const unsigned none = 2 * width_;
+    std::unique_ptr<std::uint16_t[]> keys[2];
+    std::vector<std::size_t> next[2];  // counts of each column, then the place of its next point
+    const auto count = [&](int part) {
+      next[part].assign(none + 1, 0);
+      keys[part] = std::make_unique_for_overwrite<std::uint16_t[]>(parts_[part].size());
+      std::uint16_t* key = keys[part].get();
+      for (Point p : parts_[part]) {
+        const int side = orientation(least_, greatest_, p);
+        const unsigned mirror = (none - 1) * static_cast<unsigned>(side > 0);
+        const unsigned column = side == 0 ? none : columns(p.x) ^ mirror;  // branch-free: sides are unpredictable
+        ++next[part][column];
+        *key++ = static_cast<std::uint16_t>(column);
+      }
+    };
+    both(threads_, [&] { count(0); }, [&] { count(1); });
+
+    starts_.resize(none + 1);
+    std::size_t total = 0;
+    for (unsigned column = 0; column <= none; ++column) {
+      if (column % width_ == 0) total += column == 0 ? 1 : 2;  // room for the ends, which are in both chains
+      starts_[column] = total;
+      for (auto& part : next) total += std::exchange(part[column], total);
+    }
+    room_ = starts_[none] - 1;
+    memory_ = std::make_unique_for_overwrite<Point[]>(room_);
+    const auto put = [&](int part) {
+      const std::uint16_t* key = keys[part].get();
+      for (Point p : parts_[part]) {
+        const unsigned column = *key++;
+        if (column != none) memory_[next[part][column]++] = positive_zeros(p);
+      }
+    };
+    both(threads_, [&] { put(0); }, [&] { put(1); });
+  }
+
+  // Sorts and chains the columns of one side, from its first column. The chain overwrites points already read, from the
+  // slot before them. Returns the chain's end.
+  Point* chain(unsigned first, Point from, Point to) {
+    const auto end = [&](unsigned column) { return starts_[column + 1] - (column + 1 == first + width_ ? 2 : 0); };
+    std::size_t most = 0;
+    for (unsigned column = first; column < first + width_; ++column)
+      most = std::max(most, end(column) - starts_[column]);
+    const auto scratch = std::make_unique_for_overwrite<Point[]>(most);
+    Chain chain(&memory_[starts_[first] - 1]);
+    chain.push(from);
+    for (unsigned column = first; column < first + width_; ++column) {
+      const std::span<Point> points(&memory_[starts_[column]], &memory_[end(column)]);
+      sort_by_point(points.data(), scratch.get(), points.size());
+      if (first > 0) std::reverse(points.begin(), points.end());
+      for (Point p : points) chain.push(p);
+    }
+    chain.push(to);
+    return chain.end();
+  }
+
+  static Point positive_zeros(Point p) { return {p.x + 0.0, p.y + 0.0}; }
+
+  bool threads_, finite_ = true;
+  Part parts_[2];
+  Point least_, greatest_;
+  unsigned width_ = 0;
+  std::vector<std::size_t> starts_;
+  std::size_t room_ = 0;
+  std::unique_ptr<Point[]> memory_;
+  std::span<const Point> vertices_;
+};
+
+// Whether to discard points by a sample's hull first, and whether to use two threads; by default the input decides.
+struct StaticOptions {
+  std::optional<bool> discard, threads;
+};
+
+// Boxes that discard points; none if they would discard too few to pay, unless `always`.
+inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t count, bool always) {
+  constexpr std::size_t FEW = 2048, LARGEST_SAMPLE = 4096, ONE_OF = 32;
+  if (count < FEW && !always) return {};
+  std::vector<Point> sample(std::min(LARGEST_SAMPLE, always ? count : count / ONE_OF));
+  const std::size_t stride = count / std::max<std::size_t>(sample.size(), 1);
+  for (std::size_t i = 0; i < sample.size(); ++i)
+    sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, against patterns in the input
+  const StaticHull hull(sample, {}, false);
+  if (!hull.finite()) return {};
+  if (2 * hull.vertices().size() > sample.size() && !always) return {};
+  const InnerBoxes inner_boxes(hull.vertices());
+  const std::size_t kept = inner_boxes.discard(sample, sample.data());
+  if (sample.size() - kept < sample.size() / 8 && !always) return {};
+  return inner_boxes;
+}
+
+// O(n log n), and O(n) if few points are near the hull.
+inline StaticHull static_hull(const Point* points, std::size_t count, StaticOptions options = {}) {
+  constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // at the same cost
+  const auto threads = [&](std::size_t placed) { return options.threads.value_or(two_threads_for(placed)); };
+  const std::size_t half = count / 2;
+  const StaticHull::Part first(points, half), second(points + half, count - half);
+  const bool may_discard = options.discard.value_or(true);
+  const auto inner_boxes = may_discard ? inner_boxes_of(points, count, options.discard.has_value()) : std::nullopt;
+  if (!inner_boxes) return StaticHull(first, second, threads(count));
+  const auto kept = std::make_unique_for_overwrite<Point[]>(count);
+  std::size_t kept_first, kept_second;
+  both(
+      threads(count / DISCARDED_FOR_ONE_PLACED), [&] { kept_first = inner_boxes->discard(first, kept.get()); },
+      [&] { kept_second = inner_boxes->discard(second, kept.get() + half); });
+  return StaticHull({kept.get(), kept_first}, {kept.get() + half, kept_second}, threads(kept_first + kept_second));
+}
+
+}  // namespace dynhull
