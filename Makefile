@@ -1,16 +1,25 @@
-# One word for each thing people do here. Everything runs in .venv, made on first use.
+# One word for each thing people do here. Everything runs in .venv, made on first use from uv.lock.
 PYTHON ?= python3
 BIN := .venv/bin
-KERNEL := $(wildcard dynhull/kernel/*)
+KERNEL := $(shell find dynhull/kernel -type f)
+COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command -v "$$each"; done; true))
+# With a compiler, a kernel that does not build is an error; `DYNHULL_REQUIRE_KERNEL=0 make ...` does without.
+export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
+T ?=
 
-.PHONY: demo test check docs proto contract fuzz fuzz-reference fuzz-server robustness simulate clean
+.DEFAULT_GOAL := help
+.PHONY: help demo test check format docs proto contract fuzz fuzz-reference fuzz-server robustness simulate peers lock clean
+
+help:  ## list these words
+	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
+		printf '  %-16s %s\n' "make $$word" "$$does"; done
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
 
-test: .venv/.test tests/strangers/node_modules  ## the whole test suite, on both cores
-	$(BIN)/pytest -n 2 --dist worksteal
+test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
+	$(BIN)/pytest $(or $(T),-n 2 --dist worksteal)
 
 FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
 	-DDYNHULL_FAIL_ALLOCATIONS
@@ -26,6 +35,12 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
 	$(BIN)/python tests/lives.py --operations $(OPERATIONS)
+
+format: .venv/.check  ## format the Python, C++ and proto files
+	$(BIN)/ruff check --select I --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(KERNEL) tests/kernel/*.cpp
+	$(BIN)/buf format --write
 
 check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
@@ -63,15 +78,24 @@ SEED ?= 1
 simulate: .venv/.test  ## random lives of the server in simulated time, for SECONDS from SEED, while a model checks every promise
 	PYTHONPATH=tests $(BIN)/python -m simulation run --seconds $(SECONDS) --seed $(SEED) --keep
 
-tests/strangers/node_modules: tests/strangers/package-lock.json tests/peers.sh
+.venv/.peers: tests/strangers/package-lock.json tests/peers.sh
+	mkdir -p .venv
 	tests/peers.sh
 	touch $@
 
-.venv/.%: pyproject.toml CMakeLists.txt $(KERNEL)
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[$*]'
+peers:  ## install the programs that some tests talk to: a browser, Prometheus, Node.js (as root on Debian)
+	tests/peers.sh
+
+lock: $(BIN)/uv  ## update uv.lock after a change of dependencies in pyproject.toml
+	$(BIN)/uv lock
+
+$(BIN)/uv:
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet 'uv>=0.8'
+
+.venv/.%: pyproject.toml uv.lock CMakeLists.txt $(KERNEL) | $(BIN)/uv
+	$(BIN)/uv sync --quiet --locked --inexact --extra $*
 	touch $@
 
-clean:
+clean:  ## remove everything that these words made
 	rm -rf .venv build dist tests/strangers/node_modules
