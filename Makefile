@@ -9,7 +9,7 @@ DAY ?= 2013-03-08
 T ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs proto contract fuzz fuzz-reference fuzz-server robustness simulate peers lock clean
+.PHONY: help demo test check format docs proto contract fuzz fuzz-reference fuzz-server robustness simulate peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -53,6 +53,12 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/python proto/generate.py --check
 	$(BIN)/hadolint deploy/Dockerfile
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.citation-file-format CITATION.cff
+	$(BIN)/zizmor --quiet --offline .github
 	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.compose-spec deploy/compose.yaml
 
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
@@ -85,6 +91,9 @@ simulate: .venv/.test  ## random lives of the server in simulated time, for SECO
 
 peers:  ## install the programs that some tests talk to: a browser, Prometheus, Node.js (as root on Debian)
 	tests/peers.sh
+
+hooks: .venv/.check  ## check the files of every commit before it is made (pre-commit)
+	$(BIN)/pre-commit install
 
 lock: $(BIN)/uv  ## update uv.lock after a change of dependencies in pyproject.toml
 	$(BIN)/uv lock
