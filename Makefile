@@ -7,9 +7,13 @@ COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command 
 export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
 T ?=
+# Python 3.12 and later count lines at a small cost (sys.monitoring), so that `make test` does; 3.11 takes twice as long.
+MONITORING = $(shell $(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "")')
+COVERAGE_CORE = $(or $(MONITORING),ctrace)
+COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs proto contract fuzz fuzz-reference fuzz-server robustness simulate peers hooks lock clean
+.PHONY: help demo test check format docs proto contract fuzz fuzz-reference fuzz-server robustness simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -19,7 +23,7 @@ demo: .venv/.demo  ## replay a real day of flights through a real server and ver
 	$(BIN)/dynhull demo --day $(DAY)
 
 test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
-	$(BIN)/pytest $(or $(T),-n 2 --dist worksteal)
+	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),-n 2 --dist worksteal $(COVERAGE))
 
 FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
 	-DDYNHULL_FAIL_ALLOCATIONS
@@ -35,6 +39,9 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
 	$(BIN)/python tests/lives.py --operations $(OPERATIONS)
+
+coverage: .venv/.test .venv/.peers  ## run all tests and print the share of lines that they run, server processes included
+	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report=term
 
 format: .venv/.check  ## format the Python, C++ and proto files
 	$(BIN)/ruff check --select I --fix .
@@ -80,6 +87,11 @@ robustness: .venv/.test  ## kill, starve and damage servers, leave calls, flip b
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 
 SEED ?= 1
+MUTANTS ?= 200
+
+mutants: $(BIN)/uv  ## put MUTANTS small faults into the reference geometry, one by one, and count those that the tests find
+	UV_PROJECT_ENVIRONMENT=build/mutants/.venv $(BIN)/uv sync --quiet --locked --no-install-project --only-group mutants
+	build/mutants/.venv/bin/python tests/mutants/run.py --mutants $(MUTANTS) --seed $(SEED)
 
 simulate: .venv/.test  ## random lives of the server in simulated time, for SECONDS from SEED, while a model checks every promise
 	PYTHONPATH=tests $(BIN)/python -m simulation run --seconds $(SECONDS) --seed $(SEED) --keep
