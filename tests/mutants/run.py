@@ -2,8 +2,8 @@
 
     make mutants MUTANTS=200 SEED=1
 
-Works on a copy in build/mutants. Draws mutants at random: in one line a sign, a comparison, a constant, a condition or a
-loop is changed. Prints those that the tests do not find, and the score.
+Works on a copy in build/mutants. Draws mutants at random: in one line a sign, comparison, constant, condition or loop
+is changed. Prints those that the tests do not find, and the score.
 """
 
 import argparse
@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 COPY = ROOT / "build/mutants/tree"
 COPIED = ("dynhull", "tests", "benchmarks", "pyproject.toml")
 MODULES = [
-    *(f"dynhull/{name}.py" for name in ("predicates", "exact", "nodes", "tree")),
+    *(f"dynhull/{name}.py" for name in ("predicates", "nodes", "tree")),
     *(f"dynhull/static/{name}.py" for name in ("boundary", "graham", "jarvis", "monotone_chain", "chan")),
 ]
 TESTS = ["static/test_static.py", "core/test_predicates.py", "core/test_stateful.py", "core/test_hull.py"]
