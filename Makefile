@@ -38,7 +38,7 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 	done
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
-	$(BIN)/python tests/lives.py --operations $(OPERATIONS)
+	$(BIN)/python tests/support/lives.py --operations $(OPERATIONS)
 
 coverage: .venv/.test .venv/.peers  ## run all tests and print the share of lines that they run, server processes included
 	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report=term

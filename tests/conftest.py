@@ -5,7 +5,7 @@ import pytest
 from hypothesis import settings
 from server_process import server_process
 
-collect_ignore = ["data/make_phases.py"]  # needs pymatgen, which the tests do not
+collect_ignore = ["data/make_phases.py", "mutants/run.py"]  # need packages that the tests do not
 
 # A slow moment of the machine is not a failure.
 settings.register_profile("dynhull", deadline=None, print_blob=True)

@@ -23,7 +23,7 @@ from cosmic_ray.work_item import TestOutcome, WorkItem
 
 ROOT = Path(__file__).parents[2]
 COPY = ROOT / "build/mutants/tree"
-COPIED = ("dynhull", "tests", "benchmarks", "pyproject.toml")
+COPIED = ("dynhull", "tests", "pyproject.toml")
 MODULES = [
     *(f"dynhull/{name}.py" for name in ("predicates", "nodes", "tree")),
     *(f"dynhull/static/{name}.py" for name in ("boundary", "graham", "jarvis", "monotone_chain", "chan")),
