@@ -3,7 +3,7 @@
     make mutants MUTANTS=200 SEED=1
 
 Works on a copy in build/mutants. Draws mutants at random: in one line a sign, comparison, constant, condition or loop
-is changed. Prints those that the tests do not find, and the score.
+is changed. Prints what the tests do not find as a difference, and the score.
 """
 
 import argparse
@@ -75,10 +75,12 @@ def main() -> int:
     drawn = random.Random(options.seed).sample(everything, min(options.mutants, len(everything)))
     survivors = 0
     for item in drawn:
+        [mutation] = item.mutations
         result = mutate_and_test(item.mutations, test_command(), patience)
-        if result.test_outcome == TestOutcome.SURVIVED:
-            survivors += 1
-            print(result.diff, flush=True)
+        survived = result.test_outcome == TestOutcome.SURVIVED
+        survivors += survived
+        place = f"{mutation.module_path}:{mutation.start_pos[0]} {mutation.operator_name.removeprefix('core/')}"
+        print(f"NOT FOUND {place}\n{result.diff}" if survived else f"found {place}", flush=True)
     found = len(drawn) - survivors
     print(f"{found} of {len(drawn)} mutants found ({found / len(drawn):.0%}), drawn from {len(everything)}")
     return 0
