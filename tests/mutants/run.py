@@ -36,13 +36,23 @@ OPERATORS = re.compile(
     r"|ReplaceBreakWithContinue|ReplaceContinueWithBreak|ZeroIterationForLoop|ReplaceUnaryOperator_Delete_(USub|Not)"
     rf"|ReplaceBinaryOperator_(Add_Sub|Sub_Add|Mul_Add)|ReplaceComparisonOperator_{COMPARISON}_{COMPARISON})$"
 )
-PATIENCE = 5  # times as long as the tests take without a fault: what takes longer is found
+PATIENCE = 2  # times as long as the tests take without a fault: what takes longer is found
 
 
 def test_command() -> str:
     """Stops at the first failure; the same examples for every mutant."""
     tests = [f"tests/{path}" for path in TESTS]
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--hypothesis-seed=0",
+        "--timeout=30",
+    ]
     return shlex.join(["env", "DYNHULL_KERNEL=python", "PYTHONPATH=.", *command, "-k", f"not ({SLOW})", *tests])
 
 
