@@ -1,4 +1,5 @@
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -23,3 +24,10 @@ def address() -> Iterator[str]:
 def name(request: pytest.FixtureRequest) -> str:
     """A hull name of the test's own."""
     return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line for each program that is missing: pytest's own lines are one for each test that a fixture skips."""
+    reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
+    for reason, count in Counter(each for each in reasons if each.startswith("Skipped: no ")).items():
+        terminalreporter.write_line(f"{reason}: {count} tests")

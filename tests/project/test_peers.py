@@ -14,7 +14,7 @@ NEEDY = ["tests/deploy/test_kit.py", "-k", "configuration or alerts", "-n", "0",
 NAMED = "no promtool: install Debian's package prometheus (see `make peers`)"
 
 
-@pytest.mark.parametrize(("required", "code", "counted"), [("", 0, "SKIPPED [2]"), ("1", 1, "2 failed")])
+@pytest.mark.parametrize(("required", "code", "counted"), [("", 0, f"Skipped: {NAMED}: 2 tests"), ("1", 1, "2 failed")])
 def test_without_promtool(tmp_path: Path, required: str, code: int, counted: str) -> None:
     environment = {**os.environ, "PATH": str(tmp_path), "DYNHULL_REQUIRE_PEERS": required}
     command = [sys.executable, "-m", "pytest", *NEEDY]
