@@ -26,8 +26,10 @@ def name(request: pytest.FixtureRequest) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:]
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+@pytest.hookimpl(wrapper=True, tryfirst=True)  # after pytest's own summary
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> Iterator[None]:
     """One line for each program that is missing: pytest's own lines are one for each test that a fixture skips."""
+    yield
     reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
     for reason, count in Counter(each for each in reasons if each.startswith("Skipped: no ")).items():
         terminalreporter.write_line(f"{reason}: {count} tests")
