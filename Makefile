@@ -7,7 +7,7 @@ COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command 
 export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
 T ?=
-# Python 3.12 and later count lines at a small cost (sys.monitoring), so that `make test` does; 3.11 takes twice as long.
+# `make test` counts lines where Python reports them itself (sys.monitoring, 3.12); tracing on 3.11 takes twice as long.
 MONITORING = $(shell $(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "")')
 COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
