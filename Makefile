@@ -1,16 +1,31 @@
-# One word for each thing people do here. Everything runs in .venv, made on first use.
+# One word for each thing people do here. Everything runs in .venv, made on first use from uv.lock.
 PYTHON ?= python3
 BIN := .venv/bin
-KERNEL := $(shell find dynhull/kernel -name "*.?pp")
+KERNEL := $(shell find dynhull/kernel -type f)
+COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command -v "$$each"; done; true))
+# Certificates of the system: behind a proxy that inspects TLS, pip and uv trust the same.
+export UV_SYSTEM_CERTS ?= 1
+# With a compiler, a kernel that does not build is an error; `DYNHULL_REQUIRE_KERNEL=0 make ...` does without.
+export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
+T ?=
+# `make test` counts lines where Python reports them itself (sys.monitoring, 3.12); tracing on 3.11 takes twice as long.
+MONITORING = $(shell $(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "")')
+COVERAGE_CORE = $(or $(MONITORING),ctrace)
+COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
-.PHONY: demo test check docs stub proto contract fuzz fuzz-reference fuzz-server robustness simulate clean
+.DEFAULT_GOAL := help
+.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server robustness simulate mutants coverage peers hooks lock clean
+
+help:  ## list these words
+	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
+		printf '  %-16s %s\n' "make $$word" "$$does"; done
 
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
 
-test: .venv/.test tests/strangers/node_modules  ## the whole test suite, on both cores
-	$(BIN)/pytest -n 2 --dist worksteal
+test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
+	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),-n 2 --dist worksteal $(COVERAGE))
 
 FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
 	-DDYNHULL_FAIL_ALLOCATIONS
@@ -25,7 +40,16 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 	done
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
-	$(BIN)/python tests/lives.py --operations $(OPERATIONS)
+	$(BIN)/python tests/support/lives.py --operations $(OPERATIONS)
+
+coverage: .venv/.test .venv/.peers  ## run all tests and print the share of lines that they run, server processes included
+	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report=term
+
+format: .venv/.check  ## format the Python, C++ and proto files
+	$(BIN)/ruff check --select I --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(KERNEL) tests/kernel/*.cpp
+	$(BIN)/buf format --write
 
 check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
@@ -41,6 +65,12 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/python proto/generate.py --check
 	$(BIN)/hadolint deploy/Dockerfile
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.citation-file-format CITATION.cff
+	$(BIN)/zizmor --quiet --offline .github
 	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.compose-spec deploy/compose.yaml
 
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
@@ -67,19 +97,36 @@ robustness: .venv/.test  ## kill, starve and damage servers, leave calls, flip b
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 
 SEED ?= 1
+MUTANTS ?= 200
+
+mutants: $(BIN)/uv  ## put MUTANTS small faults into the reference geometry, one by one, and count those that the tests find
+	UV_PROJECT_ENVIRONMENT=build/mutants/.venv $(BIN)/uv sync --quiet --locked --no-install-project --only-group mutants
+	build/mutants/.venv/bin/python tests/mutants/run.py --mutants $(MUTANTS) --seed $(SEED)
 
 simulate: .venv/.test  ## random lives of the server in simulated time, for SECONDS from SEED, while a model checks every promise
 	PYTHONPATH=tests $(BIN)/python -m simulation run --seconds $(SECONDS) --seed $(SEED) --keep
 
-tests/strangers/node_modules: tests/strangers/package-lock.json tests/peers.sh
+.venv/.peers: tests/strangers/package-lock.json tests/peers.sh
+	mkdir -p .venv
 	tests/peers.sh
 	touch $@
 
-.venv/.%: pyproject.toml CMakeLists.txt $(KERNEL)
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[$*]'
+peers:  ## install the programs that some tests talk to: a browser, Prometheus, Node.js (as root on Debian)
+	tests/peers.sh
+
+hooks: .venv/.check  ## check the files of every commit before it is made (pre-commit)
+	$(BIN)/pre-commit install
+
+lock: $(BIN)/uv  ## update uv.lock after a change of dependencies in pyproject.toml
+	$(BIN)/uv lock
+
+$(BIN)/uv:
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet 'uv>=0.13'
+
+.venv/.%: pyproject.toml uv.lock CMakeLists.txt $(KERNEL) | $(BIN)/uv
+	$(BIN)/uv sync --quiet --locked --inexact --extra $*
 	touch $@
 
-clean:
+clean:  ## remove everything that these words made
 	rm -rf .venv build dist tests/strangers/node_modules

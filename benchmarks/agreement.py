@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 from dynhull.convex import Cloud
 from dynhull.gjk import Contact, contact
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/support"))
 from judges import fcl_body, fcl_distance
 
 BODIES = 1000

@@ -8,14 +8,17 @@ same code. The estimate is that of the trace, n log2(guess).
 """
 
 import argparse
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import log2
-
-from static_steps import counted, points_with_vertices
+from pathlib import Path
 
 from dynhull import static
 from dynhull.static.trace import Round, Rounds
+
+sys.path.append(str(Path(__file__).parents[1] / "tests/support"))
+from static_work import counted, points_with_vertices
 
 chan_module = static.chan.__globals__
 

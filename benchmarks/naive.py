@@ -20,7 +20,7 @@ import numpy as np
 
 import dynhull
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/support"))
 from killers import PUBLISHED
 
 Point = tuple[float, float]

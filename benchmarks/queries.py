@@ -29,7 +29,7 @@ from dynhull.envelope import Frontier, PhaseDiagram, energy_above_hull_nd
 from dynhull.gjk import contact, distance_many, intersect_many
 from dynhull.margin import max_margin
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/support"))
 from judges import fcl_body
 
 RANDOM = np.random.default_rng(8)

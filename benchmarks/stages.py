@@ -17,14 +17,14 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from steps import circle, increasing, replaced, tuples, uniform
 
 from dynhull import _predicates as predicates
 from dynhull._predicates import EPSILON, ORIENT_BOUND, UNDERFLOW, Point
 from dynhull._tree import HullTree
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/support"))
 from killers import KILLERS
+from update_steps import circle, increasing, replaced, tuples, uniform
 
 # Shewchuk's names for the bounds are ccwerrboundB, ccwerrboundC and resulterrbound.
 BOUND_B = (2.0 + 12.0 * EPSILON) * EPSILON
@@ -176,7 +176,7 @@ def decimals(updates: int) -> Iterator[Update]:
 
 
 def killers(updates: int) -> Iterator[Update]:
-    """The inputs of tests/killers.py, one after the other."""
+    """The inputs of tests/support/killers.py, one after the other."""
     yield [], []
     for points in KILLERS.values():
         inputs = [(x + 0.0, y + 0.0) for x, y in points]

@@ -1,11 +1,12 @@
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
 from server_process import server_process
 
-collect_ignore = ["data/make_phases.py"]  # needs pymatgen, which the tests do not
+collect_ignore = ["data/make_phases.py", "mutants/run.py"]  # need packages that the tests do not
 
 # A slow moment of the machine is not a failure.
 settings.register_profile("dynhull", deadline=None, print_blob=True)
@@ -23,3 +24,12 @@ def address() -> Iterator[str]:
 def name(request: pytest.FixtureRequest) -> str:
     """A hull name of the test's own."""
     return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:]
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)  # after pytest's own summary
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> Iterator[None]:
+    """One line for each program that is missing: pytest's own lines are one for each test that a fixture skips."""
+    yield
+    reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
+    for reason, count in Counter(each for each in reasons if each.startswith("Skipped: no ")).items():
+        terminalreporter.write_line(f"{reason}: {count} tests")

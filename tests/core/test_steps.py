@@ -4,7 +4,7 @@ import math
 
 import pytest
 from hulls import TinyLeafTree
-from steps import WORKLOADS, count_steps
+from update_steps import WORKLOADS, count_steps
 
 
 @pytest.mark.parametrize("name", WORKLOADS)

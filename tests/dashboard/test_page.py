@@ -1,6 +1,5 @@
 """The dashboard in a real browser, on a real server."""
 
-import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +9,7 @@ import pytest
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import wait_until
+from peers import program
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 from server_process import COMMAND, Server, server_process
 
@@ -22,8 +22,7 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "i
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A real Chromium."""
-    chromium = shutil.which("chromium")
-    assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
+    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         yield browser

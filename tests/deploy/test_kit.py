@@ -2,12 +2,12 @@
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 from metrics import fetch, measured
+from peers import program
 from server_process import COMMAND, PATIENCE
 
 from dynhull_client import HullClient
@@ -18,9 +18,9 @@ NAME = re.compile(r"\b(?:dynhull|process)_[a-z_]+")
 
 def accepted(*command: str | Path) -> str:
     """What a program of Debian's says, which must be content."""
-    program = shutil.which(command[0])
-    assert program, f"{command[0]} is not installed; tests/peers.sh installs it"
-    ended = subprocess.run([program, *command[1:]], capture_output=True, text=True, timeout=PATIENCE, check=False)
+    ended = subprocess.run(
+        [program(command[0]), *command[1:]], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
     assert ended.returncode == 0, ended.stdout + ended.stderr
     return ended.stdout
 

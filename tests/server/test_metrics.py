@@ -2,12 +2,12 @@
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 from metrics import fetch, measured, scrape
+from peers import program
 from server_process import PATIENCE, run
 
 from dynhull_client import HullClient, PointMissingError
@@ -18,12 +18,6 @@ scrape_configs:
   - job_name: dynhull
     static_configs: [{{targets: ["{target}"]}}]
 """
-
-
-def program(name: str) -> str:
-    path = shutil.which(name)
-    assert path, f"{name} is not installed; tests/peers.sh installs it (Debian's package prometheus)"
-    return path
 
 
 def work(client: HullClient) -> None:

@@ -1,20 +1,15 @@
 """A client nobody here wrote talks to the server: @grpc/grpc-js, from the .proto files alone."""
 
 import json
-import shutil
 import subprocess
-from pathlib import Path
 
+from peers import program, stranger
 from server_process import PATIENCE
-
-STRANGER = Path(__file__).parents[1] / "strangers"
 
 
 def test_a_client_in_another_language(address: str, name: str) -> None:
-    assert shutil.which("node"), "node is not installed; tests/peers.sh installs it (Debian's package nodejs)"
-    assert (STRANGER / "node_modules").is_dir(), "run tests/peers.sh, which installs the npm packages"
-    command = ["node", "client.js", address, name]
-    done = subprocess.run(command, cwd=STRANGER, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    command = [program("node"), "client.js", address, name]
+    done = subprocess.run(command, cwd=stranger(), capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 0, done.stderr
     saw = json.loads(done.stdout)
     assert (saw["created"]["name"], saw["created"]["revision"]) == (name, 0)

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from static_steps import count, points_with_vertices
+from static_work import count, points_with_vertices
 
 from dynhull import convex_hull
 

@@ -1,6 +1,6 @@
 """Random lives of the reference in Python, every operation checked against a model in whole numbers.
 
-    python tests/lives.py [--operations N] [--jobs J] [seed ...]
+    python tests/support/lives.py [--operations N] [--jobs J] [seed ...]
 
 Without seeds, new ones until N operations are checked. A life that fails says its seed: give it to live it again.
 """

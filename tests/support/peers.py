@@ -1,0 +1,42 @@
+"""Programs and packages that tests need and pip does not install.
+
+Where one is missing, its tests are skipped, and the summary counts them. With DYNHULL_REQUIRE_PEERS=1, which `.ci/run`
+sets, they fail.
+"""
+
+import os
+import shutil
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+
+STRANGER = Path(__file__).parents[1] / "strangers"
+INSTALLED_BY = {
+    "chromium": "Debian's package chromium",
+    "node": "Debian's package nodejs",
+    "prometheus": "Debian's package prometheus",
+    "promtool": "Debian's package prometheus",
+    "systemd-analyze": "Debian's package systemd",
+    "c++": "a C++20 compiler",
+}
+
+
+def missing(what: str, remedy: str) -> NoReturn:
+    """Skip the test; fail it where every peer is required."""
+    if os.environ.get("DYNHULL_REQUIRE_PEERS") == "1":
+        pytest.fail(f"no {what}: {remedy}", pytrace=False)
+    pytest.skip(f"no {what}: {remedy}")
+
+
+def program(name: str, *others: str) -> str:
+    """The path of a program, or of another one that does as well."""
+    found = next(filter(None, map(shutil.which, (name, *others))), None)
+    return found or missing(name, f"install {INSTALLED_BY.get(name, name)} (see `make peers`)")
+
+
+def stranger() -> Path:
+    """The folder of the JavaScript client, with its npm packages."""
+    if not (STRANGER / "node_modules" / "@grpc").is_dir():
+        missing("npm packages", "run `make peers`")
+    return STRANGER
