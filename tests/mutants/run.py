@@ -25,8 +25,8 @@ ROOT = Path(__file__).parents[2]
 COPY = ROOT / "build/mutants/tree"
 COPIED = ("dynhull", "tests", "pyproject.toml")
 MODULES = [
-    *(f"dynhull/{name}.py" for name in ("predicates", "nodes", "tree")),
-    *(f"dynhull/static/{name}.py" for name in ("boundary", "graham", "jarvis", "monotone_chain", "chan")),
+    *(f"dynhull/_{name}.py" for name in ("predicates", "nodes", "tree")),
+    *(f"dynhull/static/_{name}.py" for name in ("boundary", "graham", "jarvis", "monotone_chain", "chan")),
 ]
 TESTS = ["static/test_static.py", "core/test_predicates.py", "core/test_stateful.py", "core/test_hull.py"]
 SLOW = "100000 or splits_and_merges or perturbation"
