@@ -1,6 +1,7 @@
 """DynamicHull: the public class over a hull tree. Checks arguments and returns numpy arrays."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
@@ -14,6 +15,8 @@ from ._tree import HullTree
 from .arrays import Points, as_coordinate, as_directions, as_operations, as_pairs, as_points
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from . import _kernel
 
 T = TypeVar("T")
@@ -66,7 +69,7 @@ class DynamicHull:
     __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
     dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
-    _tree_type: ClassVar["type[HullTree | _kernel.HullTree]"] = HullTree if kernel is None else kernel.HullTree
+    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
         self._tree = self._tree_type(points)

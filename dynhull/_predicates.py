@@ -5,13 +5,18 @@ with slack for underflow). If the bound does not decide the sign, integers do: a
 two, and scaling every x by one power of two and every y by another changes no sign.
 """
 
-from collections.abc import Callable, Iterable
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from ._implementation import kernel
 from .arrays import Points, finite_pairs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
 
 Point = tuple[float, float]
 Floats = npt.NDArray[np.float64]

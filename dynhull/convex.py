@@ -10,13 +10,14 @@ shapes makes new shapes that query the old ones, so a live hull inside one stays
 [[13.0, 0.0]]
 """
 
-from collections.abc import Sequence
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cmp_to_key
 from itertools import product
 from math import cos, isfinite, sin
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,9 @@ from ._exact import Integers, as_integers, root
 from ._predicates import EPSILON, Point, cross_sign
 from .arrays import Points, as_array, as_directions, as_points, as_rows, as_tuples, as_vector
 from .static import convex_hull
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Way = tuple[Point, Point, int]
 

@@ -1,12 +1,17 @@
 """Concave polygons as unions of convex ones."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from ._predicates import Point, dot_sign, orient2d, orientation
 from .arrays import Points, as_points, as_tuples
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Ring = list[int]
 

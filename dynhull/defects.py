@@ -1,5 +1,7 @@
 """Convexity defects: the parts of a contour inside its hull, and their depth."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The widest gap between two sets of points, which a hard-margin support vector machine finds."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """An efficient frontier under inserts and deletes of (risk, return) points."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise

@@ -1,18 +1,23 @@
 """A binary phase diagram under inserts and deletes of entries, which are a composition and an energy."""
 
+from __future__ import annotations
+
 from bisect import bisect_left
 from dataclasses import dataclass
 from fractions import Fraction
 from math import nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from .._exact import rounded
 from .._hull import DynamicHull
-from .._predicates import Point
 from .._value import Value
 from ..arrays import Points, as_array, as_points, as_tuples
+
+if TYPE_CHECKING:
+    from .._predicates import Point
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,5 +1,7 @@
 """Energies above the hull in systems of three and more elements, computed once with Qhull."""
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

@@ -1,5 +1,7 @@
 """GJK on many pairs of small polygons at once: each step advances all pairs that have not finished."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

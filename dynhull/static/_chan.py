@@ -1,8 +1,10 @@
 """Chan's algorithm: hulls of small groups, wrapped as one."""
 
+from __future__ import annotations
+
 from bisect import bisect_left
-from collections.abc import Sequence
 from math import log2
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,9 @@ from ._boundary import check_collinear, with_boundary_points
 from ._jarvis import rightmost
 from ._monotone_chain import half_chain
 from .trace import Collinear, Groups, Round, Rounds, Trace, Wrap
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Chains = tuple[list[Point], list[Point]]  # lower and upper, left to right
 

@@ -1,10 +1,15 @@
 """The fastest hull of a fixed set of points."""
 
-import numpy.typing as npt
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from .._implementation import kernel
 from ..arrays import Points, as_pairs, as_points
 from ._monotone_chain import monotone_chain
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 
 def convex_hull(xy: npt.ArrayLike) -> Points:

@@ -1,7 +1,9 @@
 """The Graham scan: sort by angle around one vertex, then one pass."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
 from functools import cmp_to_key
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +12,9 @@ from .._predicates import Point, orientation
 from ..arrays import Points, as_points
 from ._boundary import check_collinear, farther_first_on_last_ray
 from .trace import Collinear, Pop, Push, Scan, Trace, Turn
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 def graham_scan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None = None) -> Points:

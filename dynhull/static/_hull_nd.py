@@ -3,6 +3,8 @@
 The only part of the library that needs scipy, and the only one whose vertices are not exact; `hull_nd` gives the bound.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any

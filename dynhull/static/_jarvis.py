@@ -1,6 +1,8 @@
 """The Jarvis march, or gift wrapping: from each vertex to the next, comparing all points."""
 
-from collections.abc import Iterable
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +11,9 @@ from .._predicates import Point, orientation
 from ..arrays import Points, as_points
 from ._boundary import check_collinear, with_boundary_points
 from .trace import Collinear, Push, Scan, Trace, Turn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 def jarvis_march(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None = None) -> Points:

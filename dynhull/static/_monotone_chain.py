@@ -1,6 +1,8 @@
 """The monotone chain algorithm: sort, then one pass a side."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +11,9 @@ from .._predicates import Point, orientation
 from ..arrays import Points, as_points
 from ._boundary import check_collinear
 from .trace import Collinear, Pop, Push, Scan, Trace, Turn
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None = None) -> Points:
