@@ -23,4 +23,4 @@ def __getattr__(name: str) -> str:
 
 for _public in (DynamicHull, MissingPointError):
     _public.__module__ = "dynhull"
-_modules["dynhull._hull"] = _hull  # where pickles of version 0.1 look for the classes
+_modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes
