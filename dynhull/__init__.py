@@ -11,6 +11,7 @@ from .static import convex_hull
 __all__ = ["KERNEL", "DynamicHull", "MissingPointError", "__version__", "convex_hull", "orient2d", "static"]
 
 __version__: str
+"""The version of the installed distribution."""
 
 
 def __getattr__(name: str) -> str:

@@ -16,6 +16,7 @@ from ._sources import coordinates_of
 __all__ = ["Checked", "Points", "as_coordinate", "as_points", "packed_points", "plain_points"]
 
 Points = npt.NDArray[np.float64]
+"""Type of an (n, 2) array of finite doubles, a point in each row."""
 
 LARGEST_EXACT_INTEGER = 2**53
 MOST_AXES = 64  # of an array: no list is nested deeper

@@ -229,7 +229,7 @@ def test_extreme_coordinates():
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda: intersect([], point([0, 0])), "no pieces is empty"),
+        (lambda: intersect([], point([0, 0])), "at least one piece"),
         (lambda: intersect(point([0, 0, 0]), point([0, 0])), "dimension 2 or 3, got 3 and 2"),
         (lambda: contact(Cloud([[0, 0, 0, 0]]), Cloud([[0, 0, 0, 0]])), "dimension 2 or 3, got 4 and 4"),
         (lambda: contact(DynamicHull(), point([0, 0])), "empty hull"),

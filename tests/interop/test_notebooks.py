@@ -16,11 +16,13 @@ RICHEST_FIRST = ("text/html", "image/svg+xml", "text/plain")
 
 
 def results(notebook: nbformat.NotebookNode) -> Iterator[str]:
-    """What a reader sees below each cell."""
+    """What a reader sees below each cell: what is printed, as one text however it was sent, then the value."""
     for cell in notebook.cells:
-        for output in cell.get("outputs", []):
-            data = output.get("data", {"text/plain": output.get("text")})
-            yield next(data[kind] for kind in RICHEST_FIRST if kind in data)
+        outputs = cell.get("outputs", [])
+        yield "".join(output.text for output in outputs if output.output_type == "stream")
+        for output in outputs:
+            if output.output_type != "stream":
+                yield next(output.data[kind] for kind in RICHEST_FIRST if kind in output.data)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -118,6 +118,7 @@ __all__ = [
 ]
 
 __version__: str
+"""The version of the installed distribution."""
 
 # Tracebacks and help show where to import a name from, not the private module that defines it.
 for _exported in [each for each in globals().values() if isinstance(each, type)]:

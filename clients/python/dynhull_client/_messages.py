@@ -236,6 +236,7 @@ class Deleted:
 
 
 Event = Snapshot | Change | Sketch | Progress | Deleted
+"""Type of the events of a watch."""
 
 
 @dataclass(frozen=True, slots=True)
