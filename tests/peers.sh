@@ -23,6 +23,6 @@ if [ ${#packages[@]} -gt 0 ]; then
     fi
 fi
 if command -v npm >/dev/null; then
-    npm ci --prefix strangers --no-audit --no-fund --ignore-scripts --loglevel=error \
+    npm ci --prefix javascript --no-audit --no-fund --ignore-scripts --loglevel=error \
         || skipped "could not install the npm packages"
 fi

@@ -46,7 +46,7 @@ def test_command_line(tool: str, take_program: Callable[[str, str], Path], addre
 
 
 def test_javascript(take_program: Callable[[str, str], Path], address: str) -> None:
-    modules = ROOT / "tests/strangers/node_modules"
+    modules = ROOT / "tests/javascript/node_modules"
     assert modules.is_dir(), "run tests/peers.sh, which installs the npm packages"
     program = take_program("how-to/other-languages", "fleet.js")
     printed = run("node", str(program), address, folder=ROOT, NODE_PATH=str(modules)).splitlines()

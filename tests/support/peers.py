@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import pytest
 
-STRANGER = Path(__file__).parents[1] / "strangers"
+JAVASCRIPT = Path(__file__).parents[1] / "javascript"
 INSTALLED_BY = {
     "chromium": "Debian's package chromium",
     "node": "Debian's package nodejs",
@@ -35,8 +35,8 @@ def program(name: str, *others: str) -> str:
     return found or missing(name, f"install {INSTALLED_BY.get(name, name)} (see `make peers`)")
 
 
-def stranger() -> Path:
+def javascript() -> Path:
     """The folder of the JavaScript client, with its npm packages."""
-    if not (STRANGER / "node_modules" / "@grpc").is_dir():
+    if not (JAVASCRIPT / "node_modules" / "@grpc").is_dir():
         missing("npm packages", "run `make peers`")
-    return STRANGER
+    return JAVASCRIPT

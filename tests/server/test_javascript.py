@@ -3,13 +3,13 @@
 import json
 import subprocess
 
-from peers import program, stranger
+from peers import javascript, program
 from server_process import PATIENCE
 
 
 def test_a_client_in_another_language(address: str, name: str) -> None:
     command = [program("node"), "client.js", address, name]
-    done = subprocess.run(command, cwd=stranger(), capture_output=True, text=True, timeout=PATIENCE, check=False)
+    done = subprocess.run(command, cwd=javascript(), capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 0, done.stderr
     saw = json.loads(done.stdout)
     assert (saw["created"]["name"], saw["created"]["revision"]) == (name, 0)
