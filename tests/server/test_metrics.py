@@ -75,10 +75,11 @@ def test_a_real_prometheus_scrapes_it(tmp_path: Path) -> None:
         command.append("--web.listen-address=127.0.0.1:0")
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as prometheus:
             try:
-                lines = iter(prometheus.stderr.readline, "")
-                listening = (re.search(r'msg="Listening on" address=(\S+)', line) for line in lines)
-                api = next(found for found in listening if found).group(1)
-                next(line for line in lines if "ready to receive web requests" in line)
+                log, listening = "", None
+                while not (listening and "ready to receive web requests" in log):  # in either order
+                    log += prometheus.stderr.readline()
+                    listening = re.search(r'msg="Listening on" address=(\S+)', log)
+                api = listening[1]
                 found = {}
                 while found.get("dynhull_points") != 5:
                     answer = json.loads(fetch(f"http://{api}/api/v1/query?query=%7Bjob%3D%22dynhull%22%7D"))

@@ -9,7 +9,7 @@ from dynhull.arrays import Points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.live_hull import LiveHull
-from ..engine.steps import Run
+from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
@@ -85,16 +85,34 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
     return message
 
 
-async def encode_measured_event(
-    event: Event, encoding: points_pb2.PointEncoding, run: Run
+async def encode_watched(
+    event: Event, encoding: points_pb2.PointEncoding, run: Run, *, measures: bool
 ) -> hull_service_pb2.WatchResponse:
-    """The message of an event, with the measures of the hull if the event has its vertices."""
-    if isinstance(event, Progress):
-        return encode_event(event, encoding)
-    message: hull_service_pb2.WatchResponse = await run(partial(encode_event, event, encoding))
-    if event.vertices is not None:
+    """The message of an event; with `measures`, those of the hull if the event has its vertices.
+
+    `run` encodes large events, which would delay every other call.
+    """
+    message: hull_service_pb2.WatchResponse
+    if _rows(event) > BLOCK:
+        message = await run(partial(encode_event, event, encoding))
+    else:
+        message = encode_event(event, encoding)
+    if measures and not isinstance(event, Progress) and event.vertices is not None:
         message.measures.CopyFrom(await encode_measures(event.vertices, run))
     return message
+
+
+def _rows(event: Event) -> int:
+    """The number of points in the message of an event."""
+    match event:
+        case Snapshot():
+            return len(event.vertices)
+        case Change():
+            return len(event.removed) + event.difference.added.size
+        case Progress():
+            return 0
+        case _:
+            return len(event.extremes)
 
 
 def encode_verification(

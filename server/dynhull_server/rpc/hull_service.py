@@ -266,10 +266,9 @@ class HullService:
                 while True:
                     with call.cutoff():
                         event = await anext(events)
-                        if request.include_measures:
-                            message = await encode.encode_measured_event(event, encoding, self._engine.aside)
-                        else:
-                            message = encode.encode_event(event, encoding)
+                        message = await encode.encode_watched(
+                            event, encoding, self._engine.aside, measures=request.include_measures
+                        )
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
 
