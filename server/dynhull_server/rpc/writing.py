@@ -14,7 +14,7 @@ from .calls import Call
 from .metrics import Metrics
 
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
-MOST_ROWS = 65_536
+MOST_ROWS = 131_072
 MOST_BATCHES = 1_024
 
 
