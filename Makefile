@@ -48,13 +48,13 @@ coverage: .venv/.test .venv/.peers  ## run all tests and print the share of line
 format: .venv/.check  ## format the Python, C++ and proto files
 	$(BIN)/ruff check --select I --fix .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i $(KERNEL) tests/kernel/*.cpp
+	$(BIN)/clang-format -i $(filter %.cpp %.hpp,$(KERNEL)) tests/kernel/*.cpp
 	$(BIN)/buf format --write
 
 check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/clang-format --dry-run --Werror $(KERNEL) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp
+	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp
 	$(BIN)/mypy
 	$(STUB) -o build/_kernel.pyi
 	diff build/_kernel.pyi dynhull/_kernel.pyi || (echo 'run `make stub`'; exit 1)
