@@ -15,6 +15,7 @@ COLUMN_NAMES = (
     ("longitude", "latitude"),
     ("easting", "northing"),
 )
+"""Names of columns that hold coordinates, x before y, in lower case."""
 LARGEST_EXACT_INTEGER = 2**53
 SHAPELY_POINT = 0
 

@@ -11,14 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ._implementation import kernel
-from ._sources import coordinates_of
+from ._sources import COLUMN_NAMES, LARGEST_EXACT_INTEGER, coordinates_of
 
-__all__ = ["Checked", "Points", "as_coordinate", "as_points", "packed_points", "plain_points"]
+__all__ = ["COLUMN_NAMES", "Checked", "Points", "as_coordinate", "as_points", "packed_points", "plain_points"]
 
 Points = npt.NDArray[np.float64]
 """Type of an (n, 2) array of finite doubles, a point in each row."""
 
-LARGEST_EXACT_INTEGER = 2**53
 MOST_AXES = 64  # of an array: no list is nested deeper
 
 

@@ -46,8 +46,8 @@ def test_a_hull_from_create_to_delete(name):
     done = dynhull("insert", north, "1,2", "-3,4", "1,2")
     assert done.stdout == f"{north}: 3 points inserted, 3 in the hull, its shape changed\n"
     done = dynhull("insert", north, "--json", input="0 3.5\n\n-1,3\n")
-    told = {"inserted": 2, "deleted": 0, "missing": 0, "points": 5, "hull_changed": True}
-    assert json.loads(done.stdout) == {"name": north, "revision": 2, **told}
+    applied = {"inserted": 2, "deleted": 0, "missing": 0, "points": 5, "hull_changed": True}
+    assert json.loads(done.stdout) == {"name": north, "revision": 2, **applied}
     done = dynhull("remove", north, "1,2", "-1,3")
     assert done.stdout == f"{north}: 2 points removed, 3 in the hull, its shape unchanged\n"
     assert dynhull("query", north).stdout == "-3.0\t4.0\n1.0\t2.0\n0.0\t3.5\n"

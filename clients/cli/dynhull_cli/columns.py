@@ -4,14 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-PAIRS = [
-    ("x", "y"),
-    ("lon", "lat"),
-    ("lng", "lat"),
-    ("long", "lat"),
-    ("longitude", "latitude"),
-    ("easting", "northing"),
-]
+from dynhull.arrays import COLUMN_NAMES
 
 
 def has_pair(columns: Sequence[str]) -> bool:
@@ -82,4 +75,4 @@ def plain(text: str, decimal: str) -> str:
 
 def _pair(columns: Sequence[str]) -> tuple[int, int] | None:
     lowered = [column.strip().lower() for column in columns]
-    return next(((lowered.index(x), lowered.index(y)) for x, y in PAIRS if x in lowered and y in lowered), None)
+    return next(((lowered.index(x), lowered.index(y)) for x, y in COLUMN_NAMES if x in lowered and y in lowered), None)

@@ -63,7 +63,7 @@ class Differences:
         return computed
 
     def _forget(self) -> None:
-        """Keep the newest."""
+        """Keep the newest, and those under way."""
         total = 0
         for number, (key, (old, new, computing)) in enumerate(reversed(list(self._recent.items()))):
             total += old.nbytes + new.nbytes
@@ -73,6 +73,7 @@ class Differences:
     def _computed(self, key: tuple[int, int], computing: "asyncio.Future[Difference]") -> None:
         if computing.cancelled() or computing.exception() is not None:
             self._recent.pop(key, None)  # let the next watcher try again
+        self._forget()
 
 
 def difference(old: Points, new: Points) -> Difference:

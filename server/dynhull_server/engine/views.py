@@ -99,7 +99,7 @@ class ResumedView(VerticesView):
         self._revision = revision
 
     async def first(self, min_revision: int) -> Event:
-        """The change since then; a snapshot where nobody was told what the vertices were.
+        """The change since then; a snapshot where its vertices were never sent.
 
         Raises:
             HullReplacedError, RevisionForgottenError, NotStoredError: there is no way from there to here.

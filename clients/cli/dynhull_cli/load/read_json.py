@@ -13,7 +13,7 @@ from .chunks import CHUNK_ROWS, Chunks, Position, cut, picked
 from .geometry import json_text, number, position, positions
 from .source import Source
 
-LOOKED_AT = 4096  # bytes, to tell the kinds of JSON apart
+PREFIX = 4096  # bytes, which show the kind of JSON
 
 
 def read_json(source: Source) -> Chunks:
@@ -91,6 +91,6 @@ def _is_row(line: bytes) -> bool:
 
 def _skip_byte_order_mark(file: IO[bytes]) -> bytes:
     """Skip the mark; the first bytes after it, which remain to be read."""
-    if peek(file, LOOKED_AT).startswith(codecs.BOM_UTF8):
+    if peek(file, PREFIX).startswith(codecs.BOM_UTF8):
         file.read(len(codecs.BOM_UTF8))
-    return peek(file, LOOKED_AT)
+    return peek(file, PREFIX)
