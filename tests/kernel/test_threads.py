@@ -75,7 +75,10 @@ def test_writers_and_readers():
 
 @pytest.mark.usefixtures("impatient")
 def test_a_query_sees_no_half_of_an_update():
-    """Many points come and go as one batch: every answer belongs to the hull with them or to the hull without."""
+    """Many points come and go as one batch, without a pause: every answer belongs to the hull with them or without.
+
+    That the test ends shows that a writer that never pauses lets readers in.
+    """
     random = np.random.default_rng(0)
     circle, far = cloud("circle", 1000, random), 3 * cloud("circle", 300, random)
     queries = 5 * random.random((100, 2)) - 2.5

@@ -1,4 +1,5 @@
-// A read-write lock for Python threads: many readers or one writer of a hull.
+// A read-write lock for Python threads: many readers or one writer of a hull, in the order in which they came, so that
+// neither a writer that never pauses keeps readers out, nor readers a writer.
 //
 // The GIL guards the lock's counters. A single update holds the GIL throughout and only waits for the lock; a batch
 // takes the lock, then releases the GIL. Waiting threads release the GIL too. A batch of few rows keeps it, because
@@ -8,6 +9,7 @@
 #include <nanobind/nanobind.h>
 
 #include <condition_variable>
+#include <cstdint>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -20,10 +22,10 @@ class ReadWriteLock {
  public:
   // Wait until there is no writer, or until there is neither reader nor writer.
   void await_readable() {
-    if (writing_) wait([this] { return !writing_; });
+    if (writing_) await_turn([this] { return !writing_; });
   }
   void await_writable() {
-    if (writing_ || readers_ > 0) await_as_writer([this] { return !writing_ && readers_ == 0; });
+    if (writing_ || readers_ > 0) await_turn([this] { return !writing_ && readers_ == 0; });
   }
 
   // Before a fork, waits until no batch runs in any hull and lets none start, so that the child's hulls are whole.
@@ -51,17 +53,18 @@ class ReadWriteLock {
     std::condition_variable changed;
   };
 
-  // New readers wait for a waiting writer, unless that writer waits in the process from which this one was forked.
-  template <class Holds>
-  void await_as_writer(Holds holds) {
-    if (!writer_waits()) writers_waiting_ = 0;
-    process_ = this_process_;
-    ++writers_waiting_;
-    wait(holds);
-    --writers_waiting_;
-    wake();  // readers that waited for this writer
+  // Waits until all who came before have entered and the hull is free.
+  template <class Free>
+  void await_turn(Free free) {
+    if (process_ != this_process_) {  // who waited, waits in the process from which this one was forked
+      process_ = this_process_;
+      arrived_ = entered_ = 0;
+    }
+    const std::uint64_t turn = arrived_++;
+    wait([&] { return entered_ == turn && free(); });
+    ++entered_;
+    wake();
   }
-  bool writer_waits() const { return writers_waiting_ > 0 && process_ == this_process_; }
 
   // Takes the mutex before releasing the GIL, so that no signal is missed, and never holds it while taking the GIL.
   template <class Holds>
@@ -85,8 +88,9 @@ class ReadWriteLock {
   }
 
   bool writing_ = false;
-  int readers_ = 0, writers_waiting_ = 0;
-  int process_ = 0;
+  int readers_ = 0;
+  std::uint64_t arrived_ = 0, entered_ = 0;
+  int process_ = 0;  // in which the turns were counted
 
   static inline Signal* signal_ = new Signal;
   static inline int waiting_ = 0, running_ = 0;
@@ -98,7 +102,7 @@ class ReadWriteLock {
 class ReadLock {
  public:
   explicit ReadLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
-    ReadWriteLock::wait([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && !lock.writer_waits(); });
+    lock.await_turn([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_; });
     ++lock.readers_;
     ++ReadWriteLock::running_;
     if (rows > FEW_ROWS) release_.emplace();
@@ -120,7 +124,7 @@ class ReadLock {
 class WriteLock {
  public:
   explicit WriteLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
-    lock.await_as_writer([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && lock.readers_ == 0; });
+    lock.await_turn([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && lock.readers_ == 0; });
     lock.writing_ = true;
     ++ReadWriteLock::running_;
     if (rows > FEW_ROWS) release_.emplace();
