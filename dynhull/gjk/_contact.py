@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from .._hull import DynamicHull
+from .._base import Hull
 from .._value import Value
 from ..arrays import Points
 from ..convex import Cloud, Convex
@@ -55,7 +55,7 @@ Shape = Convex | Sequence[Convex]
 def intersect(a: Shape, b: Shape) -> bool:
     """Whether two sets have a common point; touching counts.
 
-    Exact between two sets that are each a `Cloud` in the plane (point, segment, box, polygon) or a `DynamicHull`.
+    Exact between two sets that are each a `Cloud` in the plane (point, segment, box, polygon) or a live hull.
     Otherwise sets closer than about 1e-14 of their size may count as touching. Typically three to five iterations; with
     two live hulls each takes O(log n). Hulls are read in full, O(h log h), only if they are so close that rounding
     errors could decide.
@@ -181,11 +181,11 @@ def _meet(a: Convex, b: Convex, seen: Walk, radius: float) -> bool:
 
 
 def _are_polygons(a: Convex, b: Convex) -> bool:
-    return all(isinstance(shape, Cloud | DynamicHull) and shape.dimension == 2 for shape in (a, b))
+    return all(isinstance(shape, Cloud | Hull) and shape.dimension == 2 for shape in (a, b))
 
 
 def _corners(shape: Convex) -> Points:
-    if isinstance(shape, DynamicHull):
+    if isinstance(shape, Hull):
         return shape.vertices()
     assert isinstance(shape, Cloud)
     return convex_hull(shape.points)

@@ -1,6 +1,6 @@
 """Rounded shapes as a core and a radius: GJK ends after a few steps on cores, but only converges on curves."""
 
-from .._hull import DynamicHull
+from .._base import Hull
 from ..convex import Ball, Cloud, Convex, Mapped, Sum
 
 
@@ -26,4 +26,4 @@ def is_polytope(shape: Convex) -> bool:
     """Whether the shape is known to have finitely many vertices."""
     if isinstance(shape, Sum):
         return all(is_polytope(part) for part in shape.parts)
-    return is_polytope(shape.shape) if isinstance(shape, Mapped) else isinstance(shape, Cloud | DynamicHull)
+    return is_polytope(shape.shape) if isinstance(shape, Mapped) else isinstance(shape, Cloud | Hull)

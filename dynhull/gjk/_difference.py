@@ -5,7 +5,7 @@ from fractions import Fraction
 from math import frexp, inf
 from typing import cast
 
-from .._hull import DynamicHull
+from .._base import Hull
 from ..convex import Cloud, Convex
 from ._core import is_polytope
 from ._simplex import foot, nearest
@@ -97,7 +97,7 @@ class Difference:
         self._a = a
         self._b = b
         self._numbers = numbers
-        self._exact = isinstance(a, Cloud | DynamicHull) and isinstance(b, Cloud | DynamicHull)
+        self._exact = isinstance(a, Cloud | Hull) and isinstance(b, Cloud | Hull)
         self.polytopes = is_polytope(a) and is_polytope(b)
         self.dimension = a.dimension
 

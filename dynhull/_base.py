@@ -1,0 +1,239 @@
+"""Hull: what every live hull answers. Checks arguments and returns numpy arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from . import measure
+from ._implementation import kernel
+from ._nodes import LOWER, UPPER
+from ._shown import geometry, svg
+from ._tree import HullTree
+from .arrays import Points, as_directions, as_points
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from . import _kernel
+
+T = TypeVar("T")
+
+MOST_POINTS_DRAWN = 2000
+
+
+class Hull:
+    """A convex hull of points that come and go: what the classes that hold the points have in common.
+
+    Several threads may ask one hull; each answer belongs to one state of it.
+    """
+
+    __slots__ = ("_measured", "_tree")
+    __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
+    dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
+    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
+
+    _tree: HullTree | _kernel.HullTree
+    _measured: tuple[int, dict[str, Any]]
+
+    # Contents
+
+    def __len__(self) -> int:
+        """The number of points, with multiplicity. O(1)."""
+        return len(self._tree)
+
+    @property
+    def distinct(self) -> int:
+        """The number of different points. O(1)."""
+        return self._tree.distinct
+
+    @property
+    def changes(self) -> int:
+        """The number of updates, single or batch, that changed the hull. O(1)."""
+        return self._tree.changes
+
+    def count(self, x: float, y: float) -> int:
+        """The number of copies of the point. O(log n)."""
+        return self._tree.count(x, y)
+
+    def count_many(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """(k,) numbers of copies of (k, 2) points. O(log n) each."""
+        return self._tree.count_many(as_points(xy))
+
+    def __contains__(self, point: tuple[float, float]) -> bool:
+        """Whether (x, y) is one of the points. O(log n)."""
+        x, y = point
+        return self.count(x, y) > 0
+
+    def points(self) -> Points:
+        """(n, 2) points in lexicographic order, with multiplicity. O(n)."""
+        return self._tree.points()
+
+    def vertices(self) -> Points:
+        """(h, 2) vertices, counter-clockwise from the lexicographically smallest, strictly convex. O(h log n).
+
+        No points: shape (0, 2). One point, in any number of copies: one vertex. All points collinear: two vertices.
+        """
+        return self._tree.vertices()
+
+    def upper(self) -> Points:
+        """(k, 2) vertices of the upper chain, left to right. O(h log n)."""
+        return self._tree.chain(UPPER)
+
+    def lower(self) -> Points:
+        """(k, 2) vertices of the lower chain, left to right. O(h log n)."""
+        return self._tree.chain(LOWER)
+
+    # Queries
+
+    def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
+        """(k,) signs of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
+        return self._tree.locate(as_points(xy))
+
+    def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """(k,) booleans: which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
+        return self.locate(xy) >= 0
+
+    def support(self, directions: npt.ArrayLike) -> Points:
+        """(k, 2) extreme vertices, one for each of (k, 2) directions of any length. Exact. O(log n) each.
+
+        If a whole edge is extreme, the vertex is its lexicographically smaller end.
+
+        Raises:
+            ValueError: a direction is (0, 0), or there are no points.
+        """
+        vectors = as_directions(directions, self.dimension)
+        if len(vectors) and not len(self):
+            raise ValueError("an empty hull has no extreme points: insert some first")
+        return self._tree.support(vectors)
+
+    def tangents(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(k, 2, 2) left and right tangent points seen from each of (k, 2) points. Exact. O(log n) each.
+
+        Seen from an outside point, the hull is between the two: no part of it is left of the ray to the left tangent
+        point or right of the ray to the right one. Of two vertices on such a ray, the farther. NaN for points that are
+        not strictly outside, and for an empty hull.
+        """
+        return self._tree.tangents(as_points(xy))
+
+    def distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(k,) distances of (k, 2) points to the hull, each the exact value rounded once. O(log n) each.
+
+        0.0 inside and on the boundary; inf from an empty hull.
+        """
+        return self._tree.distance(as_points(xy))
+
+    def intersect_lines(self, p: npt.ArrayLike, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(k, 2, 2) points where the lines through (k, 2) points p and q enter and leave the hull. O(log n) each.
+
+        In the order from p to q; each coordinate is the exact value rounded once. A line that touches a vertex has it
+        twice, a line along an edge has the edge's ends; NaN for a line that misses the hull.
+
+        Raises:
+            ValueError: p and q differ in length, or a row of p equals that of q.
+        """
+        starts, ends = as_points(p, "p"), as_points(q, "q")
+        if len(starts) != len(ends):
+            raise ValueError(f"p and q must have the same length, got {len(starts)} and {len(ends)}")
+        same = np.flatnonzero((starts == ends).all(axis=1))
+        if same.size:
+            raise ValueError(f"p and q row {same[0]} are the same point, which defines no line")
+        return self._tree.intersect_lines(starts, ends)
+
+    # Measures, each kept until the hull changes
+
+    def _measure(self, measure_of: Callable[[Points], T]) -> T:
+        """A measure of the vertices. Reads `changes` first, so that a concurrent update outdates the result."""
+        changes = self.changes
+        if self._measured[0] != changes:
+            self._measured = (changes, {})
+        known = self._measured[1]
+        name = measure_of.__name__
+        if name not in known:
+            known[name] = measure_of(self.vertices())
+        value: T = known[name]
+        return value
+
+    @property
+    def area(self) -> float:
+        """Area, the exact value rounded once. O(h log n)."""
+        return self._measure(measure.area)
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the boundary, within one unit in the last place an edge; two vertices count twice. O(h log n)."""
+        return self._measure(measure.perimeter)
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """Centre of area, the exact value rounded once; the middle of a segment, NaN without points. O(h log n)."""
+        return self._measure(measure.centroid)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Least x, least y, greatest x, greatest y; NaN without points. O(h log n)."""
+        return self._measure(measure.bounds)
+
+    def diameter(self) -> float:
+        """The greatest distance of two points, within one unit in the last place; 0.0 for fewer. O(h log n)."""
+        return self._measure(measure.diameter)
+
+    def width(self) -> float:
+        """The least distance of parallel lines with all points between, within one unit in the last place. O(h log n).
+
+        0.0 for collinear points, and for no points.
+        """
+        return self._measure(measure.width)
+
+    def min_box(self) -> Points:
+        """(4, 2) corners, counter-clockwise, of the box of least area in any orientation. O(h log n).
+
+        Chosen exactly, each coordinate rounded once. The box of collinear points is flat; NaN without points.
+        """
+        return self._measure(measure.min_box).copy()
+
+    def min_perimeter_box(self) -> Points:
+        """(4, 2) corners of the box of least perimeter, like `min_box`. O(h log n)."""
+        return self._measure(measure.min_perimeter_box).copy()
+
+    def min_circle(self) -> tuple[tuple[float, float], float]:
+        """Centre and radius of the smallest enclosing circle. O(h log n), and about ten rounds of O(h).
+
+        The exact centre rounded once, the radius within one unit in the last place. (NaN, NaN) and 0.0 without points.
+        """
+        return self._measure(measure.min_circle)
+
+    # As a value
+
+    def copy(self) -> Self:
+        """An independent hull of the same points. O(n)."""
+        new = type(self).__new__(type(self))
+        new._tree = self._tree.copy()
+        new._measured = (0, {})
+        return new
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.copy()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self)} points, {len(self.vertices())} vertices>"
+
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The hull as a GeoJSON geometry, which shapely, geopandas and other libraries read. O(h log n).
+
+        Polygon, LineString for two vertices, Point for one; without points an empty Polygon.
+        """
+        return geometry(self.vertices())
+
+    def _repr_svg_(self) -> str:
+        points = self.points() if len(self) <= MOST_POINTS_DRAWN else None
+        return svg(self.vertices(), repr(self), points)
+
+    def check(self) -> None:
+        """Raise AssertionError if an invariant of the tree is broken, for tests and bug reports. O(n log n)."""
+        self._tree.check()
