@@ -1,5 +1,6 @@
 import datetime
 
+from google.protobuf import duration_pb2 as _duration_pb2
 from google.protobuf import timestamp_pb2 as _timestamp_pb2
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
@@ -9,15 +10,46 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
+class Clock(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    CLOCK_UNSPECIFIED: _ClassVar[Clock]
+    CLOCK_SERVER: _ClassVar[Clock]
+    CLOCK_DATA: _ClassVar[Clock]
+
+class AheadPolicy(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    AHEAD_POLICY_UNSPECIFIED: _ClassVar[AheadPolicy]
+    AHEAD_POLICY_REFUSE: _ClassVar[AheadPolicy]
+    AHEAD_POLICY_CLAMP: _ClassVar[AheadPolicy]
+
+class Ordering(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    ORDERING_UNSPECIFIED: _ClassVar[Ordering]
+    ORDERING_ARRIVAL: _ClassVar[Ordering]
+    ORDERING_EVENT_TIME: _ClassVar[Ordering]
+
 class Identity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     IDENTITY_UNSPECIFIED: _ClassVar[Identity]
     IDENTITY_MULTISET: _ClassVar[Identity]
+    IDENTITY_STRING_KEYS: _ClassVar[Identity]
+    IDENTITY_INTEGER_KEYS: _ClassVar[Identity]
+CLOCK_UNSPECIFIED: Clock
+CLOCK_SERVER: Clock
+CLOCK_DATA: Clock
+AHEAD_POLICY_UNSPECIFIED: AheadPolicy
+AHEAD_POLICY_REFUSE: AheadPolicy
+AHEAD_POLICY_CLAMP: AheadPolicy
+ORDERING_UNSPECIFIED: Ordering
+ORDERING_ARRIVAL: Ordering
+ORDERING_EVENT_TIME: Ordering
 IDENTITY_UNSPECIFIED: Identity
 IDENTITY_MULTISET: Identity
+IDENTITY_STRING_KEYS: Identity
+IDENTITY_INTEGER_KEYS: Identity
 
 class Hull(_message.Message):
-    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid")
+    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     CONFIG_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
@@ -25,6 +57,7 @@ class Hull(_message.Message):
     DISTINCT_POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     CREATE_TIME_FIELD_NUMBER: _ClassVar[int]
     UID_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     config: HullConfig
     revision: int
@@ -32,15 +65,34 @@ class Hull(_message.Message):
     distinct_point_count: int
     create_time: _timestamp_pb2.Timestamp
     uid: str
-    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ...) -> None: ...
+    clock_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class HullConfig(_message.Message):
-    __slots__ = ("identity", "max_points")
+    __slots__ = ("identity", "max_points", "window", "ordering")
     IDENTITY_FIELD_NUMBER: _ClassVar[int]
     MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
+    WINDOW_FIELD_NUMBER: _ClassVar[int]
+    ORDERING_FIELD_NUMBER: _ClassVar[int]
     identity: Identity
     max_points: int
-    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ...) -> None: ...
+    window: Window
+    ordering: Ordering
+    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ...) -> None: ...
+
+class Window(_message.Message):
+    __slots__ = ("max_age", "max_points", "clock", "max_skew", "ahead")
+    MAX_AGE_FIELD_NUMBER: _ClassVar[int]
+    MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_FIELD_NUMBER: _ClassVar[int]
+    MAX_SKEW_FIELD_NUMBER: _ClassVar[int]
+    AHEAD_FIELD_NUMBER: _ClassVar[int]
+    max_age: _duration_pb2.Duration
+    max_points: int
+    clock: Clock
+    max_skew: _duration_pb2.Duration
+    ahead: AheadPolicy
+    def __init__(self, max_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_points: _Optional[int] = ..., clock: _Optional[_Union[Clock, str]] = ..., max_skew: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., ahead: _Optional[_Union[AheadPolicy, str]] = ...) -> None: ...
 
 class Measures(_message.Message):
     __slots__ = ("area", "perimeter", "centroid_x", "centroid_y", "min_x", "min_y", "max_x", "max_y")

@@ -4,6 +4,7 @@ from dynhull_proto.v1 import batch_pb2 as _batch_pb2
 from dynhull_proto.v1 import hull_pb2 as _hull_pb2
 from dynhull_proto.v1 import points_pb2 as _points_pb2
 from google.protobuf import duration_pb2 as _duration_pb2
+from google.protobuf import timestamp_pb2 as _timestamp_pb2
 from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
@@ -82,6 +83,30 @@ class ApplyResponse(_message.Message):
     result: _batch_pb2.BatchResult
     def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ...) -> None: ...
 
+class ApplyTogetherRequest(_message.Message):
+    __slots__ = ("batches", "producer", "sequence")
+    BATCHES_FIELD_NUMBER: _ClassVar[int]
+    PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    batches: _containers.RepeatedCompositeFieldContainer[HullBatch]
+    producer: str
+    sequence: int
+    def __init__(self, batches: _Optional[_Iterable[_Union[HullBatch, _Mapping]]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
+
+class HullBatch(_message.Message):
+    __slots__ = ("name", "batch")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    BATCH_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    batch: _batch_pb2.Batch
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ...) -> None: ...
+
+class ApplyTogetherResponse(_message.Message):
+    __slots__ = ("results",)
+    RESULTS_FIELD_NUMBER: _ClassVar[int]
+    results: _containers.RepeatedCompositeFieldContainer[_batch_pb2.BatchResult]
+    def __init__(self, results: _Optional[_Iterable[_Union[_batch_pb2.BatchResult, _Mapping]]] = ...) -> None: ...
+
 class IngestRequest(_message.Message):
     __slots__ = ("name", "batch", "producer", "sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
@@ -95,7 +120,7 @@ class IngestRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class IngestResponse(_message.Message):
-    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates")
+    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted")
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
     INSERTED_FIELD_NUMBER: _ClassVar[int]
@@ -103,6 +128,12 @@ class IngestResponse(_message.Message):
     MISSING_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     DUPLICATES_FIELD_NUMBER: _ClassVar[int]
+    MOVED_FIELD_NUMBER: _ClassVar[int]
+    STALE_FIELD_NUMBER: _ClassVar[int]
+    LATE_FIELD_NUMBER: _ClassVar[int]
+    SKIPPED_FIELD_NUMBER: _ClassVar[int]
+    CLAMPED_FIELD_NUMBER: _ClassVar[int]
+    EVICTED_FIELD_NUMBER: _ClassVar[int]
     batches: int
     revision: int
     inserted: int
@@ -110,7 +141,13 @@ class IngestResponse(_message.Message):
     missing: int
     point_count: int
     duplicates: int
-    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ...) -> None: ...
+    moved: int
+    stale: int
+    late: int
+    skipped: int
+    clamped: int
+    evicted: int
+    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ...) -> None: ...
 
 class StreamRequest(_message.Message):
     __slots__ = ("name", "batch", "producer", "sequence")
@@ -147,22 +184,30 @@ class GetProducerResponse(_message.Message):
     def __init__(self, last_sequence: _Optional[int] = ...) -> None: ...
 
 class LocateRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    KEYS_OF_FIELD_NUMBER: _ClassVar[int]
+    KEYS_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    keys: _points_pb2.Keys
+    keys_of: str
+    keys_min_revision: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ...) -> None: ...
 
 class LocateResponse(_message.Message):
-    __slots__ = ("revision", "sides")
+    __slots__ = ("revision", "sides", "keys_revision")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     SIDES_FIELD_NUMBER: _ClassVar[int]
+    KEYS_REVISION_FIELD_NUMBER: _ClassVar[int]
     revision: int
     sides: bytes
-    def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ...) -> None: ...
+    keys_revision: int
+    def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class CountRequest(_message.Message):
     __slots__ = ("name", "min_revision", "points")
@@ -182,25 +227,75 @@ class CountResponse(_message.Message):
     counts: _containers.RepeatedScalarFieldContainer[int]
     def __init__(self, revision: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ...) -> None: ...
 
+class GetPositionsRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "keys", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    keys: _points_pb2.Keys
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class GetPositionsResponse(_message.Message):
+    __slots__ = ("revision", "positions", "present", "times")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    PRESENT_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    positions: _points_pb2.Points
+    present: bytes
+    times: _points_pb2.Times
+    def __init__(self, revision: _Optional[int] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., present: _Optional[bytes] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
+
+class ReadEntitiesRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class ReadEntitiesResponse(_message.Message):
+    __slots__ = ("revision", "keys", "positions", "times")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    keys: _points_pb2.Keys
+    positions: _points_pb2.Points
+    times: _points_pb2.Times
+    def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
+
 class SupportRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "directions", "encoding")
+    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     directions: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    include_keys: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
 
 class SupportResponse(_message.Message):
-    __slots__ = ("revision", "vertices")
+    __slots__ = ("revision", "vertices", "keys")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     VERTICES_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
     revision: int
     vertices: _points_pb2.Points
-    def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    keys: _points_pb2.Keys
+    def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class TangentsRequest(_message.Message):
     __slots__ = ("name", "min_revision", "points", "encoding")
@@ -225,22 +320,30 @@ class TangentsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class DistanceRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    KEYS_OF_FIELD_NUMBER: _ClassVar[int]
+    KEYS_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    keys: _points_pb2.Keys
+    keys_of: str
+    keys_min_revision: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ...) -> None: ...
 
 class DistanceResponse(_message.Message):
-    __slots__ = ("revision", "distances")
+    __slots__ = ("revision", "distances", "keys_revision")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     DISTANCES_FIELD_NUMBER: _ClassVar[int]
+    KEYS_REVISION_FIELD_NUMBER: _ClassVar[int]
     revision: int
     distances: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ...) -> None: ...
+    keys_revision: int
+    def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class IntersectLinesRequest(_message.Message):
     __slots__ = ("name", "min_revision", "origins", "targets", "encoding")
@@ -267,46 +370,54 @@ class IntersectLinesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "view")
+    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     VIEW_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     view: HullView
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ...) -> None: ...
+    include_keys: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
-    __slots__ = ("hull", "vertices", "measures")
+    __slots__ = ("hull", "vertices", "measures", "vertex_keys")
     HULL_FIELD_NUMBER: _ClassVar[int]
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     MEASURES_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_KEYS_FIELD_NUMBER: _ClassVar[int]
     hull: _hull_pb2.Hull
     vertices: _points_pb2.Points
     measures: _hull_pb2.Measures
-    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
+    vertex_keys: _points_pb2.Keys
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class SamplePointsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "sample_size", "encoding")
+    __slots__ = ("name", "min_revision", "sample_size", "encoding", "include_keys")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     SAMPLE_SIZE_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     sample_size: int
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    include_keys: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
 
 class SamplePointsResponse(_message.Message):
-    __slots__ = ("revision", "points")
+    __slots__ = ("revision", "points", "keys")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
     revision: int
     points: _points_pb2.Points
-    def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    keys: _points_pb2.Keys
+    def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetMeasuresRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding")
@@ -437,7 +548,7 @@ class FrontierResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., efficient: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., turning_rates: _Optional[_Iterable[float]] = ..., dominated: _Optional[_Iterable[bool]] = ..., tangencies: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., sharpe_ratios: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class WatchRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions")
+    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -446,6 +557,7 @@ class WatchRequest(_message.Message):
     PROGRESS_INTERVAL_FIELD_NUMBER: _ClassVar[int]
     RESUME_FIELD_NUMBER: _ClassVar[int]
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
@@ -454,7 +566,8 @@ class WatchRequest(_message.Message):
     progress_interval: _duration_pb2.Duration
     resume: WatchResume
     directions: _points_pb2.Points
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    include_keys: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., include_keys: bool = ...) -> None: ...
 
 class WatchResume(_message.Message):
     __slots__ = ("uid", "revision")
@@ -465,7 +578,7 @@ class WatchResume(_message.Message):
     def __init__(self, uid: _Optional[str] = ..., revision: _Optional[int] = ...) -> None: ...
 
 class WatchResponse(_message.Message):
-    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures")
+    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures", "cause", "clock_time")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
@@ -473,6 +586,8 @@ class WatchResponse(_message.Message):
     PROGRESS_FIELD_NUMBER: _ClassVar[int]
     SKETCH_FIELD_NUMBER: _ClassVar[int]
     MEASURES_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
     revision: int
     point_count: int
     snapshot: HullSnapshot
@@ -480,35 +595,47 @@ class WatchResponse(_message.Message):
     progress: HullProgress
     sketch: HullSketch
     measures: _hull_pb2.Measures
-    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ...) -> None: ...
+    cause: _batch_pb2.Cause
+    clock_time: _timestamp_pb2.Timestamp
+    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., cause: _Optional[_Union[_batch_pb2.Cause, str]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class HullSnapshot(_message.Message):
-    __slots__ = ("vertices", "uid")
+    __slots__ = ("vertices", "uid", "vertex_keys")
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     UID_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_KEYS_FIELD_NUMBER: _ClassVar[int]
     vertices: _points_pb2.Points
     uid: str
-    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., uid: _Optional[str] = ...) -> None: ...
+    vertex_keys: _points_pb2.Keys
+    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., uid: _Optional[str] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class HullSketch(_message.Message):
-    __slots__ = ("vertices",)
+    __slots__ = ("vertices", "keys")
     VERTICES_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
     vertices: _points_pb2.Points
-    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    keys: _points_pb2.Keys
+    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class HullChange(_message.Message):
-    __slots__ = ("removed", "removed_indices", "added", "added_indices", "rotation")
+    __slots__ = ("removed", "removed_indices", "added", "added_indices", "rotation", "added_keys", "renamed_indices", "renamed_keys")
     REMOVED_FIELD_NUMBER: _ClassVar[int]
     REMOVED_INDICES_FIELD_NUMBER: _ClassVar[int]
     ADDED_FIELD_NUMBER: _ClassVar[int]
     ADDED_INDICES_FIELD_NUMBER: _ClassVar[int]
     ROTATION_FIELD_NUMBER: _ClassVar[int]
+    ADDED_KEYS_FIELD_NUMBER: _ClassVar[int]
+    RENAMED_INDICES_FIELD_NUMBER: _ClassVar[int]
+    RENAMED_KEYS_FIELD_NUMBER: _ClassVar[int]
     removed: _points_pb2.Points
     removed_indices: _containers.RepeatedScalarFieldContainer[int]
     added: _points_pb2.Points
     added_indices: _containers.RepeatedScalarFieldContainer[int]
     rotation: int
-    def __init__(self, removed: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., removed_indices: _Optional[_Iterable[int]] = ..., added: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., added_indices: _Optional[_Iterable[int]] = ..., rotation: _Optional[int] = ...) -> None: ...
+    added_keys: _points_pb2.Keys
+    renamed_indices: _containers.RepeatedScalarFieldContainer[int]
+    renamed_keys: _points_pb2.Keys
+    def __init__(self, removed: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., removed_indices: _Optional[_Iterable[int]] = ..., added: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., added_indices: _Optional[_Iterable[int]] = ..., rotation: _Optional[int] = ..., added_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., renamed_indices: _Optional[_Iterable[int]] = ..., renamed_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class HullProgress(_message.Message):
     __slots__ = ()
@@ -525,20 +652,22 @@ class VerifyRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
 
 class VerifyResponse(_message.Message):
-    __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference")
+    __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference", "keys_equal")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     EQUAL_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     VERTEX_COUNT_FIELD_NUMBER: _ClassVar[int]
     ROUNDS_FIELD_NUMBER: _ClassVar[int]
     FIRST_DIFFERENCE_FIELD_NUMBER: _ClassVar[int]
+    KEYS_EQUAL_FIELD_NUMBER: _ClassVar[int]
     revision: int
     equal: bool
     point_count: int
     vertex_count: int
     rounds: _containers.RepeatedCompositeFieldContainer[ChanRound]
     first_difference: VertexDifference
-    def __init__(self, revision: _Optional[int] = ..., equal: bool = ..., point_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., rounds: _Optional[_Iterable[_Union[ChanRound, _Mapping]]] = ..., first_difference: _Optional[_Union[VertexDifference, _Mapping]] = ...) -> None: ...
+    keys_equal: bool
+    def __init__(self, revision: _Optional[int] = ..., equal: bool = ..., point_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., rounds: _Optional[_Iterable[_Union[ChanRound, _Mapping]]] = ..., first_difference: _Optional[_Union[VertexDifference, _Mapping]] = ..., keys_equal: bool = ...) -> None: ...
 
 class ChanRound(_message.Message):
     __slots__ = ("guess", "groups", "steps", "cost", "closed")

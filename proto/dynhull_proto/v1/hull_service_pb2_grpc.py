@@ -75,6 +75,11 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyResponse.FromString,
                 _registered_method=True)
+        self.ApplyTogether = channel.unary_unary(
+                '/dynhull.v1.HullService/ApplyTogether',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyTogetherRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyTogetherResponse.FromString,
+                _registered_method=True)
         self.Ingest = channel.stream_unary(
                 '/dynhull.v1.HullService/Ingest',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IngestRequest.SerializeToString,
@@ -99,6 +104,16 @@ class HullServiceStub(object):
                 '/dynhull.v1.HullService/Count',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountResponse.FromString,
+                _registered_method=True)
+        self.GetPositions = channel.unary_unary(
+                '/dynhull.v1.HullService/GetPositions',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetPositionsRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetPositionsResponse.FromString,
+                _registered_method=True)
+        self.ReadEntities = channel.unary_stream(
+                '/dynhull.v1.HullService/ReadEntities',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesResponse.FromString,
                 _registered_method=True)
         self.Support = channel.unary_unary(
                 '/dynhull.v1.HullService/Support',
@@ -214,6 +229,14 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def ApplyTogether(self, request, context):
+        """Applies one batch to each of several hulls: all of them, as one revision each, or none. Nobody sees some of the
+        revisions without the others, so a key that one batch removes and another one puts is always in exactly one hull.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Ingest(self, request_iterator, context):
         """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
         before it remain applied, and the metadata of the error have their number ("batch").
@@ -246,6 +269,20 @@ class HullServiceServicer(object):
 
     def Count(self, request, context):
         """Counts the multiplicity of points.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def GetPositions(self, request, context):
+        """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ReadEntities(self, request, context):
+        """Sends all keys of a keyed hull at one revision, with their positions.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -364,6 +401,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyResponse.SerializeToString,
             ),
+            'ApplyTogether': grpc.unary_unary_rpc_method_handler(
+                    servicer.ApplyTogether,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyTogetherRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyTogetherResponse.SerializeToString,
+            ),
             'Ingest': grpc.stream_unary_rpc_method_handler(
                     servicer.Ingest,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.IngestRequest.FromString,
@@ -388,6 +430,16 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.Count,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.CountResponse.SerializeToString,
+            ),
+            'GetPositions': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetPositions,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetPositionsRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetPositionsResponse.SerializeToString,
+            ),
+            'ReadEntities': grpc.unary_stream_rpc_method_handler(
+                    servicer.ReadEntities,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesResponse.SerializeToString,
             ),
             'Support': grpc.unary_unary_rpc_method_handler(
                     servicer.Support,
@@ -590,6 +642,33 @@ class HullService(object):
             _registered_method=True)
 
     @staticmethod
+    def ApplyTogether(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/ApplyTogether',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyTogetherRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyTogetherResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
     def Ingest(request_iterator,
             target,
             options=(),
@@ -714,6 +793,60 @@ class HullService(object):
             '/dynhull.v1.HullService/Count',
             dynhull__proto_dot_v1_dot_hull__service__pb2.CountRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.CountResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetPositions(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/GetPositions',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetPositionsRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetPositionsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ReadEntities(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/dynhull.v1.HullService/ReadEntities',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesResponse.FromString,
             options,
             channel_credentials,
             insecure,

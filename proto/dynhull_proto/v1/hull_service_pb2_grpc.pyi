@@ -62,6 +62,10 @@ class HullServiceStub:
     """Lists hulls by name, in pages. A caller with a token gets those it may read."""
     Apply: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]
     """Applies one batch."""
+    ApplyTogether: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyTogetherRequest, _hull_service_pb2.ApplyTogetherResponse]
+    """Applies one batch to each of several hulls: all of them, as one revision each, or none. Nobody sees some of the
+    revisions without the others, so a key that one batch removes and another one puts is always in exactly one hull.
+    """
     Ingest: _grpc.StreamUnaryMultiCallable[_hull_service_pb2.IngestRequest, _hull_service_pb2.IngestResponse]
     """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
     before it remain applied, and the metadata of the error have their number ("batch").
@@ -76,6 +80,10 @@ class HullServiceStub:
     """Locates points: inside, on the boundary or outside. Exact."""
     Count: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]
     """Counts the multiplicity of points."""
+    GetPositions: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetPositionsRequest, _hull_service_pb2.GetPositionsResponse]
+    """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
+    ReadEntities: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.ReadEntitiesRequest, _hull_service_pb2.ReadEntitiesResponse]
+    """Sends all keys of a keyed hull at one revision, with their positions."""
     Support: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]
     """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
     Tangents: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]
@@ -146,6 +154,10 @@ class HullServiceAsyncStub(HullServiceStub):
     """Lists hulls by name, in pages. A caller with a token gets those it may read."""
     Apply: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]  # type: ignore[assignment]
     """Applies one batch."""
+    ApplyTogether: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyTogetherRequest, _hull_service_pb2.ApplyTogetherResponse]  # type: ignore[assignment]
+    """Applies one batch to each of several hulls: all of them, as one revision each, or none. Nobody sees some of the
+    revisions without the others, so a key that one batch removes and another one puts is always in exactly one hull.
+    """
     Ingest: _aio.StreamUnaryMultiCallable[_hull_service_pb2.IngestRequest, _hull_service_pb2.IngestResponse]  # type: ignore[assignment]
     """Applies many batches to one hull, in order, and answers once at the end. A refused batch ends the call; the batches
     before it remain applied, and the metadata of the error have their number ("batch").
@@ -160,6 +172,10 @@ class HullServiceAsyncStub(HullServiceStub):
     """Locates points: inside, on the boundary or outside. Exact."""
     Count: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]  # type: ignore[assignment]
     """Counts the multiplicity of points."""
+    GetPositions: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetPositionsRequest, _hull_service_pb2.GetPositionsResponse]  # type: ignore[assignment]
+    """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
+    ReadEntities: _aio.UnaryStreamMultiCallable[_hull_service_pb2.ReadEntitiesRequest, _hull_service_pb2.ReadEntitiesResponse]  # type: ignore[assignment]
+    """Sends all keys of a keyed hull at one revision, with their positions."""
     Support: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]  # type: ignore[assignment]
     """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
     Tangents: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]  # type: ignore[assignment]
@@ -253,6 +269,16 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         """Applies one batch."""
 
     @_abc_1.abstractmethod
+    def ApplyTogether(
+        self,
+        request: _hull_service_pb2.ApplyTogetherRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.ApplyTogetherResponse, _abc.Awaitable[_hull_service_pb2.ApplyTogetherResponse]]:
+        """Applies one batch to each of several hulls: all of them, as one revision each, or none. Nobody sees some of the
+        revisions without the others, so a key that one batch removes and another one puts is always in exactly one hull.
+        """
+
+    @_abc_1.abstractmethod
     def Ingest(
         self,
         request_iterator: _MaybeAsyncIterator[_hull_service_pb2.IngestRequest],
@@ -295,6 +321,22 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.CountResponse, _abc.Awaitable[_hull_service_pb2.CountResponse]]:
         """Counts the multiplicity of points."""
+
+    @_abc_1.abstractmethod
+    def GetPositions(
+        self,
+        request: _hull_service_pb2.GetPositionsRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetPositionsResponse, _abc.Awaitable[_hull_service_pb2.GetPositionsResponse]]:
+        """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
+
+    @_abc_1.abstractmethod
+    def ReadEntities(
+        self,
+        request: _hull_service_pb2.ReadEntitiesRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.ReadEntitiesResponse], _abc.AsyncIterator[_hull_service_pb2.ReadEntitiesResponse]]:
+        """Sends all keys of a keyed hull at one revision, with their positions."""
 
     @_abc_1.abstractmethod
     def Support(
