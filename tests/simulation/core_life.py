@@ -43,6 +43,7 @@ from dynhull_server.state.events import (
 )
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
+from dynhull_server.state.records import HullSettings
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
@@ -115,7 +116,7 @@ class CoreServer:
         self.core = Core(limits, contents.next_number, immediate=storage.immediate)
         for row in contents.hulls:
             kept = storage.read(row.number)
-            self.core.restore(row, HullState(limits, row.max_points, kept, now=0.0), len(kept.records))
+            self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
         threads: Any = NoThreads()
         self._commits = GroupCommit(storage, threads, Clock(), lambda _: None, lambda _: None)
         self._events: deque[Event] = deque()
@@ -219,7 +220,7 @@ class CoreServer:
         return Birth(self.model.uid(), 0.0)
 
     async def create(self, name: str, max_points: int) -> str:
-        uid: str = (await self._ask(CreateHull(Answer(), name, self._birth(), max_points))).uid
+        uid: str = (await self._ask(CreateHull(Answer(), name, self._birth(), HullSettings(max_points=max_points)))).uid
         return uid
 
     async def delete(self, name: str) -> None:
@@ -274,12 +275,12 @@ class CoreServer:
         asked = self.model.ask(op["name"])
         try:
             hull = self.core.get(op["name"])
-            read = ReadHull(Answer(), hull, lambda state: (state.hull.points(), state.producers()))
-            counts, (points, producers) = await self._ask(read)
+            read = ReadHull(Answer(), hull, HullState.kept)
+            _, kept = await self._ask(read)
         except (RefusedError, StoppingError) as error:
             client.refused(asked, error, (HullNotFoundError,))
             return
-        for step in self._storage.snapshot(hull.row.number, counts.revision, points, producers):
+        for step in self._storage.snapshot(hull.row.number, kept):
             failed: list[Exception | None] = []
             self._commits.submit([step], partial(_remember, failed))
             await Wait(partial(len, failed))
@@ -346,8 +347,8 @@ def compare(core: Core, model: Model) -> None:
         held = (hull.counts.revision, state.counts.revision, content(state.hull.points()))
         if held != (truth.revision, truth.revision, truth.contents[-1]):
             raise model.finds(f"{name} is {held} in memory, kept is {truth.revision, truth.contents[-1]}")
-        if not model.days and state.producers() != truth.producers:
-            raise model.finds(f"producers in memory: {state.producers()}, kept: {truth.producers}")
+        if not model.days and state.kept().producers != truth.producers:
+            raise model.finds(f"producers in memory: {state.kept().producers}, kept: {truth.producers}")
         if core.state_of(name) != "there":
             raise model.finds(f"{name} is {core.state_of(name)} at rest")
 

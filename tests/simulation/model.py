@@ -17,7 +17,7 @@ from typing import Any
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import Append, Create, Delete, HullRow, Record
+from dynhull_server.state.records import Append, Create, Delete, HullRow, PointRows, Record
 
 Content = tuple[int, ...]
 
@@ -91,7 +91,7 @@ class Model:
         if limit == "max_hulls":
             return len(self.alive) >= self._limits.max_hulls
         truth = self.alive.get(name)
-        most = min(truth.row.max_points or self._limits.max_points, self._limits.max_points) if truth else 0
+        most = min(truth.row.settings.max_points or self._limits.max_points, self._limits.max_points) if truth else 0
         return limit == "max_points" and truth is not None and len(truth.contents[-1]) >= most
 
     def finds(self, what: str) -> Finding:
@@ -136,14 +136,16 @@ class Model:
             raise self.finds("a batch is kept of a hull that has been deleted")
         if record.revision != truth.revision + 1:
             raise self.finds(f"revision {record.revision} is kept after revision {truth.revision}")
-        attempt = int(record.inserts[0, 0])
+        rows = record.rows
+        assert isinstance(rows, PointRows)
+        attempt = int(rows.inserts[0, 0])
         if attempt in self._refused:
             raise self.finds(f"batch {attempt} is kept after it was refused")
         if attempt in self._places:
             raise self.finds(f"batch {attempt} is kept twice")
         content = {*truth.contents[-1], attempt}
-        for x in record.deletes[:, 0].tolist():
-            if x not in content and not record.lenient:
+        for x in rows.deletes[:, 0].tolist():
+            if x not in content and not rows.lenient:
                 raise self.finds(f"batch {attempt} deletes a point that is not there")
             content.discard(int(x))
         if record.producer:

@@ -17,6 +17,7 @@ from dynhull_server.state.errors import HullNotFoundError
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
+from dynhull_server.state.records import HullSettings
 
 from .clients import Client
 from .core_life import compare
@@ -105,7 +106,7 @@ class ShellServer:
     # What clients ask for
 
     async def create(self, name: str, max_points: int) -> str:
-        return (await self._engine.create(name, max_points)).uid
+        return (await self._engine.create(name, HullSettings(max_points=max_points))).uid
 
     async def delete(self, name: str) -> None:
         await self._engine.delete(name)

@@ -1,10 +1,9 @@
 """A storage that fails when the plan says so, and reports to the model what it has kept."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from dynhull.arrays import Points
 from dynhull_server.state.records import HullRow, Kept
 from dynhull_server.storage.port import NEWEST, Contents, NotCommittedError, Progress, Step, Storage
 
@@ -120,9 +119,9 @@ class FaultyStorage:
         self._fail("oldest")
         return self._inner.oldest(number)
 
-    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
         """Steps, each of which may fail."""
-        for step in self._inner.snapshot(number, revision, points, producers):
+        for step in self._inner.snapshot(number, kept):
             self.give_way()
             self._fail("snapshot")
             yield step

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynhull_server.state.records import Append, Create, HullRow, Record
+from dynhull_server.state.records import Append, Contents, Create, HullRow, Kept, PointRows, Record
 from dynhull_server.storage.sqlite.folder import DATABASE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -29,7 +29,7 @@ def points(n, seed=0):
 
 
 def record(revision, n=3):
-    return Record(revision, points(n, revision), NOTHING)
+    return Record(revision, PointRows(points(n, revision), NOTHING))
 
 
 def records(first, last):
@@ -39,7 +39,7 @@ def records(first, last):
 def same(found, expected):
     assert [each.revision for each in found] == [each.revision for each in expected]
     for one, other in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(one.inserts, other.inserts)
+        np.testing.assert_array_equal(one.rows.inserts, other.rows.inserts)
 
 
 def fill(storage, last, name="fleet", number=1):
@@ -54,7 +54,7 @@ def append(storage, first, last, number=1):
 
 
 def snapshot(storage, revision, number=1):
-    for step in storage.snapshot(number, revision, points(100, -revision % 1000), {}):
+    for step in storage.snapshot(number, Kept(revision, Contents(points(100, -revision % 1000)))):
         storage.commit([step])
 
 

@@ -8,7 +8,17 @@ import threading
 import numpy as np
 import pytest
 
-from dynhull_server.state.records import Append, Create, Delete, HullRow, Record
+from dynhull_server.state.records import (
+    Append,
+    Contents,
+    Create,
+    Delete,
+    HullRow,
+    HullSettings,
+    Kept,
+    PointRows,
+    Record,
+)
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NEWEST, DamagedError, NotCommittedError
@@ -95,7 +105,7 @@ class Opened:
         return count
 
     def snapshot(self, number, revision, points):
-        return self.carry_out(self.storage.snapshot(number, revision, points, {"w": revision}))
+        return self.carry_out(self.storage.snapshot(number, Kept(revision, Contents(points), {"w": revision})))
 
 
 @pytest.fixture
@@ -106,15 +116,15 @@ def opened(make):
 
 
 def row(number, name=None):
-    return HullRow(number, name or f"hull {number}", f"uid{number}", 12.5 + number, number)
+    return HullRow(number, name or f"hull {number}", f"uid{number}", 12.5 + number, HullSettings(max_points=number))
 
 
 def points(n, seed=0):
     return np.random.default_rng(seed).random((n, 2))
 
 
-def record(revision, n=3, deletes=NOTHING, **fields):
-    return Record(revision, points(n, revision), deletes, **fields)
+def record(revision, n=3, deletes=NOTHING, lenient=False, **fields):
+    return Record(revision, PointRows(points(n, revision), deletes, lenient), **fields)
 
 
 def records(first, last):
@@ -124,17 +134,17 @@ def records(first, last):
 def same(found, expected):
     assert [each.revision for each in found] == [each.revision for each in expected]
     for one, other in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(one.inserts, other.inserts)
-        np.testing.assert_array_equal(one.deletes, other.deletes)
-        assert (one.producer, one.sequence, one.lenient) == (other.producer, other.sequence, other.lenient)
+        np.testing.assert_array_equal(one.rows.inserts, other.rows.inserts)
+        np.testing.assert_array_equal(one.rows.deletes, other.rows.deletes)
+        assert (one.producer, one.sequence, one.rows.lenient) == (other.producer, other.sequence, other.rows.lenient)
 
 
 def test_what_was_committed_comes_back(opened):
     assert (opened.contents.hulls, opened.contents.next_number, opened.contents.notes) == ([], 1, [])
     batches = [
         record(1, producer="truck é", sequence=7),
-        Record(2, NOTHING, points(1, 1)),
-        Record(3, NOTHING, NOTHING),
+        Record(2, PointRows(NOTHING, points(1, 1))),
+        Record(3, PointRows(NOTHING, NOTHING)),
         record(4, n=20_000, deletes=np.array([[-0.5, 1e308], [5e-324, 0.0]]), lenient=True),
     ]
     fleet, other = row(1, "fleet"), row(2, "fl/é")
@@ -144,7 +154,7 @@ def test_what_was_committed_comes_back(opened):
         assert opened.storage.row(1) == fleet
         assert opened.storage.row(3) is None
         kept = opened.storage.read(1)
-        assert (kept.revision, kept.points.shape, kept.producers, kept.last_revision) == (0, (0, 2), {}, 4)
+        assert (kept.revision, kept.contents.points.shape, kept.producers, kept.last_revision) == (0, (0, 2), {}, 4)
         same(kept.records, batches)
         assert opened.storage.read(2).records == []
         assert opened.storage.oldest(1) == 0
@@ -175,12 +185,12 @@ def test_a_snapshot_stands_for_the_batches_before_it(opened):
     for _ in range(2):
         kept = opened.storage.read(1)
         assert (kept.revision, kept.producers, kept.last_revision) == (40, {"w": 40}, 41)
-        np.testing.assert_array_equal(kept.points, at[40])
+        np.testing.assert_array_equal(kept.contents.points, at[40])
         same(kept.records, [record(41)])
         assert opened.storage.oldest(1) == 30
         kept = opened.storage.read(1, 33)
         assert (kept.revision, kept.producers) == (30, {"w": 30})
-        np.testing.assert_array_equal(kept.points, at[30])
+        np.testing.assert_array_equal(kept.contents.points, at[30])
         same(kept.records, records(31, 33))
         with pytest.raises(DamagedError, match="no longer kept"):
             opened.storage.read(1, 29)
@@ -189,7 +199,7 @@ def test_a_snapshot_stands_for_the_batches_before_it(opened):
 
 def test_a_snapshot_counts_once_it_is_whole(opened):
     opened.create(1, Append(1, records(1, 2)))
-    steps = opened.storage.snapshot(1, 2, points(3 * CHUNK_POINTS), {})
+    steps = opened.storage.snapshot(1, Kept(2, Contents(points(3 * CHUNK_POINTS))))
     opened.commit(next(steps))
     steps.close()
     for _ in range(2):
@@ -206,7 +216,7 @@ def test_an_empty_hull_has_a_snapshot_too(opened):
     opened.create(1, Append(1, [record(1)]))
     opened.snapshot(1, 1, NOTHING)
     kept = opened.storage.read(1)
-    assert (kept.revision, kept.points.shape, kept.records) == (1, (0, 2), [])
+    assert (kept.revision, kept.contents.points.shape, kept.records) == (1, (0, 2), [])
 
 
 def test_snapshots_of_hulls_are_written_beside_each_other_and_beside_a_sweep(opened):
@@ -215,7 +225,7 @@ def test_snapshots_of_hulls_are_written_beside_each_other_and_beside_a_sweep(ope
     opened.snapshot(3, 3, points(CHUNK_POINTS + 1))
     opened.commit(Delete(3))
     large = {number: points(2 * CHUNK_POINTS + 1, number) for number in (1, 2)}
-    writing = [opened.storage.snapshot(number, 3, large[number], {}) for number in (1, 2)]
+    writing = [opened.storage.snapshot(number, Kept(3, Contents(large[number]))) for number in (1, 2)]
     writing.append(opened.storage.sweep())
     while writing:
         for steps in list(writing):
@@ -226,7 +236,7 @@ def test_snapshots_of_hulls_are_written_beside_each_other_and_beside_a_sweep(ope
                 opened.commit(step)
     for _ in range(2):
         for number in (1, 2):
-            np.testing.assert_array_equal(opened.storage.read(number).points, large[number])
+            np.testing.assert_array_equal(opened.storage.read(number).contents.points, large[number])
         opened.reopen()
 
 
@@ -234,7 +244,7 @@ def test_a_deleted_hull_is_gone(opened):
     opened.create(1, Append(1, records(1, 30)))
     opened.create(2, Append(2, [record(1)]))
     opened.snapshot(1, 30, points(3))
-    steps = opened.storage.snapshot(1, 30, points(3), {})  # is under way
+    steps = opened.storage.snapshot(1, Kept(30, Contents(points(3))))  # is under way
     opened.commit(next(steps))
     opened.commit(Delete(1))
     opened.carry_out(steps)

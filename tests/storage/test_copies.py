@@ -26,7 +26,7 @@ from folders import (
 from server_process import COMMAND, PATIENCE, server_process
 
 from dynhull_client import HullClient
-from dynhull_server.state.records import Append, Create, Delete, HullRow, Record
+from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, Kept, PointRows, Record
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite import copies
 
@@ -91,12 +91,12 @@ def test_a_backup_takes_the_moment_it_began_at(paths):
     storage.commit([Create(HullRow(1, "large", "", 0.0))])
     batch = np.zeros((50_000, 2))
     for revision in range(1, 21):
-        storage.commit([Append(1, [Record(revision, batch, batch[:0])])])
+        storage.commit([Append(1, [Record(revision, PointRows(batch, batch[:0]))])])
     with subprocess.Popen([COMMAND, "backup", copy, "--data", data]) as backup:
         revision = 20
         while backup.poll() is None:
             revision += 1
-            storage.commit([Append(1, [Record(revision, batch[:1], batch[:0])])])
+            storage.commit([Append(1, [Record(revision, PointRows(batch[:1], batch[:0]))])])
     assert backup.returncode == 0
     storage.close()
     storage, contents = opened(copy)
@@ -142,7 +142,7 @@ def test_a_damaged_backup_is_not_restored(paths):
     data, copy, new = paths
     stopped(data)
     done("backup", copy, "--data", data, says=f"{copy}: 1 hulls")
-    flip(copy / DATABASE, record(4).inserts.tobytes())
+    flip(copy / DATABASE, record(4).rows.inserts.tobytes())
     refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones exist")
     assert not new.exists()
 
@@ -203,7 +203,7 @@ def test_half_a_copy_is_never_taken_for_one(paths, where, nth, whole):
     fill(storage, 9)
     for number in range(2, 5):
         fill(storage, 1, f"hull {number}", number)
-        for step in storage.snapshot(number, 1, np.zeros((200_000, 2)), {}):
+        for step in storage.snapshot(number, Kept(1, Contents(np.zeros((200_000, 2))))):
             storage.commit([step])
     storage.close()
     command = [sys.executable, "-c", KILLED, data, copy, where, str(nth)]
@@ -287,7 +287,7 @@ def test_check_says_what_is_damaged(paths):
     for revision in (10, 20, 30):
         snapshot(storage, revision)
         append(storage, revision + 1, revision + 10)
-    older = storage.read(1, 25).points
+    older = storage.read(1, 25).contents.points
     storage.commit([Delete(3)])
     storage.close()
     content = (data / DATABASE).read_bytes()
@@ -301,7 +301,7 @@ def test_check_says_what_is_damaged(paths):
     ]
     assert finished.stderr == "hull 'fleet': the snapshot at revision 20 is damaged, and was dropped\n"
     (data / DATABASE).write_bytes(content)
-    flip(data / DATABASE, record(35).inserts.tobytes())
+    flip(data / DATABASE, record(35).rows.inserts.tobytes())
     finished = run("check", data)
     assert finished.returncode == 1
     assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it cannot be served: restore a backup"

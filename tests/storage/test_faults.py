@@ -9,7 +9,7 @@ import threading
 import pytest
 from folders import DATABASE, LOG, append, fill, killed, no_progress, opened, points, record, records, same
 
-from dynhull_server.state.records import Append, Create, Delete, HullRow
+from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import NotCommittedError, StorageError
 from dynhull_server.storage.sqlite.disk import Access, Disk
@@ -213,7 +213,7 @@ def test_a_sync_that_failed_is_made_good_by_a_checkpoint(folder, disk):
 
 
 def test_a_snapshot_that_fails_leaves_nothing_behind_for_long(storage, disk):
-    steps = storage.snapshot(1, 3, points(100_000), {})
+    steps = storage.snapshot(1, Kept(3, Contents(points(100_000))))
     storage.commit([next(steps)])
     disk.fail("INSERT INTO chunks", failure(FULL))
     with pytest.raises(NotCommittedError):
@@ -227,7 +227,7 @@ def test_a_snapshot_that_fails_leaves_nothing_behind_for_long(storage, disk):
 def test_settling_spares_a_snapshot_that_is_under_way(storage, disk):
     storage.commit([Create(HullRow(2, "gone", "", 0.0)), Delete(2)])
     whole = points(100_000)
-    steps = storage.snapshot(1, 3, whole, {})
+    steps = storage.snapshot(1, Kept(3, Contents(whole)))
     storage.commit([next(steps)])
     disk.fail("COMMIT", failure(sqlite3.SQLITE_IOERR_FSYNC))
     with pytest.raises(StorageError, match="injected"):
@@ -237,7 +237,7 @@ def test_settling_spares_a_snapshot_that_is_under_way(storage, disk):
         storage.commit([step])
     for step in steps:
         storage.commit([step])
-    assert storage.read(1).points.tobytes() == whole.tobytes()
+    assert storage.read(1).contents.points.tobytes() == whole.tobytes()
 
 
 def test_reading_and_writing_need_no_new_descriptors(storage):
@@ -258,7 +258,7 @@ def test_reading_and_writing_need_no_new_descriptors(storage):
             thread.join()
         assert results == [3] * 16
         append(storage, 4, 6)
-        for step in storage.snapshot(1, 6, points(10), {}):
+        for step in storage.snapshot(1, Kept(6, Contents(points(10)))):
             storage.commit([step])
         storage.sync()
         storage.checkpoint()
@@ -335,7 +335,7 @@ def test_a_folder_is_closed_while_an_outcome_is_unknown(folder, disk):
 
 def test_values_that_no_row_can_hold_change_nothing(storage):
     with pytest.raises(NotCommittedError, match="nothing was written"):
-        storage.commit([Create(HullRow(2, "b", "", 0.0, max_points=2**63))])
+        storage.commit([Create(HullRow(2, "b", "", 0.0, HullSettings(max_points=2**63)))])
     append(storage, 4, 5)
     same(storage.read(1).records, records(1, 5))
 

@@ -22,7 +22,7 @@ from folders import (
 )
 
 from dynhull_server.state.hull_state import replayed
-from dynhull_server.state.records import Append, Delete, HullRow
+from dynhull_server.state.records import Append, Delete, HullRow, HullSettings
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
 from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES, HEADER_BYTES
@@ -60,7 +60,7 @@ def test_one_server_at_a_time(folder):
 def test_a_start_that_is_refused_lets_others_in(folder):
     stopped(folder)
     whole = (folder / DATABASE).read_bytes()
-    flip(folder / DATABASE, record(4).inserts.tobytes())
+    flip(folder / DATABASE, record(4).rows.inserts.tobytes())
     for _ in range(2):
         with pytest.raises(DamagedError):
             opened(folder)
@@ -94,7 +94,7 @@ def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
         storage, contents = opened(folder)
         assert contents.hulls == [
             HullRow(1, "fleet", "00aa00aa00aa00aa", 1700000000.5),
-            HullRow(2, "zones/é", "00bb00bb00bb00bb", 1700000001.0, 500),
+            HullRow(2, "zones/é", "00bb00bb00bb00bb", 1700000001.0, HullSettings(max_points=500)),
         ]
         assert (contents.next_number, contents.notes) == (3, [])
         for number, (revision, count) in ((1, fleet), (2, zones)):
@@ -147,7 +147,7 @@ def test_what_a_snapshot_makes_superfluous_is_dropped(folder):
 @pytest.mark.parametrize("damaged", [1, 5])
 def test_damage_in_the_middle_is_refused(folder, damaged):
     stopped(folder)
-    flip(folder / DATABASE, record(damaged).inserts.tobytes())
+    flip(folder / DATABASE, record(damaged).rows.inserts.tobytes())
     words = f"hull 'fleet': revisions {damaged} to {damaged} are damaged, and later ones exist: restore a backup"
     with pytest.raises(DamagedError, match=words):
         opened(folder)
@@ -182,7 +182,7 @@ def test_a_missing_hull_is_refused(folder):
 
 def test_a_damaged_end_is_cut_at_the_last_whole_batch(folder):
     stopped(folder)
-    flip(folder / DATABASE, record(9).inserts.tobytes())
+    flip(folder / DATABASE, record(9).rows.inserts.tobytes())
     storage, contents = opened(folder)
     assert contents.notes == [
         (
@@ -205,7 +205,7 @@ def test_a_damaged_end_that_a_snapshot_reaches_into_is_cut_at_the_snapshot(folde
     storage.commit([Append(1, records(4, 8))])
     snapshot(storage, 6)
     storage.close()
-    flip(folder / DATABASE, record(8).inserts.tobytes())
+    flip(folder / DATABASE, record(8).rows.inserts.tobytes())
     storage, contents = opened(folder)
     assert "revisions 4 to 8 are damaged: the hull was cut back to revision 6" in contents.notes[0]
     assert storage.read(1).last_revision == 6
@@ -223,7 +223,7 @@ def test_a_damaged_snapshot_gives_way_to_the_one_before(folder):
     for revision in (10, 20, 30):
         snapshot(storage, revision)
         append(storage, revision + 1, revision + 10)
-    newest = storage.read(1, 30).points
+    newest = storage.read(1, 30).contents.points
     storage.close()
     flip(folder / DATABASE, newest.tobytes())
     storage, contents = opened(folder)
@@ -273,7 +273,7 @@ def test_a_killed_servers_folder_is_whole(crash):
 
 def test_a_log_cut_short_loses_the_last_commit_only(crash):
     log = crash / LOG
-    length = log.read_bytes().rindex(record(9).inserts.tobytes()) + 10
+    length = log.read_bytes().rindex(record(9).rows.inserts.tobytes()) + 10
     log.write_bytes(log.read_bytes()[:length])
     storage, contents = opened(crash)
     same(storage.read(1).records, records(1, 8))
@@ -283,7 +283,7 @@ def test_a_log_cut_short_loses_the_last_commit_only(crash):
 
 
 def test_damage_in_the_middle_of_the_log_is_refused(crash):
-    flip(crash / LOG, record(4).inserts.tobytes())
+    flip(crash / LOG, record(4).rows.inserts.tobytes())
     with pytest.raises(DamagedError, match=r"frame .* is damaged, and intact commits follow it: restore a backup"):
         opened(crash)
 
@@ -357,7 +357,7 @@ def test_after_a_power_failure_unsynced_commits_are_dropped_with_a_note(folder, 
     crash = killed(folder, tmp_path / "crash")
     storage.close()
     content = (crash / LOG).read_bytes()
-    start = HEADER_BYTES + (content.index(record(4).inserts.tobytes()) - HEADER_BYTES) // FRAME_BYTES * FRAME_BYTES
+    start = HEADER_BYTES + (content.index(record(4).rows.inserts.tobytes()) - HEADER_BYTES) // FRAME_BYTES * FRAME_BYTES
     hole = bytes(FRAME_BYTES)
     (crash / LOG).write_bytes(content[:start] + hole + content[start + FRAME_BYTES :])
     storage, contents = opened(crash)

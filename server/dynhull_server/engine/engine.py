@@ -34,6 +34,7 @@ from ..state.events import (
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
+from ..state.records import DEFAULT, HullSettings
 from ..state.trip import Trip
 from ..storage.port import Contents, Progress, Storage
 from .batch_stream import BatchStream
@@ -104,9 +105,9 @@ class Engine:
         progress(0, len(contents.hulls))
         for done, row in enumerate(contents.hulls, start=1):
             kept = await self.run(self.disk, partial(self._storage.read, row.number))
-            load = partial(HullState, self._limits, row.max_points, kept, now=clock.monotonic())
+            load = partial(HullState, self._limits, row.settings, kept, now=clock.monotonic())
             state = await self.run(self._turns, load)
-            unsaved = sum(len(record.inserts) + len(record.deletes) for record in kept.records)
+            unsaved = sum(len(record.rows) for record in kept.records)
             self._core.restore(row, state, unsaved)
             progress(done, len(contents.hulls))
         self._commits = GroupCommit(
@@ -185,9 +186,9 @@ class Engine:
                 hulls.append(self.get(name))
         return hulls, False
 
-    async def create(self, name: str, max_points: int = 0) -> LiveHull:
+    async def create(self, name: str, settings: HullSettings = DEFAULT) -> LiveHull:
         """Create an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
-        hull: Hull = await self.ask(CreateHull(Waiter(), name, self._birth(), max_points))
+        hull: Hull = await self.ask(CreateHull(Waiter(), name, self._birth(), settings))
         return self._live_hull(hull)
 
     async def delete(self, name: str) -> None:

@@ -5,6 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..state.errors import HullNotFoundError
+from ..state.hull_state import HullState
 from ..storage.port import Storage
 from .threads import Clock
 
@@ -62,10 +63,8 @@ class Housekeeping:
 
     async def _snapshot(self, hull: "LiveHull") -> None:
         unsaved = hull.unsaved
-        counts, (points, producers) = await hull.read(
-            lambda state: (state.hull.points(), state.producers()), rows=hull.counts.points
-        )
-        await self._carry_out(self._storage.snapshot(hull.number, counts.revision, points, producers))
+        _, kept = await hull.read(HullState.kept, rows=hull.counts.points)
+        await self._carry_out(self._storage.snapshot(hull.number, kept))
         hull.saved(unsaved)
 
     async def _carry_out(self, steps: Iterator[Any]) -> None:

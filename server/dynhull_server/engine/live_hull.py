@@ -17,6 +17,7 @@ from ..state.errors import HullEmptyError, HullNotFoundError, HullReplacedError,
 from ..state.events import ReadHull
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
+from ..state.records import HullSettings
 from ..state.sample import sample
 from .difference import Differences
 from .recalls import Recalls
@@ -68,9 +69,9 @@ class LiveHull:
         return datetime.fromtimestamp(self._hull.row.created, UTC)
 
     @property
-    def max_points(self) -> int:
-        """The limit on its points set at creation, 0 for the server's."""
-        return self._hull.row.max_points
+    def settings(self) -> HullSettings:
+        """Its settings."""
+        return self._hull.row.settings
 
     @property
     def counts(self) -> Counts:

@@ -4,7 +4,7 @@ import asyncio
 from collections import defaultdict
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -145,7 +145,7 @@ class Recalls:
 
 def _vertices_at(kept: Kept, revisions: list[int]) -> dict[int, Points]:
     """The vertices at the first of some revisions, as many as there is room for."""
-    live = replayed(Kept(kept.revision, kept.points, {}, []))
+    live = replayed(replace(kept, records=[]))
     found: dict[int, Points] = {}
     position = total = 0
     for revision in revisions:

@@ -12,6 +12,7 @@ from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..state.batch import Batch
+from ..state.records import HullSettings
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
@@ -68,13 +69,13 @@ def decode_sequence(producer: str, sequence: int) -> int:
     return sequence
 
 
-def decode_max_points(config: hull_pb2.HullConfig) -> int:
-    """The limit on the points of a new hull; there is only one identity so far."""
+def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
+    """The settings of a new hull."""
     if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
         raise InvalidFieldError("config.identity", config.identity, "not an identity that this server supports")
     if config.max_points > LARGEST_INTEGER:
         raise InvalidFieldError("config.max_points", config.max_points, f"must be at most {LARGEST_INTEGER}")
-    return int(config.max_points)
+    return HullSettings(max_points=config.max_points)
 
 
 def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:

@@ -27,7 +27,7 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     """A hull with its counts at one revision."""
     message = hull_pb2.Hull(
         name=hull.name,
-        config=hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_MULTISET, max_points=hull.max_points),
+        config=hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_MULTISET, max_points=hull.settings.max_points),
         revision=counts.revision,
         point_count=counts.points,
         distinct_point_count=counts.distinct,

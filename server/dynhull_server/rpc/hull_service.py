@@ -42,7 +42,7 @@ class HullService:
     async def CreateHull(self, request: pb.CreateHullRequest, call: Call) -> pb.CreateHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        hull = await self._engine.create(name, decode.decode_max_points(request.config))
+        hull = await self._engine.create(name, decode.decode_settings(request.config))
         return pb.CreateHullResponse(hull=encode.encode_hull(hull, hull.counts))
 
     async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:

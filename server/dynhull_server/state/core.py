@@ -399,7 +399,7 @@ class Core:
         hull = trip.before or trip.after
         assert hull is not None  # a trip without a hull changes nothing
         row = hull.row
-        load = partial(HullState, self._limits, row.max_points, now=self._now)
+        load = partial(HullState, self._limits, row.settings, now=self._now)
         effects.append(Examine(trip, row.number, trip.unknown, load))
 
     def _under_way(self, trip: Trip) -> _Queue | None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from .records import Change, Kept
+from .records import DEFAULT, Change, HullSettings, Kept
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,7 +55,7 @@ class CreateHull(Request):
 
     name: str
     birth: Birth
-    max_points: int = 0
+    settings: HullSettings = DEFAULT
 
 
 @dataclass(slots=True, eq=False)

@@ -14,7 +14,7 @@ from .errors import LimitExceededError, PointMissingError
 from .history import History
 from .limits import Limits
 from .producers import Producers
-from .records import Kept, Record
+from .records import Contents, HullSettings, Kept, PointRows, Record
 
 if TYPE_CHECKING:
     from .events import WriteBatch
@@ -41,8 +41,8 @@ class HullState:
         torn: whether a batch has been applied in part, because memory ran out in the middle of it.
     """
 
-    def __init__(self, limits: Limits, max_points: int, kept: Kept, now: float) -> None:
-        self._most_points = min(max_points or limits.max_points, limits.max_points)
+    def __init__(self, limits: Limits, settings: HullSettings, kept: Kept, now: float) -> None:
+        self._most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self.torn = False
         self.hull = replayed(kept)
         self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct)
@@ -83,10 +83,8 @@ class HullState:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
         self.counts = Counts(applied.revision, applied.points, self.hull.distinct)
         if records is not None:
-            lenient = applied.missing > 0
-            records.append(
-                Record(applied.revision, batch.inserts, batch.deletes, write.producer, write.sequence, lenient)
-            )
+            rows = PointRows(batch.inserts, batch.deletes, lenient=applied.missing > 0)
+            records.append(Record(applied.revision, rows, write.producer, write.sequence))
         self.torn = False
         return applied
 
@@ -107,17 +105,14 @@ class HullState:
         """The last sequence number applied of a producer, 0 where there is none."""
         return self._producers.last(producer)
 
-    def producers(self) -> dict[str, int]:
-        """The last sequence number of each producer."""
-        return self._producers.state()
-
-
-EMPTY = Kept(0, np.empty((0, 2)), {}, [])
+    def kept(self) -> Kept:
+        """The hull at this revision, for a snapshot. O(n)."""
+        return Kept(self.counts.revision, Contents(self.hull.points()), self._producers.state())
 
 
 def replayed(kept: Kept) -> DynamicHull:
     """The hull of a snapshot and the batches after it. O(n log n)."""
-    hull = DynamicHull(kept.points)
+    hull = DynamicHull(kept.contents.points)
     replay(hull, kept.records)
     return hull
 
@@ -125,8 +120,8 @@ def replayed(kept: Kept) -> DynamicHull:
 def replay(hull: DynamicHull, records: Iterable[Record]) -> None:
     """Apply recorded batches, many at a time."""
     for group in _together(records):
-        inserts = np.concatenate([record.inserts for record in group])
-        deletes = np.concatenate([record.deletes for record in group])
+        inserts = np.concatenate([rows.inserts for rows in group])
+        deletes = np.concatenate([rows.deletes for rows in group])
         ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
         hull.apply(ops, np.concatenate([inserts, deletes]), missing="ignore" if group[0].lenient else "raise")
 
@@ -139,15 +134,17 @@ def _last_sequences(kept: Kept) -> dict[str, int]:
     return last
 
 
-def _together(records: Iterable[Record]) -> Iterable[list[Record]]:
-    """Groups of records to apply as one set. A lenient one stays alone: its deletes depend on the points before it."""
-    group: list[Record] = []
-    rows = 0
+def _together(records: Iterable[Record]) -> Iterable[list[PointRows]]:
+    """Groups of batches to apply as one set. A lenient one stays alone: its deletes depend on the points before it."""
+    group: list[PointRows] = []
+    size = 0
     for record in records:
-        if group and (record.lenient or group[-1].lenient or rows >= REPLAYED_TOGETHER):
+        rows = record.rows
+        assert isinstance(rows, PointRows)
+        if group and (rows.lenient or group[-1].lenient or size >= REPLAYED_TOGETHER):
             yield group
-            group, rows = [], 0
-        group.append(record)
-        rows += len(record.inserts) + len(record.deletes)
+            group, size = [], 0
+        group.append(rows)
+        size += len(rows)
     if group:
         yield group

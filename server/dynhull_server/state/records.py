@@ -1,8 +1,65 @@
 """The data that the storage keeps: hulls, and the batches applied to them."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from dynhull.arrays import Points
+
+if TYPE_CHECKING:
+    from dynhull.keys import PackedKeys
+
+    Keys: TypeAlias = PackedKeys | npt.NDArray[np.uint64]
+
+Identity = Literal["multiset", "str", "int"]
+Clock = Literal["server", "data"]
+Condition = Literal["absent", "present"]
+Times = npt.NDArray[np.int64]  # microseconds since 1970
+NO_TIME = -(2**63)
+FOREVER = 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A sliding window over the points of a hull.
+
+    Attributes:
+        max_age: the age in microseconds at which points leave, 0 for none.
+        max_points: the number of points beyond which the oldest leave, 0 for none.
+        clock: what drives the clock of the hull: the server's clock, or the greatest event time.
+        max_skew: microseconds by which an event time may be ahead of the server's clock, None for any number.
+        clamps: whether event times further ahead are reduced to that, rather than refused.
+    """
+
+    max_age: int = 0
+    max_points: int = 0
+    clock: Clock = "server"
+    max_skew: int | None = None
+    clamps: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class HullSettings:
+    """The settings of a hull, fixed at its creation.
+
+    Attributes:
+        identity: what identifies a point: its coordinates ("multiset"), a string or an integer.
+        max_points: the limit on its points, 0 for the server's own.
+        window: the window over its points, or None.
+        by_event_time: whether a position with an earlier event time than the stored one changes nothing.
+    """
+
+    identity: Identity = "multiset"
+    max_points: int = 0
+    window: Window | None = None
+    by_event_time: bool = False
+
+
+DEFAULT = HullSettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,35 +71,96 @@ class HullRow:
         name: its name.
         uid: distinguishes it from other hulls of its name.
         created: seconds since 1970.
-        max_points: the limit on its points, 0 for the server's own.
+        settings: its settings.
     """
 
     number: int
     name: str
     uid: str
     created: float
-    max_points: int = 0
+    settings: HullSettings = DEFAULT
+
+
+@dataclass(slots=True)
+class PointRows:
+    """A change of the points of a multiset.
+
+    Attributes:
+        inserts: (n, 2) points inserted.
+        deletes: (m, 2) points deleted.
+        lenient: whether some of the deletes were ignored because the point was missing.
+        times: (n,) times of the inserts, in a hull with a window.
+    """
+
+    inserts: Points
+    deletes: Points
+    lenient: bool = False
+    times: Times | None = None
+
+    def __len__(self) -> int:
+        return len(self.inserts) + len(self.deletes)
+
+
+@dataclass(slots=True)
+class KeyRows:
+    """A change of the positions of keys. Applied again to the same state, it has the same effect.
+
+    Attributes:
+        keys: n keys put.
+        points: (n, 2) their positions.
+        times: (n,) their times, or None.
+        deadlines: (n,) the times at which they leave, or None; FOREVER for a key without one.
+        condition: which keys are put: all, or only those that are absent or present.
+        removes: keys removed; missing ones are ignored.
+    """
+
+    keys: Keys
+    points: Points
+    removes: Keys
+    times: Times | None = None
+    deadlines: Times | None = None
+    condition: Condition | None = None
+
+    def __len__(self) -> int:
+        return len(self.keys) + len(self.removes)
+
+
+@dataclass(frozen=True, slots=True)
+class Expiry:
+    """The removal of all points with a time of `until` or earlier, and of keys whose deadline has come.
+
+    Attributes:
+        until: microseconds since 1970; None where only deadlines count.
+        points: the number of points removed.
+    """
+
+    until: int | None
+    points: int
+
+    def __len__(self) -> int:
+        return self.points
+
+
+Rows = PointRows | KeyRows | Expiry
 
 
 @dataclass(slots=True)
 class Record:
-    """One batch, as applied.
+    """One revision of a hull.
 
     Attributes:
-        revision: the revision after it.
-        inserts: (n, 2) points inserted.
-        deletes: (m, 2) points deleted.
-        producer: the producer that numbered it; empty where it has no number.
+        revision: the revision.
+        rows: what it changed.
+        producer: the producer that numbered the batch; empty where it has no number.
         sequence: its number.
-        lenient: whether some of the deletes were ignored because the point was missing.
+        clock: the hull's clock after it, in microseconds since 1970; None for a hull without a clock.
     """
 
     revision: int
-    inserts: Points
-    deletes: Points
+    rows: Rows
     producer: str = ""
     sequence: int = 0
-    lenient: bool = False
+    clock: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,20 +189,43 @@ Change = Create | Append | Delete
 
 
 @dataclass(slots=True)
+class Contents:
+    """The points of a hull.
+
+    Attributes:
+        points: (n, 2) points, with multiplicity.
+        keys: the key of each point, ascending; None for a multiset.
+        times: (n,) the time of each point; None for a hull without times, NO_TIME for a point without one.
+        deadlines: (n,) the time at which each point leaves; None for a hull without deadlines, FOREVER for a point that
+            has none.
+    """
+
+    points: Points = field(default_factory=lambda: np.empty((0, 2)))
+    keys: Keys | None = None
+    times: Times | None = None
+    deadlines: Times | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+@dataclass(slots=True)
 class Kept:
     """One hull as stored: a snapshot, and the batches after it.
 
     Attributes:
-        revision: the revision of the points.
-        points: (n, 2) points of the snapshot, with multiplicity.
+        revision: the revision of the contents.
+        contents: the points at that revision.
         producers: the last sequence number of each producer at that revision.
         records: the batches after it, in order.
+        clock: the hull's clock at that revision, in microseconds since 1970; None for a hull without a clock.
     """
 
-    revision: int
-    points: Points
-    producers: dict[str, int]
-    records: list[Record]
+    revision: int = 0
+    contents: Contents = field(default_factory=Contents)
+    producers: dict[str, int] = field(default_factory=dict)
+    records: list[Record] = field(default_factory=list)
+    clock: int | None = None
 
     @property
     def last_revision(self) -> int:

@@ -6,9 +6,9 @@ from .batch import Applied
 from .errors import HullExistsError, HullNotFoundError
 from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch
 from .hull import Hull
-from .hull_state import EMPTY, HullState
+from .hull_state import HullState
 from .limits import Limits
-from .records import Append, Change, Create, Delete, HullRow, Record
+from .records import DEFAULT, Append, Change, Create, Delete, HullRow, Kept, Record
 
 
 @dataclass(slots=True)
@@ -150,9 +150,9 @@ class Trip:
         if place.refusal is not None:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
-        most = request.max_points if type(request) is CreateHull else 0
-        row = HullRow(place.number, self.name, birth.uid, birth.created, most)
-        return Hull(row, HullState(place.limits, most, EMPTY, self._now))
+        settings = request.settings if type(request) is CreateHull else DEFAULT
+        row = HullRow(place.number, self.name, birth.uid, birth.created, settings)
+        return Hull(row, HullState(place.limits, settings, Kept(), self._now))
 
 
 def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:

@@ -1,12 +1,8 @@
 """A storage in memory: for servers without a data folder, and as the simplest implementation of the port."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Lock
-
-import numpy as np
-
-from dynhull.arrays import Points
 
 from ..state.records import Append, Change, Create, Delete, HullRow, Kept, Record
 from .port import NEWEST, Contents, DamagedError, NotCommittedError, Progress, Step
@@ -19,9 +15,7 @@ class _Snapshot:
     """A step: a whole snapshot."""
 
     number: int
-    revision: int
-    points: Points
-    producers: dict[str, int]
+    kept: Kept
 
 
 @dataclass(slots=True)
@@ -76,23 +70,24 @@ class MemoryStorage:
         if until < self.oldest(number):
             raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
         with self._turn:
-            base = next((each for each in reversed(hull.snapshots) if each.revision <= until), None)
+            base = next((each for each in reversed(hull.snapshots) if each.kept.revision <= until), None)
             if base is None:
-                base = _Snapshot(number, 0, np.empty((0, 2)), {})
-            records = [record for record in hull.records if base.revision < record.revision <= until]
-        return Kept(base.revision, base.points, dict(base.producers), records)
+                base = _Snapshot(number, Kept())
+            revision = base.kept.revision
+            records = [record for record in hull.records if revision < record.revision <= until]
+        return replace(base.kept, producers=dict(base.kept.producers), records=records)
 
     def oldest(self, number: int) -> int:
         """The oldest revision that `read` can return."""
         hull = self._hulls[number]
         if not self.keeps:
             return NEWEST
-        return hull.snapshots[0].revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
+        return hull.snapshots[0].kept.revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
 
-    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
         """One step."""
         if self.keeps:
-            yield _Snapshot(number, revision, points, dict(producers))
+            yield _Snapshot(number, kept)
 
     def sweep(self) -> Iterator[Step]:
         """No steps: deletes leave nothing behind."""
@@ -159,8 +154,8 @@ class MemoryStorage:
         hull = self._hulls.get(snapshot.number)
         if hull is None:  # deleted meanwhile
             return
-        snapshots = sorted([*hull.snapshots, snapshot], key=lambda each: each.revision)
+        snapshots = sorted([*hull.snapshots, snapshot], key=lambda each: each.kept.revision)
         hull.snapshots = snapshots[-KEPT_SNAPSHOTS:]
         if len(hull.snapshots) == KEPT_SNAPSHOTS:
-            oldest = hull.snapshots[0].revision
+            oldest = hull.snapshots[0].kept.revision
             hull.records = [record for record in hull.records if record.revision > oldest]

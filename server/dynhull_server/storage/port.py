@@ -4,11 +4,9 @@ Calls block until they are complete. One thread commits; any thread may read at 
 the engine calls `sync` and `checkpoint`, and commits the steps of `snapshot` and `sweep`.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
-
-from dynhull.arrays import Points
 
 from ..state.records import Change, HullRow, Kept
 
@@ -117,12 +115,12 @@ class Storage(Protocol):
     def oldest(self, number: int) -> int:
         """The oldest revision of a hull that `read` can return; KeyError if no hull has that number."""
 
-    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator["Step"]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator["Step"]:
         """Write a snapshot, then drop the rows it supersedes: commit each step before the next is taken.
 
-        A snapshot is valid from its last writing step on. Steps are small, so that other commits wait only briefly for
-        them. To abandon a snapshot, close its iterator; `sweep` drops the rest of it. Snapshots of several hulls may be
-        written at the same time.
+        The records of `kept` are not written. A snapshot is valid from its last writing step on. Steps are small, so
+        that other commits wait only briefly for them. To abandon a snapshot, close its iterator; `sweep` drops the rest
+        of it. Snapshots of several hulls may be written at the same time.
         """
 
     def sweep(self) -> Iterator["Step"]:

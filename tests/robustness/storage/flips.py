@@ -24,7 +24,17 @@ from pathlib import Path
 
 import numpy as np
 
-from dynhull_server.state.records import Append, Create, Delete, HullRow, Kept, Record
+from dynhull_server.state.records import (
+    Append,
+    Contents,
+    Create,
+    Delete,
+    HullRow,
+    HullSettings,
+    Kept,
+    PointRows,
+    Record,
+)
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.sqlite.folder import DATABASE
@@ -53,11 +63,19 @@ class Flip:
     bit: int
 
 
+def hull_row(number: int) -> HullRow:
+    """A hull of the folder."""
+    settings = HullSettings(max_points=number * 100)
+    return HullRow(number, f"hull {number}", f"{number:016x}", 1.7e9 + number, settings)
+
+
 def record(number: int, revision: int, points: int = 3) -> Record:
     """The batch that made a revision of a hull: always the same."""
     rng = np.random.default_rng([number, revision])
     deletes = rng.random((revision % 3, 2))
-    return Record(revision, rng.random((points, 2)), deletes, f"writer {revision % 4}", revision, revision % 5 == 0)
+    return Record(
+        revision, PointRows(rng.random((points, 2)), deletes, revision % 5 == 0), f"writer {revision % 4}", revision
+    )
 
 
 def no_progress(done: int, total: int) -> None:
@@ -74,7 +92,7 @@ class Builder:
 
     def create(self, number: int) -> None:
         """A hull."""
-        row = HullRow(number, f"hull {number}", f"{number:016x}", 1.7e9 + number, number * 100)
+        row = hull_row(number)
         self.storage.commit([Create(row)])
         self.acknowledged[number] = []
 
@@ -91,7 +109,9 @@ class Builder:
     def snapshot(self, number: int, points: int) -> None:
         """As of now."""
         revision = len(self.acknowledged[number])
-        for step in self.storage.snapshot(number, revision, snapshot_points(number, revision, points), {"a": revision}):
+        for step in self.storage.snapshot(
+            number, Kept(revision, Contents(snapshot_points(number, revision, points)), {"a": revision})
+        ):
             self.storage.commit([step])
 
     def delete(self, number: int, *, sweep: bool = True) -> None:
@@ -231,7 +251,7 @@ def difference(storage: SQLiteStorage, acknowledged: Acknowledged) -> str:
     """How the storage differs from what was acknowledged; empty where it does not."""
     for number, records in acknowledged.items():
         row = storage.row(number)
-        if row is None or row != HullRow(number, f"hull {number}", f"{number:016x}", 1.7e9 + number, number * 100):
+        if row != hull_row(number):
             return f"hull {number} is {row}"
         kept = storage.read(number)
         if not same(number, kept, records):
@@ -241,10 +261,10 @@ def difference(storage: SQLiteStorage, acknowledged: Acknowledged) -> str:
 
 def same(number: int, kept: Kept, records: list[Record]) -> bool:
     """Whether a hull is as it was acknowledged."""
-    points = snapshot_points(number, kept.revision, len(kept.points))
+    points = snapshot_points(number, kept.revision, len(kept.contents.points))
     return (
         kept.last_revision == len(records)
-        and np.array_equal(kept.points, points)
+        and np.array_equal(kept.contents.points, points)
         and kept.producers == ({"a": kept.revision} if kept.revision else {})
         and all(map(equal, kept.records, records[kept.revision :]))
     )
@@ -253,10 +273,10 @@ def same(number: int, kept: Kept, records: list[Record]) -> bool:
 def equal(one: Record, other: Record) -> bool:
     """Field by field."""
     return (
-        (one.revision, one.producer, one.sequence, one.lenient)
-        == (other.revision, other.producer, other.sequence, other.lenient)
-        and np.array_equal(one.inserts, other.inserts)
-        and np.array_equal(one.deletes, other.deletes)
+        (one.revision, one.producer, one.sequence, one.rows.lenient)
+        == (other.revision, other.producer, other.sequence, other.rows.lenient)
+        and np.array_equal(one.rows.inserts, other.rows.inserts)
+        and np.array_equal(one.rows.deletes, other.rows.deletes)
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dynhull.arrays import Points
 
-from ...state.records import HullRow, Record
+from ...state.records import HullRow, PointRows, Record
 
 # The numbers of inserts and of deletes, the sequence number, the length of the producer's name, whether lenient.
 HEADER = struct.Struct("<IIQHB")
@@ -20,9 +20,11 @@ def encode(records: Iterable[Record]) -> bytes:
     parts = []
     for record in records:
         producer = record.producer.encode()
-        sizes = len(record.inserts), len(record.deletes)
-        parts.append(HEADER.pack(*sizes, record.sequence, len(producer), record.lenient))
-        parts += [producer, point_bytes(record.inserts), point_bytes(record.deletes)]
+        rows = record.rows
+        assert isinstance(rows, PointRows)
+        sizes = len(rows.inserts), len(rows.deletes)
+        parts.append(HEADER.pack(*sizes, record.sequence, len(producer), rows.lenient))
+        parts += [producer, point_bytes(rows.inserts), point_bytes(rows.deletes)]
     return b"".join(parts)
 
 
@@ -40,7 +42,7 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
             raise ValueError(f"a record is cut short at byte {position}")
         producer = payload[position + HEADER.size : start].decode()
         inserted, deleted = points_from(payload[start:middle]), points_from(payload[middle:end])
-        yield Record(revision, inserted, deleted, producer, sequence, bool(lenient))
+        yield Record(revision, PointRows(inserted, deleted, bool(lenient)), producer, sequence)
         position, revision = end, revision + 1
 
 
@@ -57,7 +59,7 @@ def weight(stored: int, *keys: int) -> int:
 def hull_checksum(row: HullRow) -> int:
     """CRC-32 of the row of a hull."""
     text = f"{row.name}\n{row.uid}".encode()
-    return checksum(text + struct.pack("<d", row.created), row.number, row.max_points)
+    return checksum(text + struct.pack("<d", row.created), row.number, row.settings.max_points)
 
 
 def point_bytes(points: Points) -> bytes:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...state.records import HullRow
+from ...state.records import HullRow, HullSettings
 from ..port import DamagedError, FormatError, Progress
 from .encoding import checksum, hull_checksum, weight
 from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
@@ -337,17 +337,19 @@ class _Examination:
 def hull_rows(connection: sqlite3.Connection, version: int) -> Iterator[tuple[HullRow, bool]]:
     """The hulls, and whether each row is intact."""
     if version == FORMAT:
-        for *values, stored in connection.execute("SELECT id, name, uid, created, max_points, checksum FROM hulls"):
-            row = HullRow(*values)
+        rows = connection.execute("SELECT id, name, uid, created, max_points, checksum FROM hulls")
+        for number, name, uid, created, most, stored in rows:
+            row = HullRow(number, name, uid, created, HullSettings(max_points=most))
             try:
                 yield row, hull_checksum(row) == stored
             except (AttributeError, TypeError, struct.error):
-                yield HullRow(values[0], str(row.name), "", 0.0), False
+                yield HullRow(number, str(row.name), "", 0.0), False
         return
     for number, name, created, config in connection.execute("SELECT id, name, created, config FROM hulls"):
         try:
-            settings = json.loads(config)
-            yield HullRow(number, name, settings["uid"], created, settings["config"]["max_points"]), True
+            found = json.loads(config)
+            settings = HullSettings(max_points=found["config"]["max_points"])
+            yield HullRow(number, name, found["uid"], created, settings), True
         except (ValueError, TypeError, KeyError):
             yield HullRow(number, str(name), "", 0.0), False
 

@@ -234,7 +234,9 @@ class Group:
         self._now[row.number] = _Now(rows, 0, stored, 0)
         next_number = max(self._totals.next_number, row.number + 1)
         self._totals = self._totals.plus(1, 0, stored)._replace(next_number=next_number)
-        self.statements.append((INSERT_HULL, (row.number, row.name, row.uid, row.created, row.max_points, stored)))
+        self.statements.append(
+            (INSERT_HULL, (row.number, row.name, row.uid, row.created, row.settings.max_points, stored))
+        )
         self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
 
     def _append(self, change: Append) -> None:

@@ -30,7 +30,8 @@ def migrate(connection: sqlite3.Connection, ledger: Ledger) -> None:
         connection.execute(TABLES[table])
     rows = (hull.row for hull in ledger.hulls.values())
     connection.executemany(
-        INSERT_HULL, ((row.number, row.name, row.uid, row.created, row.max_points, hull_checksum(row)) for row in rows)
+        INSERT_HULL,
+        ((row.number, row.name, row.uid, row.created, row.settings.max_points, hull_checksum(row)) for row in rows),
     )
     renew_totals(connection, ledger.totals)
     stamp(connection)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...state.records import Kept, Record
+from ...state.records import Contents, Kept, Record
 from ..port import DamagedError
 from .encoding import checksum, decode, points_from
 from .ledger import HullRows, Snapshot
@@ -124,7 +124,7 @@ def _newest_snapshot(connection: sqlite3.Connection, hull: HullRows, until: int)
             kept = _snapshot(connection, hull.row.number, snapshot)
             if kept is not None:
                 return kept
-    return Kept(0, np.empty((0, 2)), {}, [])
+    return Kept()
 
 
 def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -> Kept | None:
@@ -142,7 +142,7 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
         parts.append(points_from(data))
     if len(parts) != len(snapshot.chunks) + 1:
         return None
-    return Kept(snapshot.revision, np.concatenate(parts), json.loads(row[0] or "{}"), [])
+    return Kept(snapshot.revision, Contents(np.concatenate(parts)), json.loads(row[0] or "{}"))
 
 
 def _batches(connection: sqlite3.Connection, hull: HullRows, ids: "array[int]") -> Iterable[Iterable[Record]]:

@@ -12,12 +12,10 @@ durable, reading shows the outcome.
 import json
 import sqlite3
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
-
-from dynhull.arrays import Points
 
 from ...state.errors import words
 from ...state.records import Change, HullRow, Kept
@@ -251,16 +249,17 @@ class SQLiteStorage:
 
     # Snapshots, and the removal of superseded rows
 
-    def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
         """Write a snapshot, then drop the rows it supersedes."""
+        points = kept.contents.points
         starts = range(0, len(points), CHUNK_POINTS)
         ids = [next(self._ledger.chunk_ids) for _ in starts]
-        snapshot = Snapshot(next(self._ledger.snapshot_ids), revision, array("q", ids))
+        snapshot = Snapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
         self._under_way[snapshot.id] = set(ids)
         try:
             for i, (place, start) in enumerate(zip(ids, starts, strict=True)):
                 yield Chunk(place, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
-            yield Finish(number, snapshot, json.dumps(dict(producers)).encode())
+            yield Finish(number, snapshot, json.dumps(kept.producers).encode())
         finally:
             del self._under_way[snapshot.id]
         yield from self._trim(number)
