@@ -8,56 +8,17 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
-from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any, cast
 
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from .chunks import Chunks
+from .options import STANDARD_INPUT, Format, Options
 
-STANDARD_INPUT = "-"
 DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
-
-
-class Format(StrEnum):
-    """The formats."""
-
-    CSV = "csv"
-    TSV = "tsv"
-    PARQUET = "parquet"
-    JSON = "json"
-    GEOJSON = "geojson"
-    NDJSON = "ndjson"
-
-
 SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """How to read the input; None for what is to be found out. The fields are the options of the command.
-
-    Attributes:
-        x: the column or member of x.
-        y: the column or member of y.
-        delimiter: the character between columns of CSV.
-        decimal: the decimal mark of CSV.
-        header: whether the first row of CSV names the columns.
-        encoding: the encoding of CSV.
-        vertices: whether to take the vertices of geometries that are no single points.
-    """
-
-    x: str | None = None
-    y: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
-    header: bool | None = None
-    encoding: str | None = None
-    vertices: bool = False
-
-
 TABLES = {Format.CSV, Format.TSV}
 APPLIES_TO = {
     "x": set(Format) - {Format.GEOJSON},
