@@ -1,4 +1,4 @@
-"""`dynhull phases` and `dynhull frontier`: the lower and the upper side of a hull, with a meaning."""
+"""`dynhull phases` and `dynhull frontier`: a hull as a phase diagram or as an efficient frontier."""
 
 import math
 from itertools import zip_longest

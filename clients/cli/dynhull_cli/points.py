@@ -1,4 +1,4 @@
-"""`dynhull insert` and `dynhull remove`: a few points into a hull or out of it. Files are for `dynhull load`."""
+"""`dynhull insert` and `dynhull remove`: add or take away a few points. `dynhull load` reads files."""
 
 from typing import TYPE_CHECKING, Annotated
 

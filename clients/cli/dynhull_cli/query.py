@@ -18,7 +18,7 @@ SIDES = {1: "inside", 0: "boundary", -1: "outside"}
 
 
 class Question(StrEnum):
-    """The questions."""
+    """The questions of `dynhull query`."""
 
     LOCATE = "locate"
     COUNT = "count"

@@ -19,7 +19,7 @@ EXAMPLE += [(14, 2), (3, 5), (8, 9.5), (1, 6), (11, 4), (6, 0)]
 
 
 class Boundary(StrEnum):
-    """What happens to points on the boundary that are not vertices."""
+    """Whether the hull keeps points on the boundary that are not vertices."""
 
     DROP = "drop"
     KEEP = "keep"
@@ -102,7 +102,7 @@ def _story(algorithm: str, name: str, points: "list[Point]", collinear: Boundary
 
 
 def _writer(path: Path) -> "Callable[[Path, Story], int]":
-    """What writes a file with this suffix, and returns the number of steps in it."""
+    """The function that writes a file with this suffix and returns the number of steps in it."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"--out {path}: the name must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")

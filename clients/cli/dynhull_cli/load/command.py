@@ -76,7 +76,7 @@ def load(
     max_bad: Annotated[
         int | None, typer.Option(min=0, help="Stop if there are more bad rows than this. Default: never.")
     ] = None,
-    patience: Annotated[float, typer.Option(min=0, help="Seconds to wait for a server that went away.")] = 60.0,
+    patience: Annotated[float, typer.Option(min=0, help="Seconds to wait for a server that does not answer.")] = 60.0,
     as_json: AsJson = False,
 ) -> None:
     """Add the points of a file or a pipe to a hull, each exactly once.

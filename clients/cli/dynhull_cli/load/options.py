@@ -7,7 +7,7 @@ STANDARD_INPUT = "-"
 
 
 class Format(StrEnum):
-    """The formats."""
+    """The formats that `dynhull load` reads."""
 
     CSV = "csv"
     TSV = "tsv"
@@ -19,7 +19,7 @@ class Format(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How to read the input; None for what is to be found out. The fields are the options of the command.
+    """How to read the input; None for what is to be detected. The fields are the options of the command.
 
     Attributes:
         x: the column or member of x.
@@ -28,7 +28,7 @@ class Options:
         decimal: the decimal mark of CSV.
         header: whether the first row of CSV names the columns.
         encoding: the encoding of CSV.
-        vertices: whether to take the vertices of geometries that are no single points.
+        vertices: whether to take the vertices of geometries other than single points.
     """
 
     x: str | None = None

@@ -36,13 +36,13 @@ class Source:
     """An input that is read once.
 
     Attributes:
-        name: what messages call it.
-        file: its bytes, decompressed; it can be peeked into.
+        name: its name in messages.
+        file: its bytes, decompressed; `peek` can look ahead in it.
         compressed: the bytes as they are stored.
         size: how many these are; None for a pipe.
         format: its format.
         options: how to read it.
-        notes: lines about what was found out while reading and may surprise.
+        notes: lines about what was detected while reading and may surprise.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Source:
         return _reader(self.format)(self)
 
     def rewind(self) -> None:
-        """Begin anew; not of a pipe."""
+        """Return to the beginning; not possible with a pipe."""
         self.file.seek(0)
         self.notes.clear()
 
@@ -85,9 +85,9 @@ Reader = Callable[[Source], Chunks]
 
 @contextmanager
 def open_source(name: str, kind: Format | None, options: Options) -> Iterator[Source]:
-    """Open a file, or standard input for "-". Without a `kind`, the end of the name says it; standard input is CSV.
+    """Open a file, or standard input for "-". Without a `kind`, the suffix of the name decides; standard input is CSV.
 
-    ValueError where the format is not known, an option is not for it, or the compressed data is damaged.
+    ValueError if the format is unknown, an option does not apply to it, or the compressed data is damaged.
     """
     kind = kind or _format_of(name)
     for option in _given(options):
