@@ -2,9 +2,9 @@
 
     python tests/data/make_folder.py tests/data/format2
 
-By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped, `killed` that
-of its successor, which was killed with batches in its log. The CSV files are the points of each hull in each of them, as
-that version exports them.
+By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
+the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
+of each hull, as that version exports them.
 """
 
 import shutil
@@ -68,12 +68,11 @@ def fill(data, address, client):
     client.apply("zones/a", move=([(4, 0)], [(1e308, -1e308)]))
     client.apply("gone", insert=[(1, 1)])
     client.delete_hull("gone")
-    last = 0
-    for producer in ("plane", "ship", "train"):
+    for producer, written in (("plane", 1), ("ship", 2)):
         insert_and_delete(client, producer, 1, 12)
-        last += 1
-        while snapshots(data) < min(last, 2):
-            pass
+        while snapshots(data) < written:
+            continue
+    insert_and_delete(client, "train", 1, 12)
     insert_and_delete(client, "bus", 1, 4)
 
 
