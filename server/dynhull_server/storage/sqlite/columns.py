@@ -7,24 +7,25 @@ from dynhull.keys import PackedKeys
 
 from ...state.records import Keys, Times
 
+DOUBLE, SIGNED, UNSIGNED = np.dtype("<f8"), np.dtype("<i8"), np.dtype("<u8")
 POINT_BYTES, TIME_BYTES, INTEGER_BYTES = 16, 8, 8
 
 
 def point_bytes(points: Points) -> bytes:
     """(n, 2) points as 16 n bytes."""
-    return np.ascontiguousarray(points, dtype="<f8").tobytes()
+    return np.ascontiguousarray(points, DOUBLE).tobytes()
 
 
 def time_bytes(times: Times) -> bytes:
     """(n,) times as 8 n bytes."""
-    return np.ascontiguousarray(times, dtype="<i8").tobytes()
+    return np.ascontiguousarray(times, SIGNED).tobytes()
 
 
 def key_bytes(keys: Keys) -> bytes:
     """Integers as 8 n bytes; strings as n bytes with their lengths, then their UTF-8."""
     if isinstance(keys, PackedKeys):
         return keys.lengths + keys.data
-    return np.ascontiguousarray(keys, dtype="<u8").tobytes()
+    return np.ascontiguousarray(keys, UNSIGNED).tobytes()
 
 
 class Cursor:
@@ -61,12 +62,12 @@ class Cursor:
 
     def points(self, rows: int) -> Points:
         """(rows, 2) points."""
-        found = np.frombuffer(self.take(rows * POINT_BYTES), dtype="<f8")
+        found = np.frombuffer(self.take(rows * POINT_BYTES), DOUBLE)
         return found.reshape(-1, 2).astype(np.float64, copy=False)
 
     def times(self, rows: int) -> Times:
         """(rows,) times."""
-        return np.frombuffer(self.take(rows * TIME_BYTES), dtype="<i8").astype(np.int64, copy=False)
+        return np.frombuffer(self.take(rows * TIME_BYTES), SIGNED).astype(np.int64, copy=False)
 
     def strings(self, rows: int) -> PackedKeys:
         """String keys; ValueError also if they are not UTF-8."""
@@ -76,4 +77,4 @@ class Cursor:
 
     def integers(self, rows: int) -> Keys:
         """(rows,) integer keys."""
-        return np.frombuffer(self.take(rows * INTEGER_BYTES), dtype="<u8").astype(np.uint64, copy=False)
+        return np.frombuffer(self.take(rows * INTEGER_BYTES), UNSIGNED).astype(np.uint64, copy=False)

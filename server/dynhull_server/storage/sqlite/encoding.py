@@ -62,20 +62,19 @@ def weight(stored: int, *keys: int) -> int:
 
 def _encoded(rows: Rows) -> tuple[int, int, int, list[bytes]]:
     """The two numbers of rows, the flags and the columns."""
-    match rows:
-        case PointRows(inserts, deletes, lenient, times):
-            flags = POINTS | (LENIENT if lenient else 0)
-            columns = [point_bytes(inserts), point_bytes(deletes)]
-            if times is not None:
-                flags |= HAS_TIMES
-                columns.append(time_bytes(times))
-            return len(inserts), len(deletes), flags, columns
-        case KeyRows():
-            return len(rows.keys), len(rows.removes), *_encoded_keys(rows)
-        case Expiry(None, points):
-            return points, 0, EXPIRY, []
-        case Expiry(until, points):
-            return points, 0, EXPIRY | HAS_TIMES, [TIME.pack(until)]
+    if isinstance(rows, PointRows):
+        inserts, deletes = rows.inserts, rows.deletes
+        flags = LENIENT if rows.lenient else 0
+        columns = [point_bytes(inserts), point_bytes(deletes)]
+        if rows.times is not None:
+            flags |= HAS_TIMES
+            columns.append(time_bytes(rows.times))
+        return len(inserts), len(deletes), flags, columns
+    if isinstance(rows, KeyRows):
+        return len(rows.keys), len(rows.removes), *_encoded_keys(rows)
+    if rows.until is None:
+        return rows.points, 0, EXPIRY, []
+    return rows.points, 0, EXPIRY | HAS_TIMES, [TIME.pack(rows.until)]
 
 
 def _encoded_keys(rows: KeyRows) -> tuple[int, list[bytes]]:
