@@ -242,7 +242,7 @@ class WheelLife {
   explicit WheelLife(std::uint64_t seed) : random_(seed), wheel_(BySlot{&times_}) {}
 
   void live() {
-    const std::uint64_t steps = 20 + random_.below(200);
+    const std::uint64_t steps = 10 + random_.below(40);
     for (std::uint64_t step = 0; step < steps; ++step) {
       if (random_.below(2) == 0) push(random_.below(80));
       grow();

@@ -1,4 +1,4 @@
-"""Windows with allocations that fail, on random inputs: a short run of fuzz_window.cpp, without sanitizers to be quick."""
+"""Windows on random inputs, with allocations that fail: a short run of fuzz_window.cpp, without sanitizers."""
 
 import subprocess
 from pathlib import Path
