@@ -3,12 +3,26 @@
 from sys import modules as _modules
 
 from . import _hull, static
+from ._entities import DuplicateKeyError, MissingKeyError
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
+from ._keyed import KeyedHull, Put
 from ._predicates import orient2d
 from .static import convex_hull
 
-__all__ = ["KERNEL", "DynamicHull", "MissingPointError", "__version__", "convex_hull", "orient2d", "static"]
+__all__ = [
+    "KERNEL",
+    "DuplicateKeyError",
+    "DynamicHull",
+    "KeyedHull",
+    "MissingKeyError",
+    "MissingPointError",
+    "Put",
+    "__version__",
+    "convex_hull",
+    "orient2d",
+    "static",
+]
 
 __version__: str
 """The version of the installed distribution."""
@@ -22,6 +36,6 @@ def __getattr__(name: str) -> str:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-for _public in (DynamicHull, MissingPointError):
+for _public in (DynamicHull, MissingPointError, KeyedHull, DuplicateKeyError, MissingKeyError, Put):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

@@ -18,6 +18,7 @@ from . import answers, decode, encode
 from .calls import Call
 from .metrics import Metrics
 from .readings import ENTRIES, RISKS
+from .status import MethodUnknownError
 from .writing import StreamedBatches, decode_write
 
 
@@ -77,6 +78,9 @@ class HullService:
         encode.encode_applied(applied, response.result)
         return response
 
+    async def ApplyTogether(self, _: pb.ApplyTogetherRequest, __: Call) -> pb.ApplyTogetherResponse:
+        raise MethodUnknownError
+
     async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
         call.batches = 0
         summary = pb.IngestResponse()
@@ -127,6 +131,12 @@ class HullService:
         xy = Checked(decode.decode_points(request.points, "points"))
         counts, times = await hull.count(xy, request.min_revision)
         return pb.CountResponse(revision=counts.revision, counts=times)
+
+    async def GetPositions(self, _: pb.GetPositionsRequest, __: Call) -> pb.GetPositionsResponse:
+        raise MethodUnknownError
+
+    async def ReadEntities(self, _: pb.ReadEntitiesRequest, __: Call) -> None:
+        raise MethodUnknownError
 
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
         hull = self._read(call, request.name)
