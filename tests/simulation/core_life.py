@@ -149,8 +149,8 @@ class CoreServer:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Reply():
-                if effect.moved is not None:
-                    self.schedule.note((effect.moved.uid, effect.moved.counts.revision))
+                for hull in effect.moved:
+                    self.schedule.note((hull.uid, hull.counts.revision))
                 for request in effect.requests:
                     self.schedule.note((type(request).__name__, str(request.error)))
                     request.to.answer(request)
@@ -196,8 +196,11 @@ class CoreServer:
         effect = self._examining.popleft()
         event: Event
         try:
-            row = self._storage.row(effect.number)
-            event = Examined(effect.ticket, effect.load(self._storage.read(effect.number)) if row else None)
+            states = []
+            for number, load in effect.hulls:
+                row = self._storage.row(number)
+                states.append(load(self._storage.read(number)) if row else None)
+            event = Examined(effect.ticket, states)
         except Exception as error:
             event = NotExamined(effect.ticket, error)
         self._news.append(partial(self.dispatch, event))

@@ -54,6 +54,16 @@ def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
     return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))
 
 
+def check_batch(hull: DynamicHull, batch: Batch) -> None:
+    """Raise the error with which `apply_batch` would refuse the batch. O(k log n): the hull itself does not change."""
+    if batch.count_missing or not len(batch.deletes):
+        return
+    named = np.unique(batch.deletes, axis=0)
+    copies = np.minimum(hull.count_many(named), len(batch.deletes))
+    rehearsal = DynamicHull(np.repeat(named, copies, axis=0))
+    _apply(rehearsal, batch)
+
+
 def _apply(hull: DynamicHull, batch: Batch) -> int:
     """Returns the number of points deleted."""
     inserts, deletes = batch.inserts, batch.deletes

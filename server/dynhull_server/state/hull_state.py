@@ -9,7 +9,7 @@ import numpy as np
 from dynhull import DynamicHull
 from dynhull.arrays import Points
 
-from .batch import Applied, apply_batch
+from .batch import Applied, Batch, apply_batch, check_batch
 from .errors import LimitExceededError, PointMissingError
 from .history import History
 from .limits import Limits
@@ -64,12 +64,44 @@ class HullState:
         Raises:
             Exception: the batch is refused; nothing has changed.
         """
+        if not self.is_new(write, now):
+            return self.duplicate()
+        return self.apply_decoded(write, self.decoded(write), now, records)
+
+    def is_new(self, write: "WriteBatch", now: float) -> bool:
+        """Whether a batch is the next one of its producer, or not numbered; False where it has already been applied.
+
+        Raises:
+            SequenceGapError: batches before it are missing.
+            LimitExceededError: the hull has too many producers to add one.
+        """
+        return not write.producer or self._producers.is_new(write.producer, write.sequence, write.owner, now)
+
+    def duplicate(self) -> Applied:
+        """The result of a batch that has already been applied."""
         counts = self.counts
-        if write.producer and not self._producers.is_new(write.producer, write.sequence, write.owner, now):
-            return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True)
+        return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True)
+
+    def decoded(self, write: "WriteBatch") -> Batch:
+        """The batch; raises the error that refuses it, unless that depends on the points of the hull."""
         batch = write.make()
-        if counts.points + batch.growth > self._most_points:
+        if self.counts.points + batch.growth > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
+        return batch
+
+    def checked(self, write: "WriteBatch") -> Batch:
+        """The batch, if it can be applied; raises the error that refuses it. O(k log n)."""
+        batch = self.decoded(write)
+        check_batch(self.hull, batch)
+        return batch
+
+    def apply_decoded(self, write: "WriteBatch", batch: Batch, now: float, records: list[Record] | None) -> Applied:
+        """Apply a new batch as the next revision, and append it to `records` unless that is None.
+
+        Raises:
+            Exception: the batch is refused; nothing has changed.
+        """
+        counts = self.counts
         self.torn = True
         try:
             applied = apply_batch(self.hull, batch, counts.revision + 1)

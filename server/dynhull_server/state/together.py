@@ -6,6 +6,7 @@ from typing import TypeVar
 from .batch import Applied
 from .errors import SequencesDifferError
 from .events import WriteBatch, WriteTogether
+from .hull import Hull
 from .hull_state import HullState
 from .records import Record
 
@@ -13,7 +14,7 @@ T = TypeVar("T")
 
 
 def apply_together(
-    request: WriteTogether, states: list[HullState], records: list[list[Record] | None], now: float
+    request: WriteTogether, hulls: list[Hull], records: list[list[Record] | None], now: float
 ) -> list[Applied]:
     """Apply each part of the request to its hull, as the next revision of each.
 
@@ -23,24 +24,26 @@ def apply_together(
     Raises:
         Exception: a part is refused. No hull has changed, unless they are torn.
     """
+    states = [hull.state for hull in hulls]
     new = _of_each(request, states, lambda part, state: state.is_new(part, now))
     if not any(new):
         return [state.duplicate() for state in states]
     if not all(new):
-        raise _sequences_differ(request, states, new.index(False), new.index(True))
-    batches = _of_each(request, states, lambda part, state: state.decode(part))
-    for request.refused, (state, batch) in enumerate(zip(states, batches, strict=True)):
-        state.check(batch)
-    request.refused = None
+        applied, missing = new.index(False), new.index(True)
+        part = request.parts[applied]
+        expected = states[applied].last_sequence(part.producer) + 1
+        raise SequencesDifferError(part.producer, part.sequence, expected, hulls[applied].name, hulls[missing].name)
+    batches = _of_each(request, states, lambda part, state: state.checked(part))
+    results: list[Applied] = []
     try:
-        return [
-            state.apply_decoded(part, batch, now, kept)
-            for state, part, batch, kept in zip(states, request.parts, batches, records, strict=True)
-        ]
+        for part, state, batch, kept in zip(request.parts, states, batches, records, strict=True):
+            results.append(state.apply_decoded(part, batch, now, kept))
     except BaseException:
-        for state in states:
-            state.torn = True
+        if results:
+            for state in states:
+                state.torn = True
         raise
+    return results
 
 
 def _of_each(request: WriteTogether, states: list[HullState], step: Callable[[WriteBatch, HullState], T]) -> list[T]:

@@ -167,11 +167,62 @@ class Trip:
         self._count(leg, applied)
 
     def _write_together(self, request: WriteTogether) -> None:
+        """Apply a batch to each hull. All requests of such a trip name the same hulls, perhaps in another order."""
         legs = {leg.name: leg for leg in self.legs}
-        parts = [(part, legs[part.name]) for part in request.parts]
-        states = []
-        for request.refused, (_, leg) in enumerate(parts):
+        ordered = [legs[part.name] for part in request.parts]
+        hulls: list[Hull] = []
+        for index, leg in enumerate(ordered):
             if leg.after is None:
+                request.refused = index
                 raise HullNotFoundError(leg.name)
-            states.append(leg.after.state)
-        self.torn = True  # unless
+            hulls.append(leg.after)
+        try:
+            request.result = apply_together(request, hulls, [leg.records for leg in ordered], self._now)
+        finally:
+            self.torn = any(hull.state.torn for hull in hulls)
+        for leg, applied in zip(ordered, request.result, strict=True):
+            self._count(leg, applied)
+
+    def _count(self, leg: Leg, applied: Applied) -> None:
+        if not applied.duplicate:
+            self.applied = True
+            leg.unsaved += applied.inserted + applied.deleted
+
+    def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
+        place, birth = self.place, request.birth
+        assert place is not None  # the hull is missing, so it may be created
+        if place.refusal is not None:
+            raise place.refusal
+        assert birth is not None  # otherwise the request was refused
+        settings = request.settings if type(request) is CreateHull else DEFAULT
+        row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
+        return Hull(row, HullState(place.limits, settings, Kept(), self._now))
+
+
+def _read(request: ReadHull, leg: Leg) -> object:
+    hull = leg.after
+    if hull is None or request.hull is not hull:
+        raise HullNotFoundError(leg.name)
+    return hull.state.counts, request.function(hull.state)
+
+
+def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:
+    """Apply a batch to a hull, and store the result or the error in the request. None where it was refused."""
+    stream = request.stream
+    try:
+        if stream is not None and stream.hull is not hull and stream.hull is not None:
+            raise HullNotFoundError(hull.name)
+        request.result = applied = hull.state.apply(request, now, records)
+    except Exception as error:  # any error is the answer to the caller
+        refuse(request, error)
+        return None
+    if stream is not None:
+        stream.hull = hull
+    return applied
+
+
+def refuse(request: Request, error: Exception) -> None:
+    """Store an error in the request, and stop its stream."""
+    request.error = error
+    if type(request) is WriteBatch and request.stream is not None:
+        request.stream.stopped = True
