@@ -26,6 +26,7 @@ BYTES_PER_POINT = 16
 NO_POINTS = np.empty((0, 2))
 MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
 LARGEST_INTEGER = 2**63 - 1
+LEAST_PARTS, MOST_PARTS = 2, 16
 
 
 class InvalidFieldError(Exception):
@@ -170,6 +171,23 @@ def decode_batch(batch: batch_pb2.Batch) -> Batch:
             raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
         inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
     return Batch(inserts, deletes, moves, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
+
+
+def decode_parts(request: hull_service_pb2.ApplyTogetherRequest) -> list[str]:
+    """The names of the hulls of a request to several of them, all different."""
+    if not LEAST_PARTS <= len(request.batches) <= MOST_PARTS:
+        problem = f"must be {LEAST_PARTS} to {MOST_PARTS}, each of another hull"
+        raise InvalidFieldError("batches", f"{len(request.batches)} batches", problem)
+    names: dict[str, int] = {}
+    for index, part in enumerate(request.batches):
+        name = decode_name(part.name, f"batches[{index}].name")
+        if name in names:
+            problem = f"batches[{names[name]}] is of the same hull"
+            raise InvalidFieldError(f"batches[{index}].name", name, problem)
+        if not part.HasField("batch"):
+            raise InvalidFieldError(f"batches[{index}].batch", "", "a batch is required")
+        names[name] = index
+    return list(names)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:

@@ -18,8 +18,8 @@ from . import answers, decode, encode
 from .calls import Call
 from .metrics import Metrics
 from .readings import ENTRIES, RISKS
-from .status import MethodUnknownError
-from .writing import StreamedBatches, decode_write
+from .status import ANSWERED, MethodUnknownError, PartRefusedError
+from .writing import StreamedBatches, decode_together, decode_write
 
 
 class HullService:
@@ -78,8 +78,22 @@ class HullService:
         encode.encode_applied(applied, response.result)
         return response
 
-    async def ApplyTogether(self, _: pb.ApplyTogetherRequest, __: Call) -> pb.ApplyTogetherResponse:
-        raise MethodUnknownError
+    async def ApplyTogether(self, request: pb.ApplyTogetherRequest, call: Call) -> pb.ApplyTogetherResponse:
+        begun = time.perf_counter()
+        names = decode.decode_parts(request)
+        for name in names:
+            call.access.require_write(name)
+        write = decode_together(request, names, call.message_bytes, call.owner)
+        try:
+            results = await self._engine.apply_together(write)
+        except ANSWERED as error:
+            self._metrics.batches.refused()
+            raise (error if write.refused is None else PartRefusedError(write.refused, error)) from None
+        response = pb.ApplyTogetherResponse()
+        for applied in results:
+            self._metrics.batches.applied(applied, time.perf_counter() - begun)
+            encode.encode_applied(applied, response.results.add())
+        return response
 
     async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
         call.batches = 0
