@@ -25,7 +25,7 @@ from dynhull_server.state.errors import (
     SequenceGapError,
     StoppingError,
 )
-from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.events import WriteBatch, WriteTogether
 
 from .model import Asked, Content, Model
 from .plan import Operation
@@ -47,6 +47,9 @@ class Server(Protocol):
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         """Apply a batch."""
+
+    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+        """Apply a batch to each of several hulls."""
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         """For many batches."""
@@ -116,6 +119,8 @@ class Client:
                 await self.delete(op["name"])
             case "write":
                 await self.write(op)
+            case "together":
+                await self.together(op)
             case "stream":
                 await self.stream(op)
             case "read":
@@ -160,6 +165,37 @@ class Client:
             self._batch_refused(op, asked, error, [attempt])
         else:
             self._applied(asked, attempt, applied, producer, sequence)
+
+    async def together(self, op: Operation) -> None:
+        """A batch to each of several hulls; a fault of it is in the last one."""
+        names = op["names"]
+        producer = f"{self.producer}-{'-'.join(names)}" if op["numbered"] else ""
+        sequence = self._next.get(producer, 1) if producer else 0
+        attempts, parts = [], []
+        for name in names:
+            last = name == names[-1]
+            part = {key: value for key, value in op.items() if last or key not in ("delete", "torn")}
+            attempt, write = self._batch(part | {"name": name}, producer, sequence)
+            write.name = name
+            attempts.append(attempt)
+            parts.append(write)
+        self.model.bind(attempts)
+        asked = [self.model.ask(name) for name in names]
+        try:
+            results = await self.server.apply_together(WriteTogether(parts, rows=op["rows"]))
+        except Exception as error:
+            missing = error.name if isinstance(error, HullNotFoundError) else names[0]
+            about = asked[names.index(missing)]
+            self.refused(about, error, (HullNotFoundError, *_reasons(op)), attempts)
+            if isinstance(error, SequenceGapError):
+                self._next[producer] = error.expected
+            return
+        for each, attempt, applied in zip(asked, attempts, results, strict=True):
+            self.model.applied(each, attempt, applied, producer, sequence)
+        if len({applied.duplicate for applied in results}) > 1:
+            raise self.model.finds(f"batches {attempts} are a duplicate in one hull alone: {results}")
+        if producer:
+            self._next[producer] = sequence + 1
 
     async def stream(self, op: Operation) -> None:
         name, producer = op["name"], self._producer(op)
@@ -236,15 +272,9 @@ class Client:
             self._next[asked.name + producer] = sequence + 1
 
     def _batch_refused(self, op: Operation, asked: Asked, error: Exception, attempts: Sequence[int]) -> None:
-        reasons: list[type[Exception]] = [LimitExceededError]
+        reasons = _reasons(op)
         if not op["create"] or op["do"] == "stream":
             reasons.append(HullNotFoundError)
-        if "delete" in op:
-            reasons.append(PointMissingError)
-        if op["numbered"]:
-            reasons.append(SequenceGapError)
-        if "torn" in op:
-            reasons.append(MemoryError)
         self.refused(asked, error, tuple(reasons), attempts)
         if isinstance(error, SequenceGapError):
             self._next[op["name"] + self._producer(op)] = error.expected
@@ -321,6 +351,18 @@ class Client:
             case _:
                 raise self.model.finds(f"without a reason: {error!r}") from error
         self.model.refused(asked, attempts)
+
+
+def _reasons(op: Operation) -> list[type[Exception]]:
+    """Why batches to a hull may be refused."""
+    reasons: list[type[Exception]] = [LimitExceededError]
+    if "delete" in op:
+        reasons.append(PointMissingError)
+    if op["numbered"]:
+        reasons.append(SequenceGapError)
+    if "torn" in op:
+        reasons.append(MemoryError)
+    return reasons
 
 
 def content(vertices: Points) -> Content:

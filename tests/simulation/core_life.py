@@ -40,6 +40,7 @@ from dynhull_server.state.events import (
     Stopping,
     Tick,
     WriteBatch,
+    WriteTogether,
 )
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
@@ -241,6 +242,11 @@ class CoreServer:
             write.birth = self._birth()
         applied: Applied = await self._ask(write)
         return applied
+
+    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+        write.to = Answer()
+        results: list[Applied] = await self._ask(write)
+        return results
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         hull = self.core.get(name) if name in self.core.hulls or not create else None

@@ -4,13 +4,14 @@ The storage reports what it has kept, in order; that is the truth. Each batch in
 its x, and all points of a parabola are vertices: so an answer names the batches that it has seen.
 
 * Acknowledged batches are in the truth when they are acknowledged, at the revision told; refused ones never are.
+* Of batches to several hulls all are kept by one commit, or none; and who has seen one of them sees the others.
 * No batch is there twice, and no two of one producer have the same number.
 * A read at a revision is the truth at that revision, and so is a recall.
 * Whatever is asked after an answer has been seen is not older than that answer.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,12 +31,16 @@ class Finding(BaseException):
 
 @dataclass(slots=True, eq=False)
 class Truth:
-    """One hull as the storage has kept it: its content at each revision, and the last number of each producer."""
+    """One hull as the storage has kept it: its content at each revision, and the last number of each producer.
+
+    `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
+    """
 
     row: HullRow
     contents: list[Content] = field(default_factory=lambda: [()])
     producers: dict[str, int] = field(default_factory=dict)
     deleted: bool = False
+    bonds: deque[tuple[int, list[int]]] = field(default_factory=deque)
 
     @property
     def revision(self) -> int:
@@ -80,6 +85,7 @@ class Model:
         self._uids: dict[str, Truth] = {}
         self._places: dict[int, tuple[Truth, int]] = {}
         self._refused: set[int] = set()
+        self._bound: dict[int, list[int]] = {}
         self._floor: dict[str, tuple[int, int]] = {}
         self._attempts = self._uids_given = 0
         self._open: Counter[tuple[str, str]] = Counter()
@@ -110,18 +116,26 @@ class Model:
     # What is kept
 
     def landed(self, changes: Sequence[Any]) -> None:
-        """The storage has kept these changes."""
+        """The storage has kept these changes, by one commit."""
+        appended: list[int] = []
         for change in changes:
             match change:
                 case Create():
                     self._create(change.row)
                 case Append():
-                    for record in change.records:
-                        self._append(self._hulls[change.number], record)
+                    truth = self._hulls[change.number]
+                    appended += [self._append(truth, record) for record in change.records]
                 case Delete():
                     truth = self._hulls[change.number]
                     truth.deleted = True
                     del self.alive[truth.row.name]
+        for attempt in appended:
+            together = self._bound.get(attempt, [])
+            if not set(together) <= set(appended):
+                raise self.finds(f"of the batches {together} only {attempt} is kept")
+            if together:
+                truth, revision = self._places[attempt]
+                truth.bonds.append((revision, together))
 
     def _create(self, row: HullRow) -> None:
         if row.number in self._numbers:
@@ -131,7 +145,8 @@ class Model:
         self._numbers.add(row.number)
         self.alive[row.name] = self._hulls[row.number] = self._uids[row.uid] = Truth(row)
 
-    def _append(self, truth: Truth, record: Record) -> None:
+    def _append(self, truth: Truth, record: Record) -> int:
+        """Take a batch into the truth. Returns its x."""
         if truth.deleted:
             raise self.finds("a batch is kept of a hull that has been deleted")
         if record.revision != truth.revision + 1:
@@ -155,6 +170,7 @@ class Model:
             self._numbered[truth.row.name, record.producer, record.sequence].append(truth)
         truth.contents.append(tuple(sorted(content)))
         self._places[attempt] = truth, record.revision
+        return attempt
 
     # What is asked
 
@@ -162,6 +178,10 @@ class Model:
         """The x of a new batch."""
         self._attempts += 1
         return self._attempts
+
+    def bind(self, attempts: list[int]) -> None:
+        """These batches are applied together or not at all."""
+        self._bound |= dict.fromkeys(attempts, attempts)
 
     def uid(self) -> str:
         """Of a new hull."""
@@ -188,6 +208,13 @@ class Model:
     def _see(self, name: str, place: tuple[int, int]) -> None:
         if place > self._floor.get(name, (0, 0)):
             self._floor[name] = place
+        if place[0] not in self._hulls:
+            return
+        bonds = self._hulls[place[0]].bonds
+        while bonds and bonds[0][0] <= place[1]:
+            for other in bonds.popleft()[1]:
+                truth, revision = self._places[other]
+                self._see(truth.row.name, (truth.row.number, revision))
 
     def _answered(self, asked: Asked, place: tuple[int, int]) -> None:
         self._count(asked.name, asked.makes, asked.removes, -1)

@@ -22,6 +22,7 @@ NAMES = ("a", "b", "c")
 # a few operations meet (swarm testing: Groce and others, 2012).
 CORE = {
     "write": 40,
+    "together": 14,
     "stream": 14,
     "read": 12,
     "delete": 10,
@@ -33,6 +34,7 @@ CORE = {
 }
 SHELL = {
     "write": 34,
+    "together": 12,
     "stream": 14,
     "read": 10,
     "delete": 9,
@@ -64,6 +66,8 @@ def random_plan(seed: int, layer: str) -> Plan:
     names = NAMES[: draw.randint(1, 3)]
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
     weights["write"] += 1
+    if len(names) == 1:
+        weights["together"] = 0
     immediate = layer != "sqlite" and draw.random() < 0.1
     return {
         "seed": seed,
@@ -108,6 +112,14 @@ def _operation(draw: random.Random, names: tuple[str, ...], weights: dict[str, i
             op["window"] = draw.randint(1, 5)
         elif draw.random() < 0.05:
             op["shared"] = True
+    elif do == "together":
+        op["names"] = draw.sample(names, draw.randint(2, len(names)))
+        op["numbered"] = draw.random() < 0.5
+        op["rows"] = draw.choice((1, 1, 200))
+        if draw.random() < 0.3:
+            op["delete"] = draw.choice(("strict", "lenient", "nowhere"))
+        if draw.random() < 0.05:
+            op["torn"] = draw.randint(1, 4)
     elif do == "delete":
         if draw.random() < 0.01:
             op["crowd"] = 400

@@ -14,7 +14,7 @@ from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.engine.watch import watch
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
-from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings
@@ -116,6 +116,9 @@ class ShellServer:
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         return await self._engine.apply(name, write, create=create)
+
+    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+        return await self._engine.apply_together(write)
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         event = asyncio.Event()
