@@ -272,7 +272,7 @@ class HullService:
         resume = decode.decode_resume(request)
         view: View
         if directions is not None:
-            view = SketchView(hull, directions, request.include_measures)
+            view = SketchView(hull, directions, vertices=request.include_measures)
         elif resume is None:
             view = VerticesView(hull)
         else:
