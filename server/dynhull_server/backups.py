@@ -13,7 +13,7 @@ import typer
 from dynhull.arrays import Points
 
 from .progress import progress_bar
-from .state.hull_state import replayed
+from .state.contents import replayed
 from .storage.port import Progress, StorageError
 from .storage.sqlite import copies
 
@@ -84,7 +84,7 @@ def export(
         kept, notes = copies.read(data, name)
         for note in notes:
             typer.echo(note, err=True)
-        points = replayed(kept).points()
+        points = replayed(kept).hull.points()
         with progress_bar("points") as progress:
             writers[file.suffix](file, points, progress)
     typer.echo(f"{file}: {len(points):,} points of {name} at revision {kept.last_revision}")

@@ -21,7 +21,7 @@ from folders import (
     stopped,
 )
 
-from dynhull_server.state.hull_state import replayed
+from dynhull_server.state.contents import replayed
 from dynhull_server.state.records import Append, Delete, HullRow, HullSettings
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
@@ -99,7 +99,7 @@ def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
         assert (contents.next_number, contents.notes) == (3, [])
         for number, (revision, count) in ((1, fleet), (2, zones)):
             kept = storage.read(number)
-            assert (kept.last_revision, len(replayed(kept))) == (revision, count)
+            assert (kept.last_revision, len(replayed(kept).hull)) == (revision, count)
         assert (storage.oldest(1), storage.oldest(2)) == (20, 0)
         assert storage.read(1).producers == {"p0": 24, "p1": 25, "p2": 23}
         assert storage.read(2).records[0].producer == "truck"

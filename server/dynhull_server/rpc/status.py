@@ -15,6 +15,9 @@ from ..state.errors import (
     HullNotFoundError,
     HullReplacedError,
     HullUnsuitableError,
+    InvalidBatchError,
+    KeyMissingError,
+    KeyRepeatedError,
     LimitExceededError,
     NotStoredError,
     OutcomeUnknownError,
@@ -95,15 +98,14 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
     where = {} if batch is None else {"batch": str(batch)}
     match error:
         case InvalidFieldError():
-            row = {} if error.row is None else {"row": str(error.row)}
-            value = _short(error.value)
-            name = within + error.field
-            field = name if error.row is None else f"{name}[{error.row}]"
-            detail = BadRequest()
-            detail.field_violations.add(field=field, description=f"{error.problem}, got {value}")
-            message = f"{field} is {value}: {error.problem}"
-            metadata = {"field": name, **row, "value": value, **where}
-            return _status(code.INVALID_ARGUMENT, message, "INVALID_FIELD", metadata, detail)
+            return _invalid_field(within, error, where)
+        case InvalidBatchError():
+            field = f"batch.{error.field}"
+            first = {}
+            if isinstance(error, KeyRepeatedError):
+                first = {"first_field": f"{within}batch.{error.first[0]}", "first_row": str(error.first[1])}
+            invalid = InvalidFieldError(field, error.value, error.problem, error.row)
+            return _invalid_field(within, invalid, first | where)
         case PointMissingError():
             field, value = within + PART_FIELDS[error.part], _short(error.point)
             failure = PreconditionFailure()
@@ -111,6 +113,13 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
             message = f"{field}[{error.row}] is {value}: no such point to delete; nothing of the batch was applied"
             metadata = {"field": field, "row": str(error.row), "value": value, **where}
             return _status(code.FAILED_PRECONDITION, message, "POINT_MISSING", metadata, failure)
+        case KeyMissingError():
+            field, value = f"{within}batch.removes", _short(error.key)
+            failure = PreconditionFailure()
+            failure.violations.add(type="KEY_MISSING", subject=f"{field}[{error.row}]", description=str(error))
+            message = f"{field}[{error.row}] is {value}: no such key to remove; nothing of the batch was applied"
+            metadata = {"field": field, "row": str(error.row), "value": value, **where}
+            return _status(code.FAILED_PRECONDITION, message, "KEY_MISSING", metadata, failure)
         case PartRefusedError():
             return error_status(error.reason, error.index, f"batches[{error.index}].")
         case HullNotFoundError():
@@ -131,7 +140,8 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case HullUnsuitableError():
             failure = PreconditionFailure()
             failure.violations.add(type="HULL_UNSUITABLE", subject=error.name, description=str(error))
-            metadata = {"value": error.name, "point": str(error.point)}
+            point = {} if error.point is None else {"point": str(error.point)}
+            metadata = {"value": error.name, **point, **where}
             return _status(code.FAILED_PRECONDITION, str(error), "HULL_UNSUITABLE", metadata, failure)
         case RevisionForgottenError():
             metadata = {"field": "resume.revision", "value": str(error.revision)}
@@ -171,6 +181,18 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case DrainingError() | StoppingError():
             return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error
+
+
+def _invalid_field(within: str, error: InvalidFieldError, where: Mapping[str, str]) -> Status:
+    row = {} if error.row is None else {"row": str(error.row)}
+    value = _short(error.value)
+    name = within + error.field
+    field = name if error.row is None else f"{name}[{error.row}]"
+    detail = BadRequest()
+    detail.field_violations.add(field=field, description=f"{error.problem}, got {value}")
+    message = f"{field} is {value}: {error.problem}"
+    metadata = {"field": name, **row, "value": value, **where}
+    return _status(code.INVALID_ARGUMENT, message, "INVALID_FIELD", metadata, detail)
 
 
 def _status(number: int, message: str, reason: str, metadata: Mapping[str, str], *details: Message) -> Status:

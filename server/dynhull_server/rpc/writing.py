@@ -14,6 +14,7 @@ from ..state.batch import Applied
 from ..state.events import WriteBatch, WriteTogether
 from . import decode
 from .calls import Call
+from .decode_batch import decode_batch
 from .metrics import Metrics
 
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
@@ -26,7 +27,7 @@ def decode_write(request: Any, message_bytes: int, producer: str, owner: str) ->
     batch = request.batch
     return WriteBatch(
         message_bytes // decode.BYTES_PER_POINT,  # an estimate: reading the points would copy them
-        lambda: decode.decode_batch(batch),
+        lambda: decode_batch(batch),
         producer,
         decode.decode_sequence(producer, request.sequence),
         owner,
@@ -41,7 +42,7 @@ def decode_together(
     sequence = decode.decode_sequence(producer, request.sequence)
     parts = []
     for name, each in zip(names, request.batches, strict=True):
-        part = WriteBatch(0, partial(decode.decode_batch, each.batch), producer, sequence, owner)
+        part = WriteBatch(0, partial(decode_batch, each.batch), producer, sequence, owner)
         part.name = name
         parts.append(part)
     return WriteTogether(parts, rows=message_bytes // decode.BYTES_PER_POINT)

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from .batch import Applied
+from .batch import Applied, Batch, KeyedBatch
 from .errors import HullExistsError, HullNotFoundError
-from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch, WriteTogether
+from .events import CreateHull, DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import DEFAULT, Append, Change, Create, Delete, HullRow, Kept, Record
+from .records import DEFAULT, Append, Change, Create, Delete, HullRow, HullSettings, Kept, Record
 from .together import apply_together
 
 
@@ -140,6 +140,9 @@ class Trip:
                     raise HullExistsError(leg.name)
                 leg.after = self._new_hull(request, leg)
                 return leg.after
+            case Expire():
+                self._expire(request, leg)
+                return None
             case DeleteHull():
                 if leg.after is None:
                     raise HullNotFoundError(leg.name)
@@ -186,7 +189,16 @@ class Trip:
     def _count(self, leg: Leg, applied: Applied) -> None:
         if not applied.duplicate:
             self.applied = True
-            leg.unsaved += applied.inserted + applied.deleted
+            leg.unsaved += applied.inserted + applied.moved + applied.deleted
+
+    def _expire(self, request: Expire, leg: Leg) -> None:
+        hull = leg.after
+        if hull is None or hull is not request.hull:
+            return
+        try:
+            self.applied |= hull.state.expire(request.time, leg.records)
+        finally:
+            self.torn = hull.state.torn
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
         place, birth = self.place, request.birth
@@ -194,9 +206,14 @@ class Trip:
         if place.refusal is not None:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
-        settings = request.settings if type(request) is CreateHull else DEFAULT
+        settings = request.settings if isinstance(request, CreateHull) else settings_for(request.make())
         row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
         return Hull(row, HullState(place.limits, settings, Kept(), self._now))
+
+
+def settings_for(batch: Batch | KeyedBatch) -> HullSettings:
+    """The settings of a hull that its first batch creates: keyed if the batch names keys."""
+    return HullSettings(batch.kind) if isinstance(batch, KeyedBatch) else DEFAULT
 
 
 def _read(request: ReadHull, leg: Leg) -> object:
