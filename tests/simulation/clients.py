@@ -6,17 +6,20 @@ CancelledError.
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from dynhull.arrays import Points
+from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
-from dynhull_server.state.batch import Applied, Batch
+from dynhull_server.state.batch import Applied, Batch, KeyedBatch
 from dynhull_server.state.errors import (
     HullExistsError,
     HullNotFoundError,
     HullReplacedError,
+    InvalidBatchError,
+    KeyMissingError,
     LimitExceededError,
     NotStoredError,
     OutcomeUnknownError,
@@ -26,17 +29,25 @@ from dynhull_server.state.errors import (
     StoppingError,
 )
 from dynhull_server.state.events import WriteBatch, WriteTogether
+from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.records import HullSettings, Identity, Window
 
-from .model import Asked, Content, Model
-from .plan import Operation
+from .entities import Key
+from .model import Asked, Content, Model, tag
+from .plan import KEYED, Operation
 
 NO_POINTS = np.empty((0, 2))
+# The points of one batch have an x of their own each, in eighths.
+EIGHT = 8
 
 
 class Server(Protocol):
     """What clients ask of a server, in either layer."""
 
-    async def create(self, name: str, max_points: int) -> str:
+    def time(self) -> int:
+        """Microseconds since 1970."""
+
+    async def create(self, name: str, settings: HullSettings) -> str:
         """Make a hull; its uid."""
 
     async def delete(self, name: str) -> None:
@@ -57,7 +68,7 @@ class Server(Protocol):
     async def news(self, stream: BatchStream) -> None:
         """Wait until the stream has an answer."""
 
-    async def vertices(self, name: str, rows: int) -> tuple[str, int, Points]:
+    async def vertices(self, name: str, rows: int) -> tuple[str, int, "Outline"]:
         """The uid, a revision and its vertices."""
 
     async def recall(self, name: str, uid: str, revision: int) -> Points | None:
@@ -70,12 +81,23 @@ class Server(Protocol):
         """What one layer has and the other has not."""
 
 
+# The vertices of a hull, and their keys if it has keys.
+Outline = tuple[Points, Sequence[Key] | None]
+
+
+def outline(state: HullState) -> Outline:
+    """The vertices, and their keys."""
+    keyed = not hasattr(state.hull, "insert")
+    return state.vertices(), state.vertex_keys().tolist() if keyed else None
+
+
 class TornBatch:
     """A batch for which memory runs out when its inserts are looked at for the nth time."""
 
     def __init__(self, batch: Batch, nth: int) -> None:
         self._batch, self._left = batch, nth
         self.deletes, self.moves, self.count_missing, self.growth = batch.deletes, 0, batch.count_missing, batch.growth
+        self.times = batch.times
 
     @property
     def inserts(self) -> Points:
@@ -111,13 +133,13 @@ class Client:
         """Carry out one operation."""
         match op["do"]:
             case "create":
-                await self.create(op["name"], op["max_points"])
+                await self.create(op["name"], _settings(op))
             case "delete" if "crowd" in op:
                 self.model.ask(op["name"], removes=True)
                 await self.server.delete_at_once(op["name"], op["crowd"])
             case "delete":
                 await self.delete(op["name"])
-            case "write":
+            case "write" | "put":
                 await self.write(op)
             case "together":
                 await self.together(op)
@@ -134,10 +156,10 @@ class Client:
 
     # Hulls
 
-    async def create(self, name: str, max_points: int = 0) -> None:
+    async def create(self, name: str, settings: HullSettings) -> None:
         asked = self.model.ask(name, makes=True)
         try:
-            uid = await self.server.create(name, max_points)
+            uid = await self.server.create(name, settings)
         except Exception as error:
             self.refused(asked, error, (HullExistsError, LimitExceededError))
         else:
@@ -165,6 +187,8 @@ class Client:
             self._batch_refused(op, asked, error, [attempt])
         else:
             self._applied(asked, attempt, applied, producer, sequence)
+            if name in KEYED:
+                self.model.put(attempt, applied, len(op["keys"]))
 
     async def together(self, op: Operation) -> None:
         """A batch to each of several hulls; a fault of it is in the last one."""
@@ -192,6 +216,8 @@ class Client:
             return
         for each, attempt, applied in zip(asked, attempts, results, strict=True):
             self.model.applied(each, attempt, applied, producer, sequence)
+            if each.name in KEYED:
+                self.model.put(attempt, applied, len(op["keys"]))
         if len({applied.duplicate for applied in results}) > 1:
             raise self.model.finds(f"batches {attempts} are a duplicate in one hull alone: {results}")
         if producer:
@@ -252,6 +278,13 @@ class Client:
 
     def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, WriteBatch]:
         attempt = self.model.attempt()
+        batch: Any = self._puts(op, attempt) if op["name"] in KEYED else self._points(op, attempt)
+        if "torn" in op and isinstance(batch, Batch):
+            self.model.faulty = True
+            batch = TornBatch(batch, op["torn"])
+        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer)
+
+    def _points(self, op: Operation, attempt: int) -> Batch:
         deletes = NO_POINTS
         seen = self.seen.get(op["name"])
         if op.get("delete") == "nowhere" and attempt % 3:  # else nothing that is right would follow a refused batch
@@ -260,11 +293,27 @@ class Client:
             x = float(seen[-1][2][0])
             deletes = np.array([[x, x * x]])
         x = float(attempt)
-        batch: Any = Batch(np.array([[x, x * x]]), deletes, 0, op.get("delete") == "lenient")
-        if "torn" in op:
-            self.model.faulty = True
-            batch = TornBatch(batch, op["torn"])
-        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer)
+        return Batch(np.array([[x, x * x]]), deletes, 0, op.get("delete") == "lenient")
+
+    def _puts(self, op: Operation, attempt: int) -> KeyedBatch:
+        """A batch of keys; those that it puts are not among those that it removes."""
+        kind = KEYED[op["name"]]
+        now = self.server.time()
+        x = attempt + np.arange(len(op["keys"])) / EIGHT
+        named = (str, int)[kind == "int"]
+        removes = [tag(attempt, kind), *(named(key) for key in op["removes"] if key not in op["keys"])]
+        times = np.full(len(x), now + op["time"], np.int64) if "time" in op else None
+        return KeyedBatch(
+            cast("Any", kind),
+            as_keys(list(map(named, op["keys"])), kind),
+            np.column_stack((x, x * x)),
+            as_keys(removes, kind),
+            times,
+            op.get("only"),
+            op.get("ttl"),
+            np.full(len(x), now + op["deadline"], np.int64) if "deadline" in op else None,
+            refuse_missing="refuse" in op,
+        )
 
     def _applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:
         self.model.applied(asked, attempt, applied, producer, sequence)
@@ -284,16 +333,19 @@ class Client:
     async def read(self, name: str, rows: int = 1) -> None:
         asked = self.model.ask(name)
         try:
-            uid, revision, vertices = await self.server.vertices(name, rows)
+            uid, revision, seen = await self.server.vertices(name, rows)
         except Exception as error:
             self.refused(asked, error, (HullNotFoundError,))
         else:
-            self.saw(asked, uid, revision, vertices)
+            self.saw(asked, uid, revision, seen)
 
-    def saw(self, asked: Asked, uid: str, revision: int, vertices: Points) -> None:
+    def saw(self, asked: Asked, uid: str, revision: int, outline: Outline) -> None:
         """The vertices at a revision have been told."""
+        vertices, keys = outline
         seen = content(vertices)
         self.model.read(asked, uid, revision, seen)
+        if keys is not None:
+            self.model.named(uid, revision, vertices[:, 0].tolist(), keys)
         self.seen.setdefault(asked.name, []).append((uid, revision, seen))
 
     async def recall(self, op: Operation) -> None:
@@ -358,6 +410,10 @@ def _reasons(op: Operation) -> list[type[Exception]]:
     reasons: list[type[Exception]] = [LimitExceededError]
     if "delete" in op:
         reasons.append(PointMissingError)
+    if "refuse" in op:
+        reasons.append(KeyMissingError)
+    if "keys" in op:
+        reasons.append(InvalidBatchError)
     if op["numbered"]:
         reasons.append(SequenceGapError)
     if "torn" in op:
@@ -367,7 +423,13 @@ def _reasons(op: Operation) -> list[type[Exception]]:
 
 def content(vertices: Points) -> Content:
     """The batches that made these vertices."""
-    return tuple(sorted(map(int, vertices[:, 0].tolist())))
+    return tuple(sorted(vertices[:, 0].tolist()))
+
+
+def _settings(op: Operation) -> HullSettings:
+    identity = cast("Identity", KEYED.get(op["name"], "multiset"))
+    window = Window(**op["window"]) if "window" in op else None
+    return HullSettings(identity, op.get("max_points", 0), window, op.get("by_event_time", False))
 
 
 async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
@@ -378,12 +440,14 @@ async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
     if name in model.alive:
         await client.read(name)
     write: Operation = {"do": "write", "name": name, "create": True, "numbered": False, "rows": 1}
+    if name in KEYED:
+        write |= {"do": "put", "keys": [0], "removes": [1], "time": 0}
     await client.write(write)
     if name not in model.alive:
         return  # there may be no more hulls
     await client.read(name)
     if anew:
         await client.delete(name)
-        await client.create(name)
+        await client.create(name, _settings(write))
         await client.write(write | {"numbered": True})
         await client.read(name)
