@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynhull.keys import KeyType
 from dynhull_client import HullClient, Points
 
 from .columns import plain
@@ -42,9 +43,14 @@ def given_keys(arguments: list[str] | None) -> list[str]:
 
 def keys_for(client: HullClient, name: str, keys: Sequence[str]) -> list[str] | list[int]:
     """The keys as the hull has them: as integers if its keys are; as text also where there is no such hull yet."""
-    first = next(client.list_hulls(name), None)
-    keyed = first.keyed if first is not None and first.name == name else None
+    _, keyed = key_type_of(client, name)
     return [integer_key(key, f"key {row}") for row, key in enumerate(keys, start=1)] if keyed == "int" else list(keys)
+
+
+def key_type_of(client: HullClient, name: str) -> tuple[bool, KeyType | None]:
+    """Whether there is such a hull, and the kind of its keys."""
+    first = next(client.list_hulls(name), None)
+    return (True, first.keyed) if first is not None and first.name == name else (False, None)
 
 
 def integer_key(key: Any, place: str) -> int:
