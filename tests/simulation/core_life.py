@@ -135,10 +135,6 @@ class CoreServer:
 
     # Events
 
-    def time(self) -> int:
-        """The server's clock in microseconds, as Engine has it."""
-        return int(self._now * 1e6)
-
     def dispatch(self, event: Event) -> None:
         """Hand an event to the core, and carry out what it asks for."""
         self._events.append(event)
