@@ -91,7 +91,11 @@ class PackedKeys(Sequence[str]):
     def __getitem__(self, row: int | slice) -> str | PackedKeys:
         """The string of a row, or the packed keys of a slice. O(n) the first time, then O(size of the result)."""
         if isinstance(row, slice):
-            return PackedKeys.pack([self[i] for i in range(*row.indices(len(self)))])
+            start, stop, step = row.indices(len(self))
+            if step != 1:
+                return PackedKeys.pack([self[i] for i in range(start, stop, step)])
+            starts, stop = self._offsets(), max(start, stop)
+            return PackedKeys(self._lengths[start:stop], self._data[starts[start] : starts[stop]])
         number = range(len(self))[operator.index(row)]
         return self._bytes_of(number).decode()
 
@@ -114,11 +118,15 @@ class PackedKeys(Sequence[str]):
     def __reduce__(self) -> tuple[type[PackedKeys], tuple[bytes, bytes]]:
         return PackedKeys, (self._lengths, self._data)
 
-    def _bytes_of(self, row: int) -> bytes:
+    def _offsets(self) -> npt.NDArray[np.int64]:
         if self._starts is None:
             ends = np.cumsum(np.frombuffer(self._lengths, np.uint8), dtype=np.int64)
             self._starts = np.concatenate([[0], ends])
-        return self._data[self._starts[row] : self._starts[row + 1]]
+        return self._starts
+
+    def _bytes_of(self, row: int) -> bytes:
+        starts = self._offsets()
+        return self._data[starts[row] : starts[row + 1]]
 
     def _check(self, name: str) -> None:
         empty = self._lengths.find(0)

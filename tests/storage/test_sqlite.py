@@ -1,4 +1,4 @@
-"""The SQLite folder: who may open it, older formats, and what damage does."""
+"""The SQLite folder: who may open it, and what damage does."""
 
 import shutil
 import sqlite3
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from folders import (
     DATABASE,
-    FORMAT_1,
     LOG,
     append,
     fill,
@@ -21,8 +20,7 @@ from folders import (
     stopped,
 )
 
-from dynhull_server.state.contents import replayed
-from dynhull_server.state.records import Append, Delete, HullRow, HullSettings
+from dynhull_server.state.records import Append, Delete
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
 from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES, HEADER_BYTES
@@ -85,43 +83,6 @@ def test_another_programs_database_is_refused(folder):
     (folder / DATABASE).write_bytes(b"not a database at all" * 100)
     with pytest.raises(DamagedError, match=r"cannot be read as a database .*: restore a backup"):
         opened(folder)
-
-
-@pytest.mark.parametrize(("name", "fleet", "zones"), [("stopped", (30, 83), (3, 5)), ("killed", (33, 92), (4, 6))])
-def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
-    shutil.copytree(FORMAT_1 / name, folder)
-    for _ in range(2):
-        storage, contents = opened(folder)
-        assert contents.hulls == [
-            HullRow(1, "fleet", "00aa00aa00aa00aa", 1700000000.5),
-            HullRow(2, "zones/é", "00bb00bb00bb00bb", 1700000001.0, HullSettings(max_points=500)),
-        ]
-        assert (contents.next_number, contents.notes) == (3, [])
-        for number, (revision, count) in ((1, fleet), (2, zones)):
-            kept = storage.read(number)
-            assert (kept.last_revision, len(replayed(kept).hull)) == (revision, count)
-        assert (storage.oldest(1), storage.oldest(2)) == (20, 0)
-        assert storage.read(1).producers == {"p0": 24, "p1": 25, "p2": 23}
-        assert storage.read(2).records[0].producer == "truck"
-        storage.close()
-
-
-def test_a_folder_of_format_1_goes_on(folder):
-    shutil.copytree(FORMAT_1 / "killed", folder)
-    storage, _ = opened(folder)
-    append(storage, 34, 40)
-    snapshot(storage, 40)
-    storage.commit([Delete(2)])
-    for step in storage.sweep():
-        storage.commit([step])
-    storage.close()
-    storage, contents = opened(folder)
-    assert ([hull.name for hull in contents.hulls], contents.notes) == (["fleet"], [])
-    assert (storage.read(1).revision, storage.oldest(1)) == (40, 25)
-    storage.close()
-    with sqlite3.connect(folder / DATABASE) as database:
-        assert database.execute("SELECT min(first) FROM batches").fetchone() == (26,)
-        assert database.execute("SELECT count(*) FROM chunks").fetchone() == (2,)
 
 
 def test_what_a_snapshot_makes_superfluous_is_dropped(folder):

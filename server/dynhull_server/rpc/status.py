@@ -99,13 +99,11 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
     match error:
         case InvalidFieldError():
             return _invalid_field(within, error, where)
+        case KeyRepeatedError():
+            first = {"first_field": f"{within}batch.{error.first[0]}", "first_row": str(error.first[1])}
+            return _invalid_field(within, _of_batch(error), first | where, "KEY_REPEATED")
         case InvalidBatchError():
-            field = f"batch.{error.field}"
-            first = {}
-            if isinstance(error, KeyRepeatedError):
-                first = {"first_field": f"{within}batch.{error.first[0]}", "first_row": str(error.first[1])}
-            invalid = InvalidFieldError(field, error.value, error.problem, error.row)
-            return _invalid_field(within, invalid, first | where)
+            return _invalid_field(within, _of_batch(error), where)
         case PointMissingError():
             field, value = within + PART_FIELDS[error.part], _short(error.point)
             failure = PreconditionFailure()
@@ -183,7 +181,13 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
     raise error
 
 
-def _invalid_field(within: str, error: InvalidFieldError, where: Mapping[str, str]) -> Status:
+def _of_batch(error: InvalidBatchError) -> InvalidFieldError:
+    return InvalidFieldError(f"batch.{error.field}", error.value, error.problem, error.row)
+
+
+def _invalid_field(
+    within: str, error: InvalidFieldError, where: Mapping[str, str], reason: str = "INVALID_FIELD"
+) -> Status:
     row = {} if error.row is None else {"row": str(error.row)}
     value = _short(error.value)
     name = within + error.field
@@ -192,7 +196,7 @@ def _invalid_field(within: str, error: InvalidFieldError, where: Mapping[str, st
     detail.field_violations.add(field=field, description=f"{error.problem}, got {value}")
     message = f"{field} is {value}: {error.problem}"
     metadata = {"field": name, **row, "value": value, **where}
-    return _status(code.INVALID_ARGUMENT, message, "INVALID_FIELD", metadata, detail)
+    return _status(code.INVALID_ARGUMENT, message, reason, metadata, detail)
 
 
 def _status(number: int, message: str, reason: str, metadata: Mapping[str, str], *details: Message) -> Status:
