@@ -4,11 +4,15 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..csv_points import Row, read_points
 from .scene import Frame, Points
+
+if TYPE_CHECKING:
+    from datetime import timedelta
 
 MILESTONES = 24
 
@@ -21,7 +25,7 @@ class Table:
     point; without, every row adds a point. Rows without finite coordinates are counted and shown.
     """
 
-    max_age = None
+    max_age: "timedelta | None" = None
     counted = "points"
     step = "batches"
     length_unit = "units"
