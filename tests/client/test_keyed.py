@@ -179,11 +179,12 @@ def test_a_writer_loses_no_position(client: HullClient, name: str) -> None:
         again = writer.put(keys=["a", "d", "d"], points=[[3, 3], [4, 4], [5, 5]])
         gone = writer.remove(["d", "b"])
         timed = writer.put(keys=["e"], points=[[6, 6]], times=[NOON])
+        untimed = writer.put(keys=["f"], points=[[7, 7]])
         writer.flush()
     assert first.result() == same.result()
-    assert [each.result().revision for each in (first, again, gone, timed)] == [1, 3, 4, 5]
+    assert [each.result().revision for each in (first, again, gone, timed, untimed)] == [1, 3, 4, 4, 5]
     assert gone.result().deleted == 2
-    assert list(client.entities(name).keys) == ["a", "c", "e"]
+    assert list(client.entities(name).keys) == ["a", "c", "e", "f"]
 
 
 def test_a_writer_may_keep_the_last_position_only(client: HullClient, name: str) -> None:
@@ -222,12 +223,12 @@ def test_every_position_once_though_the_server_is_killed(tmp_path: Path, connect
         for number, (names, points) in enumerate(zip(keys, places, strict=True)):
             results.append(writer.put(keys=names, points=points))
             if number == 400:
-                wait_until(lambda: writer.sequence > 50)
+                wait_until(lambda: writer.sequence > 20)
                 first.process.kill()
                 second = stack.enter_context(server_process(*data, killed=True, torn=True))
                 way.server = second.address
             if number == 800:
-                wait_until(lambda: writer.sequence > 400)
+                wait_until(lambda: writer.sequence > 150)
                 second.process.kill()
                 way.server = stack.enter_context(server_process(*data, torn=True)).address
         writer.flush()
