@@ -1,0 +1,179 @@
+"""Keyed hulls and windows on the command line: create, put, remove, load, query, watch, list."""
+
+import json
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from command_line import dynhull
+
+from dynhull_client import HullClient
+
+ROWS = """\
+id,seen,lon,lat
+LH400,2026-03-01T12:00:00Z,0,0
+UA17,2026-03-01T13:00:00+01:00,4,0
+LH400,2026-03-01T12:00:05Z,1,1
+"""
+
+
+def entities(served, name):
+    with HullClient(served) as client:
+        there = client.entities(name)
+        times = None if there.times is None else [str(each) for each in there.times]
+        return dict(zip(there.keys, there.points.tolist(), strict=True)), times, there.revision
+
+
+@pytest.mark.usefixtures("served")
+def test_a_fleet_by_hand(name):
+    assert dynhull("create", name, "--keyed", "str", "--max-age", "2h", "--max-points", "3").exit_code == 0
+    done = dynhull("put", name, "LH400", "-73.9", "40.7")
+    assert done.stdout == f"{name}: 1 key new, 0 moved, 1 in the hull, its shape changed\n"
+    done = dynhull("put", name, "--json", input='LH400,1,1\n\n"a, b",4,0\nc,0,5\n')
+    assert json.loads(done.stdout).items() >= {"inserted": 2, "moved": 1, "points": 3, "stale": 0}.items()
+    assert dynhull("query", name, "--keys").stdout == "0.0\t5.0\tc\n1.0\t1.0\tLH400\n4.0\t0.0\ta, b\n"
+    vertex = json.loads(dynhull("query", name, "vertices", "--keys", "--json").stdout.splitlines()[0])
+    assert vertex == {"vertex": [0, 5], "key": "c"}
+    assert dynhull("query", name, "positions", "c", "nobody").stdout == "c\t0.0\t5.0\nnobody\tnan\tnan\n"
+    assert dynhull("query", name, "locate", "--keys", input="c\nnobody\n").stdout == "c\tboundary\nnobody\tmissing\n"
+    assert dynhull("query", name, "distance", "--keys", "c").stdout == "c\t0.0\n"
+    assert dynhull("query", name, "support", "1,0", "--keys").stdout == "1.0\t0.0\t4.0\t0.0\ta, b\n"
+    done = dynhull("put", name, "d", "9", "9", "--ttl", "1h")
+    assert "1 key new, 0 moved, 1 evicted, 3 in the hull" in done.stdout
+
+    done = dynhull("remove", name, "--key", "c", "--key", "nobody")
+    assert done.exit_code == 1
+    assert done.stderr.startswith("error: key 2, nobody, is not in the hull; nothing was removed.")
+    done = dynhull("remove", name, "--key", "c", "--key", "nobody", "--missing-ok")
+    assert f"{name}: 1 key removed, 1 not there, 2 in the hull" in done.stdout
+    assert dynhull("list", name).stdout == f"{name}\t2\t2\t4\tstr\t2h, 3 points\n"
+    listed = json.loads(dynhull("list", name, "--json").stdout)
+    assert (listed["keyed"], listed["max_age"], listed["max_points"]) == ("str", 7200, 3)
+    done = dynhull("create", name, "--keyed", "int", "--exist-ok")
+    assert (done.exit_code, "exists with other settings: its keyed is 'str'" in done.stderr) == (1, True)
+
+
+def test_integer_keys_and_another_hull(served, name):
+    fleet, depot = f"{name}/fleet", f"{name}/depot"
+    dynhull("create", fleet, "--keyed", "int")
+    dynhull("create", depot)
+    dynhull("insert", depot, "0,0", "2,0", "0,2")
+    assert dynhull("put", fleet, "7", "0.5", "0.5").exit_code == 0
+    assert dynhull("query", depot, "locate", "--keys", "7", "--keys-of", fleet).stdout == "7\tinside\n"
+    done = dynhull("put", fleet, "seven", "1", "1")
+    assert done.exit_code == 2
+    assert "key 1 is 'seven', not an integer from 0 to 2**64 - 1" in done.stderr
+    file = dynhull("load", fleet, "--key", "id", input="id,x,y\n8,1,1\nx,2,2\n")
+    assert (file.exit_code, "line 3: id is 'x', not an integer" in file.stderr) == (0, True)
+    assert entities(served, fleet)[0] == {7: [0.5, 0.5], 8: [1, 1]}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["put", "HULL", "a", "1"], "give KEY X Y, three arguments: 2 were given"),
+        (["put", "HULL", "a", "1", "inf"], "arguments: 'a,1,inf' is not KEY,X,Y with finite numbers"),
+        (
+            ["put", "HULL", "a", "1", "2", "--time", "2026-03-01T12:00"],
+            "--time is '2026-03-01T12:00', without a time zone",
+        ),
+        (["put", "HULL", "a", "1", "2", "--ttl", "soon"], "--ttl 'soon' is not a time span: write for example"),
+        (["create", "HULL/x", "--max-age", "forever"], "--max-age 'forever' is not a time span"),
+        (["create", "HULL/x", "--clock", "data"], "give max_age or max_points, too"),
+        (["remove", "HULL", "1,2", "--key", "a"], "give either points or --key"),
+        (["query", "HULL", "count", "--keys", "a"], "count is about points: --keys is for"),
+        (["query", "HULL", "vertices", "--keys-of", "b"], "--keys-of is given with --keys"),
+        (["load", "HULL", "--time-unit", "s"], "--time-unit is given with --time"),
+    ],
+    ids=lambda value: "-".join(value[:1] + value[2:]) if isinstance(value, list) else "",
+)
+def test_what_is_wrong_is_named(served, name, arguments, words):
+    dynhull("create", name, "--keyed", "str")
+    done = dynhull(*(each.replace("HULL", name) for each in arguments))
+    assert (done.exit_code, words in done.stderr) == (2, True), done.stderr
+    assert entities(served, name)[2] == 0
+
+
+def test_a_table_of_keys_is_loaded_once(served, name, tmp_path):
+    file = tmp_path / "seen.csv"
+    file.write_text(ROWS + "BA2,2026-03-01T12:00:00,2,2\n,2026-03-01T12:00:00Z,2,2\n")
+    assert (
+        dynhull("create", name, "--keyed", "str", "--event-order", "--max-age", "1h", "--clock", "data").exit_code == 0
+    )
+    done = dynhull("load", name, file, "--key", "id", "--time", "seen")
+    assert (done.exit_code, done.stdout) == (0, f"{name}: 3 points loaded, 2 in the hull\n")
+    assert "line 5: seen is '2026-03-01T12:00:00', without a time zone: add Z for UTC, or an offset" in done.stderr
+    assert "line 6: id is missing" in done.stderr
+    points, times, revision = entities(served, name)
+    assert (points, revision) == ({"LH400": [1, 1], "UA17": [4, 0]}, 2)
+    assert times == ["2026-03-01T12:00:05.000000", "2026-03-01T12:00:00.000000"]
+    assert "loaded before" in dynhull("load", name, file, "--key", "id", "--time", "seen").stderr
+    done = dynhull("load", name, file, "--key", "id", "--time", "seen", "--resume")
+    assert (done.exit_code, entities(served, name)[2]) == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("number", "unit"),
+    [
+        ("1772366400", "seconds"),
+        ("1772366400.5", "seconds"),
+        ("1772366400000", "milliseconds"),
+        ("1772366400000000", "microseconds"),
+        ("1772366400000000000", "nanoseconds"),
+    ],
+)
+def test_numbers_are_times_in_a_unit_that_is_printed(served, name, number, unit):
+    dynhull("create", name, "--keyed", "str", "--max-age", "1h", "--clock", "data")
+    done = dynhull("load", name, "--key", "id", "--time", "ts", input=f"id,ts,x,y\na,{number},1,1\n")
+    assert f"ts: times are {unit} since 1970, the first is 2026-03-01T12:00:00" in done.stderr
+    assert entities(served, name)[1][0].startswith("2026-03-01T12:00:00")
+
+
+def test_the_unit_of_times_may_be_given(served, name):
+    dynhull("create", name, "--keyed", "str", "--max-age", "1h", "--clock", "data")
+    done = dynhull(
+        "load", name, "--key", "id", "--time", "ts", "--time-unit", "ms", input="id,ts,x,y\na,86400000,1,1\n"
+    )
+    assert (done.exit_code, "since 1970" in done.stderr) == (0, False)
+    assert entities(served, name)[1] == ["1970-01-02T00:00:00.000000"]
+
+
+def features(rows):
+    return json.dumps(
+        {
+            "type": "FeatureCollection",
+            "features": [
+                {
+                    "type": "Feature",
+                    "id": key,
+                    "properties": {"seen": seen},
+                    "geometry": {"type": "Point", "coordinates": [x, y]},
+                }
+                for key, seen, x, y in rows
+            ],
+        }
+    )
+
+
+def test_keys_of_every_format(served, name, tmp_path):
+    rows = [("a", "2026-03-01T12:00:00Z", 1.0, 2.0), ("b", "2026-03-01T12:00:01Z", 3.0, 4.0)]
+    names = ("id", "seen", "x", "y")
+    (tmp_path / "p.json").write_text(json.dumps([dict(zip(names, row, strict=True)) for row in rows]))
+    (tmp_path / "p.ndjson").write_text("\n".join(json.dumps(dict(zip(names, row, strict=True))) for row in rows))
+    (tmp_path / "p.geojson").write_text(features(rows))
+    table = pa.table(dict(zip(names, zip(*rows, strict=True), strict=True)))
+    seen = table["seen"].cast(pa.timestamp("us", "UTC"))
+    pq.write_table(table.set_column(1, "seen", seen), tmp_path / "p.parquet")
+    for file in sorted(tmp_path.iterdir()):
+        hull = f"{name}/{file.suffix[1:]}"
+        dynhull("create", hull, "--keyed", "str", "--event-order")
+        done = dynhull("load", hull, file, "--key", "id", "--time", "seen")
+        assert done.exit_code == 0, done.stderr
+        points, times, _ = entities(served, hull)
+        assert points == {"a": [1, 2], "b": [3, 4]}
+        assert times == ["2026-03-01T12:00:00.000000", "2026-03-01T12:00:01.000000"]
+    plain = f"{name}/plain"
+    dynhull("create", plain)
+    dynhull("insert", plain, "1,1")
+    done = dynhull("load", plain, tmp_path / "p.json", "--key", "id")
+    assert (done.exit_code, "have no keys: leave out --key" in done.stderr) == (2, True)
