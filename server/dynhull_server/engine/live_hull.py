@@ -14,7 +14,13 @@ from dynhull import DynamicHull
 from dynhull.arrays import Checked, Points
 
 from ..state.contents.live import AnyHull
-from ..state.errors import HullEmptyError, HullNotFoundError, HullReplacedError, RevisionForgottenError
+from ..state.errors import (
+    HullEmptyError,
+    HullNotFoundError,
+    HullReplacedError,
+    HullUnsuitableError,
+    RevisionForgottenError,
+)
 from ..state.events import ReadHull
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
@@ -92,6 +98,11 @@ class LiveHull:
     def saved(self, points: int) -> None:
         """Record a snapshot, which includes batches with this number of points."""
         self._hull.unsaved -= points
+
+    def require_keys(self) -> None:
+        """Raise HullUnsuitableError if the points have no keys."""
+        if self.settings.identity == "multiset":
+            raise HullUnsuitableError(self.name, "has points without keys")
 
     # Reads
 

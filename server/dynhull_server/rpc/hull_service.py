@@ -277,13 +277,16 @@ class HullService:
         encoding = decode.decode_encoding(request.encoding)
         directions = decode.decode_directions(request.directions) if request.HasField("directions") else None
         resume = decode.decode_resume(request)
+        keys = request.include_keys
+        if keys:
+            hull.require_keys()
         view: View
         if directions is not None:
-            view = SketchView(hull, directions, vertices=request.include_measures)
+            view = SketchView(hull, directions, vertices=request.include_measures, keys=keys)
         elif resume is None:
-            view = VerticesView(hull)
+            view = VerticesView(hull, keys=keys)
         else:
-            view = ResumedView(hull, resume.uid, resume.revision)
+            view = ResumedView(hull, resume.uid, resume.revision, keys=keys)
         events = watch(
             hull,
             view,
