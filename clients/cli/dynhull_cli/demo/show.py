@@ -42,9 +42,10 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
 
         draw(out, scene, largest)
         console.print(f"Largest at {largest.frame.clock}: {largest.area:,.0f} {scene.area_unit}. Picture: {out}")
-    what = ", its keys with those that were sent," if scene.keyed else ""
+    sent = "keys and positions" if scene.keyed else "points"
     console.print(
-        f"Live hull{what} compared with Chan's recomputation and with the watcher's copy: {agreed} {scene.step}"
+        "Compared after each batch: the live hull with Chan's recomputation, its "
+        f"{sent} with those sent, the watcher's copy with the live hull: {agreed} {scene.step}"
     )
     if difference:
         console.print(f"[red]DIFFERENT[/red] at {difference}")
