@@ -34,6 +34,13 @@ def test_a_day_of_flights(tmp_path):
     assert is_picture(picture)
 
 
+def test_the_positions_of_the_last_half_hour(tmp_path):
+    done = demo("--day", "2013-02-09", "--window", "30m", "--out", tmp_path / "window.png")
+    assert done.returncode == 0, done.stderr
+    assert "positions of the last 30m" in done.stdout
+    assert done.stdout.splitlines()[-1] == "VERIFIED 1440/1440"
+
+
 def test_points_of_ones_own(tmp_path):
     rng = np.random.default_rng(5)
     rows = [f"{minute},{truck},{x},{y}" for minute in range(20) for truck, (x, y) in enumerate(rng.random((15, 2)))]

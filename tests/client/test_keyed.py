@@ -17,6 +17,7 @@ from dynhull_client import (
     Batch,
     DuplicateKeyError,
     HullClient,
+    HullCopy,
     HullExistsError,
     HullNotFoundError,
     HullUnsuitableError,
@@ -169,6 +170,40 @@ def test_a_key_moves_from_hull_to_hull(client: HullClient, name: str) -> None:
     with pytest.raises(KeyMissingError):
         client.transfer(batches, producer="p", sequence=2)
     assert (client.get_hull(north).revision, client.get_hull(south).revision) == (2, 1)
+
+
+def test_a_watch_names_the_corners(client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str", max_age=600, clock="data")
+    client.put(name, FLEET, PLACES, [NOON] * 4)
+    copy, plain = HullCopy(), HullCopy()
+    with client.watch(name, keys=True, copy=copy) as watch, client.watch(name, copy=plain) as unnamed:
+        first = next(watch)
+        assert (first.vertex_keys, first.cause) == (("LH400", "UA17", "AF84"), "batch")
+        assert (first.clock, next(unnamed).vertex_keys) == (NOON, None)
+        rng = np.random.default_rng(2)
+        for step in range(30):
+            client.put(name, FLEET, rng.integers(0, 4, (4, 2)), [NOON + timedelta(seconds=step)] * 4)
+            hull = client.get_hull(name)
+            while copy.revision < hull.revision:
+                next(watch)
+            assert copy.vertex_keys == hull.vertex_keys
+            assert copy.vertices.tolist() == hull.vertices.tolist()
+        client.put(name, ["new"], [[1, 1]], [NOON + timedelta(hours=1)])
+        while copy.vertex_keys != ("new",):
+            last = next(watch)
+        assert last.clock == NOON + timedelta(hours=1)
+    resumed = HullCopy()
+    resumed.update(client_snapshot(client, name))
+    client.put(name, ["newer"], [[2, 2]], [NOON + timedelta(hours=1)])
+    with client.watch(name, keys=True, copy=resumed) as watch:
+        while resumed.vertex_keys != ("new", "newer"):
+            next(watch)
+
+
+def client_snapshot(client: HullClient, name: str) -> Any:
+    """The first event of a watch that does not name vertices."""
+    with client.watch(name) as watch:
+        return next(watch)
 
 
 def test_a_writer_loses_no_position(client: HullClient, name: str) -> None:
