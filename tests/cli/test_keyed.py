@@ -68,6 +68,17 @@ def test_integer_keys_and_another_hull(served, name):
     assert entities(served, fleet)[0] == {7: [0.5, 0.5], 8: [1, 1]}
 
 
+def test_a_watch_names_who_joins_and_leaves_the_corners(served, name):
+    with HullClient(served) as client:
+        client.create_hull(name, keyed="str")
+        client.put(name, ["a", "b", "c", "d"], [[0, 0], [4, 0], [0, 4], [1, 1]])
+        shown = dynhull("watch", name, "--keys", "--events", "1").stdout
+        assert shown.split()[1:4] == ["4", "3", "+3"]
+        assert shown.rstrip().endswith("+a +b +c")
+        event = json.loads(dynhull("watch", name, "--keys", "--events", "1", "--json").stdout)
+        assert (event["joined"], event["left"]) == (["a", "b", "c"], [])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

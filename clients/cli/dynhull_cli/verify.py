@@ -29,7 +29,7 @@ def verify(
     different = 0
     for name in names or [info.name for info in client.list_hulls()]:
         found = client.verify(name, timeout=timeout)
-        different += not found.equal
+        different += not (found.equal and found.keys_equal)
         typer.echo(json_line(name=name, **asdict(found)) if as_json else f"{name}: {_summary(found)}")
     if different:
         sys.exit(Exit.FAILED)
@@ -38,6 +38,8 @@ def verify(
 def _summary(found: "Verification") -> str:
     if not found.equal:
         return f"DIFFERENT at revision {found.revision:,}: {found.difference}"
+    if not found.keys_equal:
+        return f"DIFFERENT at revision {found.revision:,}: the points are not the positions of the keys"
     rounds = ", ".join(f"{each.guess:,}" for each in found.rounds)
     how = f"Chan's guesses: {rounds}" if rounds else "nothing to compute"
     return f"verified at revision {found.revision:,}: {found.points:,} points, {found.vertices:,} vertices ({how})"
