@@ -95,6 +95,20 @@ def wait_for_watchers(metrics: str, count: int) -> None:
     wait_until(lambda: scrape(metrics)["dynhull_watchers"] == count)
 
 
+def place_of(page: Page, x: float, y: float) -> list[float]:
+    """Where a point is on the screen."""
+    place: list[float] = page.evaluate(
+        """([x, y]) => {
+            const view = Bokeh.index.get_by_id(Bokeh.documents[0].get_model_by_name("plane").id)
+            const box = view.el.getBoundingClientRect()
+            const [right] = view.frame.x_scale.v_compute([x]), [down] = view.frame.y_scale.v_compute([y])
+            return [box.x + right, box.y + down]
+        }""",
+        [x, y],
+    )
+    return place
+
+
 def test_the_polygon_follows_the_hull(browser: Browser, url: str, client: HullClient, hull: str) -> None:
     generator = np.random.default_rng(3)
     with opened(browser, url, hull) as page:
@@ -116,16 +130,25 @@ def test_the_polygon_follows_the_hull(browser: Browser, url: str, client: HullCl
 def test_hovering_shows_coordinates_and_revision(browser: Browser, url: str, hull: str) -> None:
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
-        at = page.evaluate("""() => {
-            const view = Bokeh.index.get_by_id(Bokeh.documents[0].get_model_by_name("plane").id)
-            const box = view.el.getBoundingClientRect()
-            const [x] = view.frame.x_scale.v_compute([4]), [y] = view.frame.y_scale.v_compute([4])
-            return [box.x + x, box.y + y]
-        }""")
-        page.mouse.move(*at)
+        page.mouse.move(*place_of(page, 4, 4))
         tip = page.locator(".bk-Tooltip")
         expect(tip).to_contain_text(f"a vertex of {hull}")
         expect(tip).to_contain_text("revision")
+
+
+def test_vertices_have_the_names_of_their_keys(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str")
+    client.put(name, ["LH400", "UA17", "AF84", "<b>BA2"], SQUARE)
+    with opened(browser, url, name) as page:
+        wait_for_vertices(page, name, SQUARE)
+        labels = """name => Bokeh.documents[0].get_model_by_name("plane").renderers
+            .find(each => each.data_source.name == `vertices of ${name}`).data_source.data.label"""
+        assert page.evaluate(labels, name) == ["LH400", "UA17", "AF84", "<b>BA2"]
+        page.mouse.move(*place_of(page, 0, 4))
+        expect(page.locator(".bk-Tooltip")).to_contain_text(f"<b>BA2: a vertex of {name}")
+        client.put(name, ["a"], [[0, 0]])  # of two at one place the least is named
+        client.remove(name, ["LH400"])
+        page.wait_for_function(f"name => ({labels})(name)[0] == 'a'", arg=name)
 
 
 def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullClient, hull: str) -> None:

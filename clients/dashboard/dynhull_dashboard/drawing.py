@@ -1,6 +1,7 @@
 """Points as sent to the pages, serialized once for all of them."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dynhull_client import Points as Points
@@ -14,17 +15,21 @@ class Drawing:
         source: the name of the data source on the page.
         revision: the revision of the hull with these points.
         points: float64 array of shape (n, 2).
+        keys: the key of each point; None in a hull without keys.
         message: all of these as JSON.
     """
 
     source: str
     revision: int
     points: Points
+    keys: Sequence[str | int] | None = None
     message: str = field(init=False)
 
     def __post_init__(self) -> None:
         x, y = self.points.T.tolist()
-        columns = {"source": self.source, "revision": self.revision, "x": x, "y": y}
+        # As text: a browser's numbers are doubles, and integer keys may be larger.
+        keys = None if self.keys is None else [str(key) for key in self.keys]
+        columns = {"source": self.source, "revision": self.revision, "x": x, "y": y, "keys": keys}
         object.__setattr__(self, "message", json.dumps(columns))
 
 

@@ -7,6 +7,8 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from dynhull_client import (
     AsyncHullClient,
     AsyncWatch,
@@ -15,13 +17,14 @@ from dynhull_client import (
     Event,
     HullCopy,
     HullNotFoundError,
+    HullUnsuitableError,
     Progress,
     Verification,
 )
 
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
-from .outline import Box, outline, without
+from .outline import Box, apart, drawn
 
 MAX_RATE = 10.0
 PROGRESS_SECONDS = 0.5
@@ -85,6 +88,7 @@ class HullFeed:
         self._outline = Drawing(vertices_of(self.name), 0, NO_POINTS)
         self._inner = Drawing(points_of(self.name), 0, NO_POINTS)
         self.verified: Verified | None = None
+        self._keyed = True  # until the server says otherwise
 
     def drawings(self) -> tuple[Drawing, Drawing]:
         """The vertices, and a sample of the other points."""
@@ -122,10 +126,18 @@ class HullFeed:
             copy = HullCopy()
             try:
                 async with self._client.watch(
-                    self.name, max_rate=MAX_RATE, progress_interval=PROGRESS_SECONDS, measures=True, copy=copy
+                    self.name,
+                    max_rate=MAX_RATE,
+                    progress_interval=PROGRESS_SECONDS,
+                    measures=True,
+                    copy=copy,
+                    keys=self._keyed,
                 ) as self._watch:
                     async for event in self._watch:
                         self._take(event, copy)
+            except HullUnsuitableError:
+                self._keyed = False
+                continue
             except DynhullError as error:
                 self._failure = error
                 if isinstance(error, HullNotFoundError):
@@ -141,7 +153,9 @@ class HullFeed:
         self.vertices = len(copy.vertices)
         self.area = event.measures.area
         self.bounds = event.measures.bounds if self.vertices else None
-        self._outline = Drawing(vertices_of(self.name), event.revision, outline(copy.vertices))
+        shown = drawn(self.vertices)
+        keys = None if copy.vertex_keys is None else copy.vertex_keys[shown]
+        self._outline = Drawing(vertices_of(self.name), event.revision, copy.vertices[shown], keys)
 
     async def _count(self) -> None:
         """Add a row to the history every second."""
@@ -160,9 +174,10 @@ class HullFeed:
 
     async def _sample(self) -> None:
         if self._inner.revision != self.revision:
-            sampled = await self._client.sample_points(self.name, SAMPLE_SIZE)
-            others = without(sampled.points, self._outline.points)
-            self._inner = Drawing(points_of(self.name), sampled.revision, others)
+            sampled = await self._client.sample_points(self.name, SAMPLE_SIZE, keys=self._keyed and self.followed)
+            inner = apart(sampled.points, self._outline.points)
+            keys = None if sampled.keys is None else [sampled.keys[row] for row in np.flatnonzero(inner)]
+            self._inner = Drawing(points_of(self.name), sampled.revision, sampled.points[inner], keys)
 
     def _sample_pause(self) -> float:
         return FEW_POINTS_SECONDS if self.points <= SAMPLE_SIZE else MANY_POINTS_SECONDS

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 import numpy as np
+import numpy.typing as npt
 
 from .drawing import Points
 
@@ -16,14 +17,14 @@ MARGIN = 0.08
 LEAST_FILLED = 0.5
 
 
-def outline(vertices: Points) -> Points:
+def drawn(count: int) -> slice:
     """The vertices to draw: all of them, or every k-th where there are more than `MOST_DRAWN`."""
-    return vertices[:: max(1, -(-len(vertices) // MOST_DRAWN))]
+    return slice(None, None, max(1, -(-count // MOST_DRAWN)))
 
 
-def without(points: Points, vertices: Points) -> Points:
-    """The points that are not vertices, which have a marker of their own."""
-    return points[~np.isin(points @ (1, 1j), vertices @ (1, 1j))]
+def apart(points: Points, vertices: Points) -> npt.NDArray[np.bool_]:
+    """Whether each point is not a vertex: these have a marker of their own."""
+    return ~np.isin(points @ (1, 1j), vertices @ (1, 1j))
 
 
 def frame_around(boxes: Iterable[Box], frame: Box | None, same_scale: bool = True) -> Box | None:

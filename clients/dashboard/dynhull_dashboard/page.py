@@ -26,6 +26,7 @@ TEMPLATE = Template(Path(__file__).with_name("page.html").read_text("utf-8"))
 STYLE = Path(__file__).with_name("widgets.css").read_text("utf-8")
 
 HULL_COLUMNS = ("points", "vertices", "area", "rate")
+MOST_LABELS = 24  # vertices with a name beside them; of more, hovering shows the name
 SERVER_LOOKS = {"updates": MEAN, "mean": MEAN, "percentile": PERCENTILE}
 
 
@@ -75,6 +76,7 @@ class Page:
             with_metrics=hub.metrics is not None,
             area_unit=hub.units.area,
             most_hulls=len(LOOKS),
+            most_labels=MOST_LABELS,
             mean=key(MEAN),
             percentile=key(PERCENTILE),
         )

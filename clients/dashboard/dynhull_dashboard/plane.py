@@ -23,7 +23,7 @@ FILL_ALPHA, POINT_ALPHA = 0.12, 0.65
 AXIS_LABEL_HEIGHT = 24
 VERTEX_SIZE, POINT_SIZE = 8, 4
 EMPTY_FRAME: Box = (0.0, 0.0, 1.0, 1.0)
-TOOLTIPS = [("", "$name"), ("x", "@x{%.12g}"), ("y", "@y{%.12g}"), ("revision", "@revision")]
+TOOLTIPS = [("", "@title$name"), ("x", "@x{%.12g}"), ("y", "@y{%.12g}"), ("revision", "@revision")]
 
 
 class DrawnHull:
@@ -47,7 +47,15 @@ class DrawnHull:
                 source=vertices, marker=look.marker, size=VERTEX_SIZE, color=colour, name=f"a vertex of {name}"
             ),
         ]
-        self.renderers = [surface, *self.markers]
+        names = plot.text(
+            source=vertices,
+            text="label",
+            text_align="side",
+            y_offset=-VERTEX_SIZE,
+            text_color=colour,
+            text_font_size="12px",
+        )
+        self.renderers = [surface, *self.markers, names]
 
 
 class Plane:
@@ -125,4 +133,6 @@ def _corners(frame: Box) -> dict[str, list[float]]:
 
 def _source(name: str) -> ColumnDataSource:
     """An empty data source. It is not synced: the page must not send back what the socket sent it."""
-    return ColumnDataSource({"x": [], "y": [], "revision": []}, name=name, syncable=False)
+    return ColumnDataSource(
+        {"x": [], "y": [], "revision": [], "title": [], "label": [], "side": []}, name=name, syncable=False
+    )

@@ -105,7 +105,9 @@ class Gathering:
         """Whether the part may go into the same batch."""
         if self._timed is not None and part.timed is not None and self._timed != part.timed:
             return False
-        return all(_coalesces(self._latest, key, part.latest[key], self._coalesce) for key in part.latest)
+        if self._latest.keys().isdisjoint(part.latest):
+            return True
+        return all(_coalesces(self._latest, key, stamp, self._coalesce) for key, stamp in part.latest.items())
 
     def add(self, part: Part) -> None:
         """Add a part."""
