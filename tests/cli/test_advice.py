@@ -51,6 +51,13 @@ LOADS = [
     ("load loaded points.csv", "--resume loads", "load loaded points.csv --resume"),
     ("load loaded points.csv", "--again all", "load loaded points.csv --again"),
     ("load loaded points.csv", "--replace deletes", "load loaded points.csv --replace"),
+    ("load loaded points.csv --key x", "leave out --key", "load loaded points.csv --again"),
+    (
+        "load {name} points.csv --time-unit s",
+        "--time-unit is given with --time",
+        "load {name} points.csv --key x --time y --time-unit s",
+    ),
+    ("query loaded vertices --keys", "leave out --keys", "query loaded vertices"),
     ("insert {name} 1,2", "`dynhull list`", "list"),
     ("insert {name} 1,2", "`dynhull create`", "create {name}; insert {name} 1,2"),
     ("insert loaded", "as lines of standard input", "insert loaded -1,2"),
@@ -67,6 +74,9 @@ FOLLOWED_ELSEWHERE = {
     "dynhull serve": "every test with a server",
     "--id": "test_table.py: the columns of the demo",
     "--time": "test_table.py: the columns of the demo",
+    "--keys-of": "test_keyed.py: test_integer_keys_and_another_hull",
+    "--window": "test_demo.py: test_the_positions_of_the_last_half_hour",
+    "--points": "test_demo.py: test_points_of_ones_own",
     "--day": "test_demo.py: test_a_day_of_flights",
     "pip install": "by hand: needs an index of packages",
 }

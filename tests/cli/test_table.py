@@ -32,10 +32,8 @@ def test_moves_by_id_in_the_order_of_time(tmp_path):
     frames = list(scene.frames())
     assert scene.length == len(frames) == 2
     assert [frame.clock for frame in frames] == ["2", "10"]
-    assert frames[0].delete.tolist() == []
-    assert frames[0].insert.tolist() == [[5, 5], [1, 1]]
-    assert frames[1].delete.tolist() == [[5, 5], [1, 1]]
-    assert frames[1].insert.tolist() == [[0, 0], [7, 7], [7, 7]]
+    assert (frames[0].keys, frames[0].points.tolist()) == (["a", "b"], [[5, 5], [1, 1]])
+    assert (frames[1].keys, frames[1].points.tolist()) == (["a", "b", "c"], [[0, 0], [7, 7], [7, 7]])
     assert frames[1].positions.tolist() == [[0, 0], [7, 7], [7, 7]]
     assert frames[1].names == ["a", "b", "c"]
     assert frames[1].names_at(frames[1].positions[1:2]) == ["b +1"]
@@ -49,8 +47,8 @@ def test_times_that_are_no_numbers_are_ordered_as_text(tmp_path):
 def test_without_time_or_id_the_file_is_cut_in_parts(tmp_path):
     text = "X,Y\n" + "".join(f"{i},{i * i}\n" for i in range(10))
     frames = list(table(write(tmp_path, text), batches=4).frames())
-    assert [len(frame.insert) for frame in frames] == [3, 3, 3, 1]
-    assert all(len(frame.delete) == 0 for frame in frames)
+    assert [len(frame.points) for frame in frames] == [3, 3, 3, 1]
+    assert all(len(frame.keys) == 0 for frame in frames)
     assert len(frames[-1].positions) == 10
 
 
