@@ -76,7 +76,7 @@ def create_hull(name: str, *, exist_ok: bool = False, timeout: float | None = No
     """Create an empty hull.
 
     Args:
-        name: 1 to 200 letters, digits and "._-/".
+        name: 1 to 200 letters a to z and A to Z, digits and "._-/".
         exist_ok: whether to return an existing hull of that name, with its points, instead of raising HullExistsError.
         timeout: seconds, instead of the client's.
     """

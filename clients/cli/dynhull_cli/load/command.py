@@ -95,7 +95,7 @@ def load(
 
     _check(decimal, replace=replace, resume=resume, again=again)
     options = Options(x, y, delimiter, decimal, header, encoding, vertices)
-    with open_source(file, format, options) as source, open_bad_rows(bad_rows) as bad_file:
+    with open_source(file, format, options) as source, open_bad_rows(bad_rows, source) as bad_file:
         bad = BadRows(bad_file, max_bad)
         if dry_run:
             report_reading(name, source, bad, as_json)

@@ -36,6 +36,7 @@ def _chunk(rows: list[list[str]], line: int, table: CsvTable, decimal: str) -> C
     """The points of rows that begin on that line."""
     places = table.x, table.y
     try:
+        table.require_no_more_fields(max(rows, key=len))
         texts = [[row[place] for row in rows] for place in places]
         # One check for all: a number with _ or with the other decimal mark is looked at below, row by row.
         plain("".join(map("".join, texts)), decimal)
@@ -48,6 +49,7 @@ def _chunk(rows: list[list[str]], line: int, table: CsvTable, decimal: str) -> C
         return Chunk(points + 0.0)
 
     def positions(row: list[str]) -> list[Position]:
+        table.require_no_more_fields(row)
         x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
         return [(x, y)]
 
