@@ -263,6 +263,17 @@ def test_copies_are_equal_and_independent(make, duplicate):
         hash(window)
 
 
+@pytest.mark.parametrize("reader", WINDOWS)
+def test_every_implementation_reads_every_pickle(make, reader):
+    window = make(max_age=100, max_points=5)
+    window.add([*SQUARE, [2, 2], [2, 2]], [3, 1, 4, 1, 5, 9])
+    window.add([[7, 7]], [2])
+    other = WINDOWS[reader].__new__(WINDOWS[reader])
+    other.__setstate__(window.__getstate__())
+    assert other == window
+    assert (other.evicted, other.changes) == (2, window.changes)
+
+
 def test_windows_differ_by_points_times_limits_and_clock(make):
     def window(points=SQUARE, times=(1, 2, 3, 4), now=9, **limits):
         made = make(**({"max_age": 50} | limits))
