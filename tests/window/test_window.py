@@ -4,9 +4,12 @@ import copy
 import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from datetime import datetime
 from fractions import Fraction
 from math import inf, nextafter
+from threading import Event
+from time import sleep
 
 import numpy as np
 import pytest
@@ -314,12 +317,20 @@ def test_a_window_answers_as_a_hull_does(make):
     assert WindowHull.__module__ == "dynhull"
 
 
+@contextmanager
+def switching_after(seconds):
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(seconds)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(interval)
+
+
 @pytest.mark.skipif("cpp" not in WINDOWS, reason="without the kernel, threads take turns")
 def test_threads_move_one_window():
-    """Writers, clocks and readers at every chance: no answer belongs to half an update."""
+    """Writers and readers at every chance: no answer belongs to half an update."""
     window = WINDOWS["cpp"](max_age=50.0)
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
 
     def write(number):
         random = np.random.default_rng(number)
@@ -335,15 +346,42 @@ def test_threads_move_one_window():
             other.check()
             assert other.oldest is None or other.oldest > other.now - 50
 
-    try:
-        with ThreadPoolExecutor(4) as pool:
-            writers = [pool.submit(write, number) for number in range(2)]
-            for reader in [pool.submit(read, number) for number in range(2)]:
-                reader.result()
-            added = sum(writer.result() for writer in writers)
-    finally:
-        sys.setswitchinterval(interval)
+    with switching_after(1e-6), ThreadPoolExecutor(4) as pool:
+        writers = [pool.submit(write, number) for number in range(2)]
+        for reader in [pool.submit(read, number) for number in range(2)]:
+            reader.result()
+        added = sum(writer.result() for writer in writers)
     window.check()
     assert added == len(window) + window.expired
     left = len(window)
     assert window.advance(1e6) == left
+
+
+@pytest.mark.skipif("cpp" not in WINDOWS, reason="without the kernel, threads take turns")
+@pytest.mark.parametrize(
+    "update", [lambda window: window.advance(9), lambda window: window.add([[5, 5]], [9])], ids=["advance", "add"]
+)
+def test_other_threads_run_while_many_points_expire(update):
+    """Although the update itself has one row at most. A thread never takes the interpreter from another here."""
+    window = WINDOWS["cpp"](max_age=5.0)
+    window.add(np.random.default_rng(0).random((20_000, 2)), np.ones(20_000))
+    copies = [window.copy() for _ in range(50)]  # the system may be slow to run the other thread
+    steps, done = [], Event()
+
+    def count():
+        while not done.is_set():
+            steps.append(None)
+            sleep(0)  # releases the interpreter
+
+    with switching_after(1000), ThreadPoolExecutor(1) as pool:
+        pool.submit(count)
+        try:
+            for each in copies:
+                before = len(steps)
+                update(each)
+                if len(steps) > before:
+                    break
+            else:
+                pytest.fail("the other thread stood still")
+        finally:
+            done.set()
