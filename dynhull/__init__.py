@@ -6,9 +6,19 @@ from . import _hull, static
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
 from ._predicates import orient2d
+from ._window import WindowHull
 from .static import convex_hull
 
-__all__ = ["KERNEL", "DynamicHull", "MissingPointError", "__version__", "convex_hull", "orient2d", "static"]
+__all__ = [
+    "KERNEL",
+    "DynamicHull",
+    "MissingPointError",
+    "WindowHull",
+    "__version__",
+    "convex_hull",
+    "orient2d",
+    "static",
+]
 
 __version__: str
 """The version of the installed distribution."""
@@ -22,6 +32,6 @@ def __getattr__(name: str) -> str:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-for _public in (DynamicHull, MissingPointError):
+for _public in (DynamicHull, MissingPointError, WindowHull):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

@@ -15,7 +15,7 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library.md"
 
 PACKAGES = {
     "dynhull": {
-        *("KERNEL", "DynamicHull", "MissingPointError", "convex_hull", "orient2d"),
+        *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d"),
         *("arrays", "measure", "static"),  # imported with it
     },
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
