@@ -113,7 +113,7 @@ def test_addresses_as_people_write_them(served, name):
         assert dynhull("list", name, "--address", address).stdout.startswith(name), address
     done = dynhull("list", "--address", f"https://{served}")
     assert done.exit_code == 3
-    assert "does it serve TLS at all" in done.stderr
+    assert "does it serve TLS?" in done.stderr
     for address in ("ftp://a", f"{host}:", f"{host}:{port}0000", f"{host}:0", "a b", "", "http://a/b", "1:2:3"):
         done = dynhull("list", "--address", address)
         assert done.exit_code == 2, address

@@ -23,7 +23,7 @@ def target(address: str) -> tuple[str, bool]:
     before, mark, after = address.partition("://")
     scheme, place = (before.lower(), after.removesuffix("/")) if mark else ("", address)
     if scheme not in TLS_BY_SCHEME:
-        raise ValueError(f"address {address!r}: a server is not reached by {scheme}://. {EXAMPLE}")
+        raise ValueError(f"address {address!r}: there is no scheme {scheme}:// for servers. {EXAMPLE}")
     found = PLACE.fullmatch(f"[{place}]" if _is_ipv6(place) else place)
     if found is None:
         raise ValueError(f"address {address!r} is not a host and a port. {EXAMPLE}")

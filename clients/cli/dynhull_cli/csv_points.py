@@ -19,14 +19,14 @@ def read_points(
 
     Args:
         path: the file.
-        x: the column of x, by name or by number from 1; without `x` and `y`, x and y, lon and lat, or the like.
+        x: the column of x, by name or by number from 1; by default the first known pair of names, such as lon and lat.
         y: the column of y.
-        identity: the column of each point's name; without, the name is the number of its line.
-        time: the column of each point's time; without, the time is empty.
+        identity: the column of each point's name; None to name points by the number of their line.
+        time: the column of each point's time; None for empty times.
 
     Returns:
-        The rows, and lines of text about them: their number, and which were left out because they have no finite
-        coordinates, no name or no time.
+        The rows, and lines of text: the number of rows, and the rows left out because they lack finite coordinates, a
+        name or a time.
 
     Raises:
         ValueError: the file does not have the columns, or no points.

@@ -4,14 +4,14 @@ import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from .connected import AsJson, Exit, connected, fail
 from .json_lines import json_line
 from .plural import plural
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from dynhull_client import HullClient, HullInfo
 
 Names = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
@@ -29,6 +29,8 @@ def list_hulls(
 
     A terminal shows a table; a pipe receives one line per hull with tabs between the columns.
     """
+    from rich.console import Console
+
     hulls = client.list_hulls(prefix)
     console = Console(highlight=False)
     if console.is_terminal and not as_json:
@@ -110,7 +112,9 @@ def _confirm(found: "list[HullInfo]") -> None:
         fail(Exit.FAILED, "nothing was deleted")
 
 
-def _table(hulls: "list[HullInfo]") -> Table:
+def _table(hulls: "list[HullInfo]") -> "Table":
+    from rich.table import Table
+
     table = Table("hull")
     for heading in ("points", "distinct", "revision"):
         table.add_column(heading, justify="right")

@@ -1,18 +1,15 @@
-"""`dynhull insert` and `dynhull remove`: a few points into a hull or out of it. Files are for `dynhull load`."""
+"""`dynhull insert` and `dynhull remove`: add or take away a few points. `dynhull load` reads files."""
 
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from .connected import AsJson, Exit, HullName, connected, fail
 from .json_lines import json_line
-from .load.chunks import Points
 from .plural import plural
-from .rows import given_or_read, number_rows
 
 if TYPE_CHECKING:
-    from dynhull_client import Applied, HullClient
+    from dynhull_client import Applied, HullClient, Points
 
 Rows = Annotated[
     list[str] | None,
@@ -57,7 +54,11 @@ def remove(
     _report(name, applied, f"{plural(applied.deleted, 'point')} removed{skipped}", as_json)
 
 
-def _all_rows(points: list[str] | None) -> Points:
+def _all_rows(points: list[str] | None) -> "Points":
+    import numpy as np
+
+    from .rows import given_or_read, number_rows
+
     rows = list(number_rows(given_or_read(points)))
     if not rows:
         raise ValueError("no points: give X,Y for each of them, as arguments or as lines of standard input")

@@ -7,7 +7,6 @@ import typer
 
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
-from .rows import given_or_read, number_rows
 from .tab_lines import tab_line
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ SIDES = {1: "inside", 0: "boundary", -1: "outside"}
 
 
 class Question(StrEnum):
-    """The questions."""
+    """The questions of `dynhull query`."""
 
     LOCATE = "locate"
     COUNT = "count"
@@ -65,6 +64,8 @@ def query(
     * lines: where the line through two points enters and leaves the hull
     * vertices (without points): the vertices of the hull, counter-clockwise
     """
+    from .rows import given_or_read, number_rows
+
     if question is Question.VERTICES:
         if points:
             raise ValueError(f"vertices takes no points, but {points[0]!r} was given")

@@ -67,7 +67,7 @@ class Flights:
         self.background = np.stack(self._project(served["lon"], served["lat"]), axis=1)
 
     def frames(self) -> Iterator[Frame]:
-        """A frame a minute: every airborne flight leaves its old place for the new one."""
+        """One frame per minute: every airborne flight moves from its old position to the new one."""
         before = np.empty((0, 2))
         for minute in range(MINUTES):
             airborne = np.flatnonzero((self._start <= minute) & (minute < self._end))

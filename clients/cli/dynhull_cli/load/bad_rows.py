@@ -1,4 +1,4 @@
-"""Rows that cannot be read as points: counted, the first ones shown, all of them written to a file if wanted."""
+"""Rows that cannot be read as points: counts them, shows the first ones, and can write all to a file."""
 
 import csv
 from collections.abc import Iterable, Iterator
@@ -12,7 +12,7 @@ from .chunks import BadRow, Chunk, Points
 
 
 class BadRows:
-    """The bad rows of a load, written to `file` if there is one; ValueError as soon as there are more than `most`."""
+    """The bad rows of a load, written to `file` if there is one; ValueError when there are more than `most`."""
 
     def __init__(self, file: TextIO | None, most: int | None) -> None:
         self.count = 0
@@ -42,5 +42,5 @@ class BadRows:
 
 
 def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:
-    """The file for the bad rows, if one is wanted."""
+    """Open the file for the bad rows; without a path, None."""
     return nullcontext() if path is None else path.open("w", encoding="utf-8", newline="")

@@ -38,9 +38,9 @@ Chunks = Generator[Chunk, None, None]
 def picked(
     rows: Iterable[tuple[str, Row]], positions: Callable[[Row], Sequence[Position]], text: Callable[[Row], str] = str
 ) -> Chunk:
-    """A chunk from rows with their places.
+    """Make a chunk from rows with their places.
 
-    `positions` returns the points of a row and raises ValueError where it has none; `text` shows the row.
+    `positions` returns the points of a row, and raises ValueError if it has none; `text` returns its text for messages.
     """
     points: list[Position] = []
     bad = []

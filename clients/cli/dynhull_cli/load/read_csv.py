@@ -5,7 +5,8 @@ import numpy as np
 from ..columns import coordinate, decimal_mark, plain
 from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbered
 from .chunks import CHUNK_ROWS, Chunk, Chunks, Position, cut, picked
-from .source import Format, Source
+from .options import Format
+from .source import Source
 
 
 def read_csv(source: Source) -> Chunks:

@@ -63,7 +63,7 @@ def _chunk(arrays: list[Any], names: list[str], first: int) -> Chunk:
 
 
 def _geometry_column(name: str, schema: Any) -> str | None:
-    """The primary geometry column of GeoParquet, None of other files; ValueError for an encoding that is not read."""
+    """The primary geometry column of GeoParquet, None for other files; ValueError for an unsupported encoding."""
     if GEO_KEY not in (schema.metadata or {}):
         return None
     geo = json.loads(schema.metadata[GEO_KEY])

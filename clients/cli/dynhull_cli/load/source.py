@@ -8,56 +8,17 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
-from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any, cast
 
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from .chunks import Chunks
+from .options import STANDARD_INPUT, Format, Options
 
-STANDARD_INPUT = "-"
 DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
-
-
-class Format(StrEnum):
-    """The formats."""
-
-    CSV = "csv"
-    TSV = "tsv"
-    PARQUET = "parquet"
-    JSON = "json"
-    GEOJSON = "geojson"
-    NDJSON = "ndjson"
-
-
 SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """How to read the input; None for what is to be found out. The fields are the options of the command.
-
-    Attributes:
-        x: the column or member of x.
-        y: the column or member of y.
-        delimiter: the character between columns of CSV.
-        decimal: the decimal mark of CSV.
-        header: whether the first row of CSV names the columns.
-        encoding: the encoding of CSV.
-        vertices: whether to take the vertices of geometries that are no single points.
-    """
-
-    x: str | None = None
-    y: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
-    header: bool | None = None
-    encoding: str | None = None
-    vertices: bool = False
-
-
 TABLES = {Format.CSV, Format.TSV}
 APPLIES_TO = {
     "x": set(Format) - {Format.GEOJSON},
@@ -75,13 +36,13 @@ class Source:
     """An input that is read once.
 
     Attributes:
-        name: what messages call it.
-        file: its bytes, decompressed; it can be peeked into.
+        name: its name in messages.
+        file: its bytes, decompressed; `peek` can look ahead in it.
         compressed: the bytes as they are stored.
         size: how many these are; None for a pipe.
         format: its format.
         options: how to read it.
-        notes: lines about what was found out while reading and may surprise.
+        notes: lines about what was detected while reading and may surprise.
     """
 
     name: str
@@ -97,7 +58,7 @@ class Source:
         return _reader(self.format)(self)
 
     def rewind(self) -> None:
-        """Begin anew; not of a pipe."""
+        """Return to the beginning; not possible with a pipe."""
         self.file.seek(0)
         self.notes.clear()
 
@@ -124,9 +85,9 @@ Reader = Callable[[Source], Chunks]
 
 @contextmanager
 def open_source(name: str, kind: Format | None, options: Options) -> Iterator[Source]:
-    """Open a file, or standard input for "-". Without a `kind`, the end of the name says it; standard input is CSV.
+    """Open a file, or standard input for "-". Without a `kind`, the suffix of the name decides; standard input is CSV.
 
-    ValueError where the format is not known, an option is not for it, or the compressed data is damaged.
+    ValueError if the format is unknown, an option does not apply to it, or the compressed data is damaged.
     """
     kind = kind or _format_of(name)
     for option in _given(options):
