@@ -8,6 +8,7 @@ from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
 from ._keyed import KeyedHull, Put
 from ._predicates import orient2d
+from ._window import WindowHull
 from .static import convex_hull
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "MissingKeyError",
     "MissingPointError",
     "Put",
+    "WindowHull",
     "__version__",
     "convex_hull",
     "orient2d",
@@ -36,6 +38,6 @@ def __getattr__(name: str) -> str:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-for _public in (DynamicHull, MissingPointError, KeyedHull, DuplicateKeyError, MissingKeyError, Put):
+for _public in (DynamicHull, MissingPointError, KeyedHull, DuplicateKeyError, MissingKeyError, Put, WindowHull):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

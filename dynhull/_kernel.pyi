@@ -95,6 +95,87 @@ class HullTree:
     def memory(self) -> tuple[int, int]:
         """The bytes that the tree uses, and the bytes that it reserves."""
 
+class WindowTree(HullTree):
+    """
+    A tree of points with times, of which the oldest leave: see dynhull's in Python.
+    """
+
+    def __init__(self, max_age: float | None, max_points: int | None) -> None: ...
+
+    @property
+    def max_age(self) -> float | None:
+        """The age at which a point leaves; None for any."""
+
+    @property
+    def max_points(self) -> int | None:
+        """The greatest number of points; None for any."""
+
+    @property
+    def now(self) -> float | None:
+        """The greatest time seen; None before."""
+
+    @property
+    def oldest(self) -> float | None:
+        """
+        The time of the oldest point; None if there is none, or if it has no time.
+        """
+
+    @property
+    def expired(self) -> int:
+        """The number of points that left because of their age."""
+
+    @property
+    def evicted(self) -> int:
+        """The number of points that left because there were too many."""
+
+    @property
+    def late(self) -> int:
+        """The number of points that were too old to be added."""
+
+    def add(self, xy: object, times: object | None) -> int:
+        """
+        Add the points that are not late, and remove those that are too old or too many, as one batch. Returns the number of points added.
+        """
+
+    def advance(self, now: float) -> int:
+        """
+        Move the clock. Returns the number of points that left. ValueError if time would go back.
+        """
+
+    def delete(self, x: float, y: float) -> bool:
+        """
+        Remove the oldest copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).
+        """
+
+    def delete_many(self, xy: object, ignore_missing: bool) -> int:
+        """
+        Remove the oldest copies of points as one batch, like `apply`. Returns the number of points removed.
+        """
+
+    def clear(self) -> None:
+        """Remove every point. The clock stays."""
+
+    def times(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        The times of the points in the order of `points`, copies of a point in order of time. O(n log n).
+        """
+
+    def state(self) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], float | None, tuple[int, int, int, int]]:
+        """
+        What `restore` needs: the points in the order in which they leave, their times, now, and the numbers of changes, expired, evicted and late points. O(n log n).
+        """
+
+    def restore(self, points: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], times: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], now: float | None, totals: tuple[int, int, int, int]) -> None:
+        """Fill an empty tree with the state of another."""
+
+    def copy(self) -> WindowTree:
+        """An independent tree of the same points and times. O(n)."""
+
+    def check(self) -> None:
+        """
+        Raise AssertionError if an invariant of the tree or of the window is broken. O(n log n).
+        """
+
 def orientation(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> int:
     """
     +1 if the three points turn left, -1 if they turn right, 0 if they are collinear.

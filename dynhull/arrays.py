@@ -172,6 +172,40 @@ def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
     return np.ascontiguousarray(array, dtype=np.int8)
 
 
+def as_times(times: Any, rows: int) -> npt.NDArray[np.float64]:
+    """Return `times` as a float64 array of shape (rows,) with finite entries and no negative zeros; always a copy."""
+    if isinstance(times, Iterable) and not hasattr(times, "__len__") and not hasattr(times, "__array__"):
+        times = list(times)
+    array = as_array(times, "times")
+    if array.shape != (rows,):
+        raise ValueError(f"times must have shape ({rows},) like the points, got {array.shape}")
+    if array.dtype.kind in "USVMm":
+        raise TypeError(f"times must be real numbers, got {array.dtype}")
+    whole = array.dtype.kind in "iu"
+    if array.dtype not in (np.float64, np.float32, np.float16) and not (whole and _all_exact(array)):
+        array = np.array(
+            [_as_double_scalar(value, f"times row {row}", "times") for row, value in enumerate(array.tolist())]
+        )
+    doubles = array.astype(np.float64) + 0.0
+    strange = np.flatnonzero(~np.isfinite(doubles))
+    if strange.size:
+        raise ValueError(f"times row {strange[0]} is {doubles[strange[0]]}: times must be finite")
+    return doubles
+
+
+def as_time(value: Any, name: str) -> float:
+    """Return one time, or a span of time, as a finite float, converted if that is exact."""
+    double = value if type(value) is float else _as_double_scalar(value, name, "times")
+    if not math.isfinite(double):
+        raise ValueError(f"{name} is {double!r}: times must be finite")
+    return double + 0.0
+
+
+def _all_exact(integers: npt.NDArray[Any]) -> bool:
+    """Whether all integers are small enough that each is a double."""
+    return bool(np.all((integers <= LARGEST_EXACT_INTEGER) & (integers >= -LARGEST_EXACT_INTEGER)))
+
+
 def _as_pairs(xy: npt.ArrayLike, name: str) -> Points:
     array = _as_array(coordinates_of(xy, name), name)
     if array.ndim == 1 and array.size == 0:
@@ -235,15 +269,15 @@ def _as_double(array: npt.NDArray[Any], name: str) -> Points:
     return array.astype(np.float64)
 
 
-def _as_double_scalar(value: Any, name: str) -> float:
+def _as_double_scalar(value: Any, name: str, kind: str = "coordinates") -> float:
     if not isinstance(value, Number) and not hasattr(value, "__float__"):
-        raise TypeError(f"{name}: coordinates must be real numbers, got {value!r}")
+        raise TypeError(f"{name}: {kind} must be real numbers, got {value!r}")
     try:
         double = float(value.real if isinstance(value, complex) and value.imag == 0 else value)
     except OverflowError:
         raise ValueError(f"{name} is {value!r}: too large for a double") from None
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: coordinates must be real numbers, got {value!r}") from None
+        raise TypeError(f"{name}: {kind} must be real numbers, got {value!r}") from None
     if double != value and not math.isnan(double):
         raise ValueError(f"{name} is {value!r}: no double has this value")
     return double

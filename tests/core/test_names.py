@@ -15,7 +15,7 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library.md"
 
 PACKAGES = {
     "dynhull": {
-        *("KERNEL", "DynamicHull", "MissingPointError", "convex_hull", "orient2d"),
+        *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d"),
         *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError"),
         *("arrays", "keys", "measure", "static"),  # imported with it
     },

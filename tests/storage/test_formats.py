@@ -9,7 +9,7 @@ from folders import DATABASE, OLD_FOLDERS, append, opened, same, snapshot
 from test_faults import FaultyDisk, failure
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.hull_state import replayed
+from dynhull_server.state.contents import replayed
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.sqlite.schema import FORMAT
@@ -33,7 +33,7 @@ def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
         assert (contents.next_number, contents.notes) == (3, [])
         for number, (revision, count) in ((1, fleet), (2, zones)):
             kept = storage.read(number)
-            assert (kept.last_revision, len(replayed(kept))) == (revision, count)
+            assert (kept.last_revision, len(replayed(kept).hull)) == (revision, count)
         assert (storage.oldest(1), storage.oldest(2)) == (20, 0)
         assert storage.read(1).producers == {"p0": 24, "p1": 25, "p2": 23}
         assert storage.read(2).records[0].producer == "truck"
@@ -97,7 +97,7 @@ def test_a_folder_of_format_2_has_everything(folder, name):
         assert [row.settings.max_points for row in contents.hulls] == [0, 0, 500]
         assert (contents.next_number, contents.notes) == (5, [])
         for number, hull in ((1, "fleet"), (4, "zones")):
-            points = replayed(storage.read(number)).points()
+            points = replayed(storage.read(number)).hull.points()
             np.testing.assert_array_equal(in_order(points), in_order(exported(name, hull)))
         fleet, zones = storage.read(1), storage.read(4)
         assert (fleet.revision, fleet.last_revision, storage.oldest(1)) == (24, last, 12)

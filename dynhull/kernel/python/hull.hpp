@@ -183,6 +183,28 @@ class Hull {
     return {tree.used_bytes(), tree.reserved_bytes()};
   }
 
+ protected:
+  // The tree, to read or to write while the caller holds the GIL.
+  const HullTree& settled() {
+    lock_.await_readable();
+    return tree_;
+  }
+  HullTree& writable() {
+    lock_.await_writable();
+    return tree_;
+  }
+
+  // The number of rows, or KeyError with the first row that deletes a missing point.
+  static std::int64_t rows_applied(const Applied& applied, const Rows& rows, bool ignore_missing) {
+    if (applied.first_missing < 0 || ignore_missing) return applied.rows;
+    const Point p = Plain()(points_of(rows)[applied.first_missing]);
+    PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y, applied.first_missing).ptr());
+    throw nb::python_error();
+  }
+
+  HullTree tree_;
+  ReadWriteLock lock_;
+
  private:
   static constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
   static constexpr Edge NO_EDGE = {{NOTHING, NOTHING}, {NOTHING, NOTHING}};
@@ -201,22 +223,7 @@ class Hull {
       }
     }();
     if (!applied) return apply(ops, ops_count, as_points(xy), ignore_missing, together);
-    if (applied->first_missing >= 0 && !ignore_missing) {
-      const Point p = Plain()(points_of(rows)[applied->first_missing]);
-      PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y, applied->first_missing).ptr());
-      throw nb::python_error();
-    }
-    return applied->rows;
-  }
-
-  // The tree, to read or to write while the caller holds the GIL.
-  const HullTree& settled() {
-    lock_.await_readable();
-    return tree_;
-  }
-  HullTree& writable() {
-    lock_.await_writable();
-    return tree_;
+    return rows_applied(*applied, rows, ignore_missing);
   }
 
   // Refreshes the index if that pays for the queries since the hull last changed.
@@ -229,10 +236,8 @@ class Hull {
     if (index_.stale(tree_, queries_)) index_.refresh(tree_, queries_);
   }
 
-  HullTree tree_;
   LocateIndex index_;
   std::uint64_t asked_version_ = 0, queries_ = 0;
-  ReadWriteLock lock_;
 };
 
 }  // namespace dynhull

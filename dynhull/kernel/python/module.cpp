@@ -8,6 +8,7 @@
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
 #include "hull.hpp"
+#include "window.hpp"
 
 using namespace nanobind::literals;
 
@@ -102,6 +103,41 @@ void add_hull_tree(nb::module_& module) {
       .def_prop_ro("memory", &Hull::memory, "The bytes that the tree uses, and the bytes that it reserves.");
 }
 
+void add_window_tree(nb::module_& module) {
+  nb::class_<Window, Hull>(module, "WindowTree",
+                           "A tree of points with times, of which the oldest leave: see dynhull's in Python.")
+      .def(nb::init<std::optional<double>, std::optional<std::size_t>>(), "max_age"_a.none(), "max_points"_a.none())
+      .def_prop_ro("max_age", &Window::max_age, "The age at which a point leaves; None for any.")
+      .def_prop_ro("max_points", &Window::max_points, "The greatest number of points; None for any.")
+      .def_prop_ro("now", &Window::now, "The greatest time seen; None before.")
+      .def_prop_ro("oldest", &Window::oldest,
+                   "The time of the oldest point; None if there is none, or if it has no time.")
+      .def_prop_ro("expired", &Window::expired, "The number of points that left because of their age.")
+      .def_prop_ro("evicted", &Window::evicted, "The number of points that left because there were too many.")
+      .def_prop_ro("late", &Window::late, "The number of points that were too old to be added.")
+      .def("add", &Window::add, "xy"_a, "times"_a.none(),
+           "Add the points that are not late, and remove those that are too old or too many, as one batch. Returns the "
+           "number of points added.")
+      .def("advance", &Window::advance, "now"_a,
+           "Move the clock. Returns the number of points that left. ValueError if time would go back.")
+      .def("delete", &Window::remove, nb::sig("def delete(self, x: float, y: float) -> bool"), "x"_a.none(),
+           "y"_a.none(),
+           "Remove the oldest copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).")
+      .def("delete_many", &Window::remove_many, "xy"_a, "ignore_missing"_a,
+           "Remove the oldest copies of points as one batch, like `apply`. Returns the number of points removed.")
+      .def("clear", &Window::clear, "Remove every point. The clock stays.")
+      .def("times", &Window::times,
+           "The times of the points in the order of `points`, copies of a point in order of time. O(n log n).")
+      .def("state", &Window::state,
+           "What `restore` needs: the points in the order in which they leave, their times, now, and the numbers of "
+           "changes, expired, evicted and late points. O(n log n).")
+      .def("restore", &Window::restore, "points"_a, "times"_a, "now"_a.none(), "totals"_a,
+           "Fill an empty tree with the state of another.")
+      .def("copy", &Window::copy, "An independent tree of the same points and times. O(n).")
+      .def("check", &Window::check,
+           "Raise AssertionError if an invariant of the tree or of the window is broken. O(n log n).");
+}
+
 void add_predicates(nb::module_& module) {
   module.def(
       "orientation",
@@ -157,6 +193,7 @@ NB_MODULE(_kernel, module) {
   module.doc() = "The hull tree in C++, with the same results as the one in Python.";
   nanobind::register_exception_translator(dynhull::translate_broken_invariant);
   dynhull::add_hull_tree(module);
+  dynhull::add_window_tree(module);
   dynhull::add_predicates(module);
   dynhull::add_arrays_and_static_hulls(module);
   dynhull::add_fork_hooks(module);

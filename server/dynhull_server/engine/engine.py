@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, assert_never
 
 from ..state.batch import Applied
 from ..state.core import Core
+from ..state.errors import StoppingError
 from ..state.events import (
     Birth,
     Commit,
@@ -42,6 +43,7 @@ from .group_commit import GroupCommit
 from .housekeeping import Housekeeping
 from .live_hull import LiveHull
 from .recalls import Recalls
+from .server_time import ServerTime
 from .supervisor import Supervisor
 from .threads import Machine, Pool
 from .waiter import Waiter
@@ -51,10 +53,24 @@ if TYPE_CHECKING:
 
 # The number of threads for trips, for large reads outside of trips, and for the disk.
 TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
-# Seconds between updates of the core's clock, which serves only to drop producers idle for a day.
-TICK = 1.0
+# Seconds between updates of the core's clock, which makes points leave that have become too old.
+TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
+
+
+class Expiries:
+    """Receives the answers to the core's own requests, and reports their failures."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+
+    def answer(self, request: Request) -> None:
+        """Report the outcome of a request; at a shutdown there is none."""
+        if request.error is None:
+            self._supervisor.succeeded("expiry")
+        elif not isinstance(request.error, StoppingError):
+            self._supervisor.failed("expiry", request.error)
 
 
 class Engine:
@@ -76,6 +92,7 @@ class Engine:
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
         self._stepping = False
+        self._expiries = Expiries(supervisor)
         self._idle: asyncio.Event | None = None
         self._started = False
 
@@ -110,6 +127,7 @@ class Engine:
             unsaved = sum(len(record.rows) for record in kept.records)
             self._core.restore(row, state, unsaved)
             progress(done, len(contents.hulls))
+        self._time = ServerTime(clock, self._core.latest_time)
         self._commits = GroupCommit(
             self._storage,
             threads,
@@ -203,6 +221,7 @@ class Engine:
         request.to, request.name = Waiter(), name
         if create:
             request.birth = self._birth()
+        request.arrived = self.time()
         applied: Applied = await self.ask(request)
         return applied
 
@@ -214,6 +233,10 @@ class Engine:
         """
         hull = self._core.get(name) if self.has(name) or not create else None
         return BatchStream(self, name, hull, notify, self._birth)
+
+    def time(self) -> int:
+        """The server's clock, in microseconds since 1970."""
+        return self._time.now()
 
     # The core
 
@@ -367,7 +390,7 @@ class Engine:
 
     async def _tick(self) -> None:
         now = self._machine.clock.monotonic()
-        self.dispatch(Tick(now))
+        self.dispatch(Tick(now, self.time(), self._expiries))
         since = self._commits.since
         if since is not None and now - since > STUCK:
             self._supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))

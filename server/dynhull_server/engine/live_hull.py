@@ -13,6 +13,7 @@ import numpy.typing as npt
 from dynhull import DynamicHull
 from dynhull.arrays import Checked, Points
 
+from ..state.contents.live import AnyHull
 from ..state.errors import HullEmptyError, HullNotFoundError, HullReplacedError, RevisionForgottenError
 from ..state.events import ReadHull
 from ..state.hull import Hull
@@ -108,7 +109,7 @@ class LiveHull:
         return await self.read(HullState.vertices, self.vertex_count // 2, min_revision)
 
     async def ask_rows(
-        self, question: Callable[[DynamicHull, slice], T], rows: int, min_revision: int = 0
+        self, question: Callable[[AnyHull, slice], T], rows: int, min_revision: int = 0
     ) -> tuple[Counts, T]:
         """Answer a query about many rows that depends only on the vertices.
 
@@ -137,7 +138,7 @@ class LiveHull:
     async def support(self, directions: Checked, min_revision: int = 0) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
 
-        def extreme(hull: DynamicHull, block: slice) -> Points:
+        def extreme(hull: AnyHull, block: slice) -> Points:
             if not len(hull):
                 raise HullEmptyError(self.name)
             return hull.support(directions[block])

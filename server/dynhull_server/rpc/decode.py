@@ -9,10 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points, packed_points, plain_points
-from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+from dynhull_proto.v1 import hull_service_pb2, points_pb2
 
-from ..state.batch import Batch
-from ..state.records import HullSettings
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
@@ -23,8 +21,6 @@ DEFAULT_SAMPLE = 1000
 LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
-NO_POINTS = np.empty((0, 2))
-MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
 LARGEST_INTEGER = 2**63 - 1
 
 
@@ -67,15 +63,6 @@ def decode_sequence(producer: str, sequence: int) -> int:
     if producer and not 1 <= sequence <= LARGEST_INTEGER:
         raise InvalidFieldError("sequence", sequence, f"a sequence number is from 1 to {LARGEST_INTEGER}")
     return sequence
-
-
-def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
-    """The settings of a new hull."""
-    if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
-        raise InvalidFieldError("config.identity", config.identity, "not an identity that this server supports")
-    if config.max_points > LARGEST_INTEGER:
-        raise InvalidFieldError("config.max_points", config.max_points, f"must be at most {LARGEST_INTEGER}")
-    return HullSettings(max_points=config.max_points)
 
 
 def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:
@@ -152,24 +139,6 @@ def _refuse_rows(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: st
 def _bad_row(bad: npt.ArrayLike, field: str, xy: Points, problem: str) -> InvalidFieldError:
     row = int(np.argmax(bad))
     return InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
-
-
-def decode_batch(batch: batch_pb2.Batch) -> Batch:
-    """A batch whose moves have equally many origins and destinations."""
-    if batch.missing_points not in MISSING_POINT_POLICIES:
-        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy that this server supports")
-    inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
-    deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
-    moves = 0
-    if batch.HasField("moves"):
-        origins = decode_points(batch.moves.origins, "batch.moves.origins")
-        destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
-        moves = len(origins)
-        if len(destinations) != moves:
-            problem = f"must be as many as the origins, {moves}"
-            raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
-        inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
-    return Batch(inserts, deletes, moves, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:

@@ -16,6 +16,7 @@ from ..engine.watch import watch
 from ..state.errors import HullEmptyError
 from . import answers, decode, encode
 from .calls import Call
+from .decode_settings import decode_settings
 from .metrics import Metrics
 from .readings import ENTRIES, RISKS
 from .status import MethodUnknownError
@@ -43,7 +44,7 @@ class HullService:
     async def CreateHull(self, request: pb.CreateHullRequest, call: Call) -> pb.CreateHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        hull = await self._engine.create(name, decode.decode_settings(request.config))
+        hull = await self._engine.create(name, decode_settings(request.config))
         return pb.CreateHullResponse(hull=encode.encode_hull(hull, hull.counts))
 
     async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:
@@ -95,6 +96,12 @@ class HullService:
                     summary.inserted += applied.inserted
                     summary.deleted += applied.deleted
                     summary.missing += applied.missing
+                    summary.moved += applied.moved
+                    summary.stale += applied.stale
+                    summary.late += applied.late
+                    summary.skipped += applied.skipped
+                    summary.clamped += applied.clamped
+                    summary.evicted += applied.evicted
                     summary.revision, summary.point_count = applied.revision, applied.points
         summary.batches = call.batches - summary.duplicates
         return summary

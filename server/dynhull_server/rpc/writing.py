@@ -11,6 +11,7 @@ from ..state.batch import Applied
 from ..state.events import WriteBatch
 from . import decode
 from .calls import Call
+from .decode_batch import decode_batch
 from .metrics import Metrics
 
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
@@ -23,7 +24,7 @@ def decode_write(request: Any, message_bytes: int, producer: str, owner: str) ->
     batch = request.batch
     return WriteBatch(
         message_bytes // decode.BYTES_PER_POINT,  # an estimate: reading the points would copy them
-        lambda: decode.decode_batch(batch),
+        lambda: decode_batch(batch),
         producer,
         decode.decode_sequence(producer, request.sequence),
         owner,

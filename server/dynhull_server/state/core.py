@@ -10,6 +10,7 @@ a time. The trip belongs to the server: when a caller disconnects, it is not ans
 """
 
 from functools import partial
+from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
 from sortedcontainers import SortedDict
@@ -34,6 +35,7 @@ from .events import (
     Event,
     Examine,
     Examined,
+    Expire,
     Failed,
     Gone,
     NotExamined,
@@ -125,6 +127,9 @@ class Core:
         self._creating = 0
         self._trips = 0
         self._stopping = False
+        # A heap of the times at which points leave, with the number and name of the hull. An entry is outdated if its
+        # time is not that of the hull's plan.
+        self._due: list[tuple[int, int, str]] = []
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
             WriteBatch: self._asked,
             ReadHull: self._asked,
@@ -154,6 +159,12 @@ class Core:
         """The hulls by name."""
         return self._hulls
 
+    @property
+    def latest_time(self) -> int | None:
+        """The latest time of the server's clock that a hull has recorded, None if there is none. O(hulls)."""
+        clocks = (hull.counts.clock for hull in self._hulls.values() if hull.state.contents.follows_server)
+        return max((clock for clock in clocks if clock is not None), default=None)
+
     def get(self, name: str) -> Hull:
         """The hull of that name, or raise HullNotFoundError."""
         hull: Hull | None = self._hulls.get(name)
@@ -180,10 +191,11 @@ class Core:
         """Add a hull that the storage has kept. Call this before the first step."""
         hull = self._hulls[row.name] = Hull(row, state, unsaved)
         self._queues[row.name] = _Queue(row.name, hull)
+        self._plan(hull)
 
     # Requests
 
-    def _asked(self, request: CreateHull | DeleteHull | ReadHull | WriteBatch, effects: list[Effect]) -> None:
+    def _asked(self, request: CreateHull | DeleteHull | Expire | ReadHull | WriteBatch, effects: list[Effect]) -> None:
         name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
         queue = self._queues.get(name)
         if queue is None:
@@ -227,6 +239,7 @@ class Core:
                 effects.append(Commit(None, [Append(hull.row.number, records)]))
             hull.counts = hull.state.counts
             effects.append(Reply([request], None if applied.duplicate else hull))
+            self._plan(hull)
         elif hull.state.torn:
             trip = queue.trip = Trip(queue.name, hull, [request], self._now, keeps=self._keeps)
             trip.torn = True
@@ -320,6 +333,8 @@ class Core:
         self._trips -= 1
         if trip.before is None:
             self._creating -= 1
+        if queue.hull is not None:
+            self._plan(queue.hull)
 
     def _rest(self, queue: _Queue) -> None:
         """Remove the queue of a name that has neither a hull nor a trip."""
@@ -462,8 +477,22 @@ class Core:
 
     # Time and shutdown
 
-    def _tick(self, event: Tick, _: list[Effect]) -> None:
+    def _tick(self, event: Tick, effects: list[Effect]) -> None:
+        """Make points leave where that is due."""
         self._now = event.now
+        while self._due and self._due[0][0] <= event.time and not self._stopping:
+            due, number, name = heappop(self._due)
+            hull = self._hulls.get(name)
+            if hull is not None and hull.row.number == number and hull.due == due:
+                hull.due = None
+                self._asked(Expire(event.to, hull, event.time, rows=hull.counts.points), effects)
+
+    def _plan(self, hull: Hull) -> None:
+        """Plan when points of a hull leave next. No trip of the hull is in progress."""
+        due = hull.state.contents.due
+        if due is not None and (hull.due is None or due < hull.due):
+            hull.due = due
+            heappush(self._due, (due, hull.row.number, hull.name))
 
     def _stop(self, _: Stopping, effects: list[Effect]) -> None:
         self._stopping = True

@@ -8,7 +8,7 @@ from .records import DEFAULT, Change, HullSettings, Kept
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .batch import Batch
+    from .batch import Batch, KeyedBatch
     from .hull import Hull
     from .hull_state import HullState
     from .trip import Trip
@@ -75,17 +75,19 @@ class WriteBatch(Request):
         sequence: its number.
         owner: the caller that the producer belongs to.
         name: the name of the hull. The engine sets this, the attributes below and `to`.
+        arrived: the time of its arrival by the server's clock, in microseconds since 1970.
         birth: the origin of the hull, if a missing hull shall be created; None if it shall be refused.
         stream: the stream that the batch is part of, or None.
     """
 
     to: Any = field(default=None, init=False)
     rows: int
-    make: "Callable[[], Batch]"
+    make: "Callable[[], Batch | KeyedBatch]"
     producer: str = ""
     sequence: int = 0
     owner: str = ""
     name: str = field(default="", init=False)
+    arrived: int = field(default=0, init=False)
     birth: Birth | None = field(default=None, init=False)
     stream: "Stream | None" = field(default=None, init=False)
 
@@ -96,6 +98,19 @@ class ReadHull(Request):
 
     hull: "Hull"
     function: "Callable[[HullState], Any]"
+
+
+@dataclass(slots=True, eq=False)
+class Expire(Request):
+    """Remove the points of a hull that leave at `time`, by the server's clock. The core makes it at a Tick."""
+
+    hull: "Hull"
+    time: int
+
+    @property
+    def name(self) -> str:
+        """The name of the hull."""
+        return self.hull.name
 
 
 @dataclass(slots=True, eq=False)
@@ -177,9 +192,17 @@ class Retried:
 
 @dataclass(slots=True)
 class Tick:
-    """The time, in seconds on a monotonic clock."""
+    """The time.
+
+    Attributes:
+        now: seconds on a monotonic clock.
+        time: microseconds since 1970 by the server's clock, which never goes back.
+        to: the recipient of the answers to the Expire requests that this makes.
+    """
 
     now: float
+    time: int = 0
+    to: Any = None
 
 
 @dataclass(slots=True)

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from .batch import Applied
+from .batch import Applied, Batch, KeyedBatch
 from .errors import HullExistsError, HullNotFoundError
-from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch
+from .events import CreateHull, DeleteHull, Expire, ReadHull, Request, WriteBatch
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import DEFAULT, Append, Change, Create, Delete, HullRow, Kept, Record
+from .records import DEFAULT, Append, Change, Create, Delete, HullRow, HullSettings, Kept, Record
 
 
 @dataclass(slots=True)
@@ -112,6 +112,9 @@ class Trip:
                     raise HullExistsError(self.name)
                 self.after = self._new_hull(request)
                 return self.after
+            case Expire():
+                self._expire(request)
+                return None
             case DeleteHull():
                 if self.after is None:
                     raise HullNotFoundError(self.name)
@@ -137,7 +140,16 @@ class Trip:
         self.after = hull
         if not applied.duplicate:
             self.applied = True
-            self.unsaved += applied.inserted + applied.deleted
+            self.unsaved += applied.inserted + applied.moved + applied.deleted
+
+    def _expire(self, request: Expire) -> None:
+        hull = self.after
+        if hull is None or hull is not request.hull:
+            return
+        try:
+            self.applied |= hull.state.expire(request.time, self._records)
+        finally:
+            self.torn = hull.state.torn
 
     def _read(self, request: ReadHull) -> object:
         hull = self.after
@@ -150,9 +162,14 @@ class Trip:
         if place.refusal is not None:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
-        settings = request.settings if type(request) is CreateHull else DEFAULT
+        settings = request.settings if isinstance(request, CreateHull) else settings_for(request.make())
         row = HullRow(place.number, self.name, birth.uid, birth.created, settings)
         return Hull(row, HullState(place.limits, settings, Kept(), self._now))
+
+
+def settings_for(batch: Batch | KeyedBatch) -> HullSettings:
+    """The settings of a hull that its first batch creates: keyed if the batch names keys."""
+    return HullSettings(batch.kind) if isinstance(batch, KeyedBatch) else DEFAULT
 
 
 def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:

@@ -1,0 +1,178 @@
+// Items in order of time, filed without a search: 1,024 buckets, and a heap for the open one.
+//
+// The buckets divide a span of time evenly. Items of the open bucket, and older ones, wait in the heap; items after the
+// span wait in one list. When all buckets are empty, they are laid over that list's times anew. So an item is filed
+// twice and passes the heap once, which holds about a thousandth of the items: O(1) an item if the times are spread
+// evenly, O(log n) if they are not.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "../memory/pool.hpp"
+#include "../sort/columns.hpp"
+
+namespace dynhull {
+
+// `Order` has two functions: time(item), and before(a, b) for items of equal times. Times may grow meanwhile (not
+// shrink): an item that proves younger when its turn comes is filed again. Only `reserve`, `front` and the copy
+// constructor throw, and leave every item in its place.
+template <class Item, class Order>
+class Wheel {
+ public:
+  explicit Wheel(Order order = {}) : order_(order) { buckets_.fill(NOWHERE); }
+
+  std::size_t size() const { return size_; }
+
+  // Makes room for `extra` more items.
+  void reserve(std::size_t extra) {
+    const std::size_t heap = heap_.size() + extra;
+    if (heap > heap_.capacity()) heap_.reserve(std::max(heap, heap_.capacity() + heap_.capacity() / 2));
+    reserve_chunks(extra);
+  }
+
+  void push(const Item& item) {
+    ++size_;
+    file(item, order_.time(item));
+  }
+
+  // The first item, valid until the next call; nullptr if there is none.
+  const Item* front() {
+    for (;;) {
+      if (heap_.empty()) {
+        if (size_ == 0) return nullptr;
+        open_next();
+        continue;
+      }
+      const Entry first = heap_.front();
+      const double time = order_.time(first.item);
+      if (time == first.time) return &heap_.front().item;
+      reserve_chunks(1);
+      remove_first();
+      file(first.item, time);
+    }
+  }
+
+  // Removes the item that `front` has returned.
+  void pop_front() {
+    remove_first();
+    --size_;
+  }
+
+  // Visits all items, in no order.
+  template <class Visit>
+  void for_each(Visit visit) const {
+    for (const Entry& entry : heap_) visit(entry.item);
+    for_each_of(later_, visit);
+    for (Number bucket : buckets_) for_each_of(bucket, visit);
+  }
+
+ private:
+  using Number = std::uint32_t;
+  static constexpr Number NOWHERE = ~Number{0};
+  static constexpr int BUCKETS = 1024;
+  static constexpr std::size_t CHUNK_BYTES = 240;
+  static constexpr Number CHUNK = (CHUNK_BYTES - 2 * sizeof(Number)) / sizeof(Item);
+
+  // Some items of a list, and the next chunk of it.
+  struct Chunk {
+    Item items[CHUNK];
+    Number size, next;
+  };
+
+  // The time is a copy, so that the heap stays in order while the item's time grows.
+  struct Entry {
+    double time;
+    Item item;
+  };
+
+  void reserve_chunks(std::size_t items) { chunks_.reserve(items / CHUNK + std::min<std::size_t>(items, BUCKETS + 1)); }
+
+  void file(const Item& item, double time) {
+    if (time > end_) {
+      later_least_ = std::min(later_least_, time);
+      later_greatest_ = std::max(later_greatest_, time);
+      ++later_size_;
+      append(later_, item);
+      return;
+    }
+    const int bucket = static_cast<int>(columns_(time));
+    if (bucket > open_) return append(buckets_[bucket], item);
+    heap_.push_back({time, item});
+    std::push_heap(heap_.begin(), heap_.end(), after());
+  }
+
+  void append(Number& list, const Item& item) {
+    if (list == NOWHERE || chunks_[list].size == CHUNK) {
+      const Number chunk = chunks_.take();
+      chunks_[chunk].size = 0;
+      chunks_[chunk].next = std::exchange(list, chunk);
+    }
+    Chunk& chunk = chunks_[list];
+    chunk.items[chunk.size++] = item;
+  }
+
+  void open_next() {
+    int next = open_ + 1;
+    while (next < BUCKETS && buckets_[next] == NOWHERE) ++next;
+    if (next == BUCKETS) return lay_buckets();
+    std::size_t count = 0;
+    for_each_of(buckets_[next], [&](const Item&) { ++count; });
+    reserve(count);
+    open_ = next;
+    file_again(std::exchange(buckets_[next], NOWHERE));
+  }
+
+  // Lays the buckets over the times of the list.
+  void lay_buckets() {
+    reserve_chunks(later_size_);
+    columns_ = Columns(later_least_, later_greatest_, BUCKETS);
+    end_ = later_greatest_;
+    open_ = -1;
+    later_least_ = INFINITE;
+    later_greatest_ = -INFINITE;
+    later_size_ = 0;
+    file_again(std::exchange(later_, NOWHERE));
+  }
+
+  void file_again(Number list) {
+    while (list != NOWHERE) {
+      for (Number i = 0; i < chunks_[list].size; ++i) {
+        const Item item = chunks_[list].items[i];
+        file(item, order_.time(item));
+      }
+      chunks_.give_back(std::exchange(list, chunks_[list].next));
+    }
+  }
+
+  template <class Visit>
+  void for_each_of(Number list, Visit&& visit) const {
+    for (; list != NOWHERE; list = chunks_[list].next)
+      for (Number i = 0; i < chunks_[list].size; ++i) visit(chunks_[list].items[i]);
+  }
+
+  void remove_first() {
+    std::pop_heap(heap_.begin(), heap_.end(), after());
+    heap_.pop_back();
+  }
+
+  auto after() const {
+    return [this](const Entry& a, const Entry& b) {
+      return a.time == b.time ? order_.before(b.item, a.item) : a.time > b.time;
+    };
+  }
+
+  Order order_;
+  std::size_t size_ = 0;
+  std::vector<Entry> heap_;
+  Pool<Chunk> chunks_;
+  std::array<Number, BUCKETS> buckets_;
+  Columns columns_;
+  int open_ = BUCKETS - 1;  // buckets up to this one are empty; their items wait in the heap
+  double end_ = -INFINITE;  // of the span
+  Number later_ = NOWHERE;  // the list of items after the span
+  std::size_t later_size_ = 0;
+  double later_least_ = INFINITE, later_greatest_ = -INFINITE;
+};
+
+}  // namespace dynhull

@@ -1,0 +1,349 @@
+// Random lives of windows and wheels under AddressSanitizer and UndefinedBehaviorSanitizer.
+//
+//     fuzz_window [--seconds S] [seed ...]
+//
+// Without seeds, random ones until the time is up. A window is checked against a vector that is searched from one end
+// to the other; some allocations fail on purpose: then tree and window have to be as they were. A wheel holds numbers
+// of slots whose times grow meanwhile, as a window of keys does.
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <random>
+
+#include "../../dynhull/kernel/check.hpp"
+#include "../../dynhull/kernel/window/expiry.hpp"
+
+namespace {
+
+long allocations_left = -1;  // until one fails; negative: none does
+bool fails() { return allocations_left >= 0 && allocations_left-- == 0; }
+
+}  // namespace
+
+bool dynhull::allocation_fails() { return fails(); }
+
+void* operator new(std::size_t size) {
+  void* memory = fails() ? nullptr : std::malloc(size);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return fails() ? nullptr : std::malloc(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace {
+
+using namespace dynhull;
+
+void require(bool holds, const char* message) {
+  if (!holds) throw std::logic_error(message);
+}
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : bits_(seed) {}
+  std::uint64_t below(std::uint64_t n) { return n > 0 ? bits_() % n : 0; }
+
+ private:
+  std::mt19937_64 bits_;
+};
+
+class WindowLife {
+ public:
+  explicit WindowLife(std::uint64_t seed)
+      : random_(seed),
+        spread_(random_.below(4)),
+        max_age_(random_.below(4) == 0 ? INFINITE : static_cast<double>(1 + random_.below(300)) * step()),
+        max_points_(max_age_ == INFINITE || random_.below(2) == 0 ? 1 + random_.below(400) : Expiry::ANY_NUMBER),
+        expiry_(max_age_, max_points_) {}
+
+  void live() {
+    const std::uint64_t steps = 10 + random_.below(60);
+    for (std::uint64_t step = 0; step < steps; ++step) {
+      switch (random_.below(8)) {
+        case 0: advance(); break;
+        case 1: remove(); break;
+        case 2: remove_many(); break;
+        case 3: random_.below(20) == 0 ? clear() : copy(); break;
+        default: add(random_.below(random_.below(4) == 0 ? 600 : 40)); break;
+      }
+      check();
+    }
+  }
+
+ private:
+  // Whole numbers, close to each other, subnormal, or far apart.
+  double step() const {
+    constexpr double STEPS[] = {1, 0x1p-52, 5e-324, 1e303};
+    return STEPS[spread_];
+  }
+
+  double time() {
+    const double base = spread_ == 1 ? 1 : 0;
+    const std::uint64_t back = random_.below(3) == 0 ? random_.below(random_.below(8) == 0 ? 500 : 40) : 0;
+    return base + (static_cast<double>(clock_) - static_cast<double>(back)) * step();
+  }
+
+  Point point() { return {static_cast<double>(random_.below(12)), static_cast<double>(random_.below(12))}; }
+
+  bool too_old(double time) const { return max_age_ != INFINITE && time <= horizon(now_, max_age_); }
+
+  std::uint64_t expire() {
+    return std::erase_if(model_, [&](const Dated& item) { return too_old(item.time); });
+  }
+
+  // Runs an update, sometimes with too little memory at first.
+  template <class Update>
+  void with_failures(Update update) {
+    if (random_.below(3) == 0) {
+      const std::uint64_t changes = tree_.changes;
+      allocations_left = static_cast<long>(random_.below(14));
+      bool failed = false;
+      try {
+        update();
+      } catch (const std::bad_alloc&) {
+        failed = true;
+      }
+      allocations_left = -1;
+      if (!failed) return;
+      require(tree_.changes == changes, "a failed allocation changed the hull");
+      check();
+    }
+    update();
+  }
+
+  void add(std::size_t count) {
+    std::vector<Point> points;
+    std::vector<double> times;
+    const bool dated = max_age_ != INFINITE || random_.below(4) != 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      clock_ += random_.below(3) == 0 ? random_.below(4) : 0;
+      points.push_back(point());
+      times.push_back(dated ? time() : now_);
+    }
+    std::size_t added = 0;
+    with_failures([&] { added = expiry_.add(tree_, points.data(), dated ? times.data() : nullptr, points.size()); });
+    for (double time : times) now_ = std::max(now_, time);
+    expired_ += expire();
+    std::size_t expected = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (too_old(times[i])) continue;
+      ++expected;
+      model_.push_back({points[i], times[i], arrivals_ + i});
+    }
+    arrivals_ += count;
+    late_ += count - expected;
+    for (; model_.size() > max_points_; ++evicted_) model_.erase(std::min_element(model_.begin(), model_.end()));
+    require(added == expected, "the number of points added is wrong");
+  }
+
+  void advance() {
+    clock_ += random_.below(random_.below(4) == 0 ? 400 : 20);
+    const double to = std::max(now_, time());
+    std::size_t left = 0;
+    with_failures([&] { left = expiry_.advance(tree_, to); });
+    now_ = to;
+    const std::uint64_t expected = expire();
+    expired_ += expected;
+    require(left == expected, "the number of points that left is wrong");
+  }
+
+  bool take(Point p) {
+    auto oldest = model_.end();
+    for (auto item = model_.begin(); item != model_.end(); ++item)
+      if (item->p == p && (oldest == model_.end() || *item < *oldest)) oldest = item;
+    if (oldest == model_.end()) return false;
+    model_.erase(oldest);
+    return true;
+  }
+
+  void remove() {
+    const Point p = point();
+    HullTree::Removal removal{};
+    with_failures([&] { removal = expiry_.remove(tree_, p); });
+    require((removal == HullTree::Removal::MISSING) == !take(p), "a delete found what is not there, or did not find");
+  }
+
+  void remove_many() {
+    std::vector<Point> points(random_.below(60));
+    for (Point& p : points) p = point();
+    const bool ignore = random_.below(2) == 0;
+    const std::vector<Dated> before = model_;
+    std::int64_t rows = 0, missing = -1;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (take(points[i]))
+        ++rows;
+      else if (missing < 0)
+        missing = static_cast<std::int64_t>(i);
+    }
+    if (missing >= 0 && !ignore) model_ = before, rows = 0;
+    const std::vector<Dated> after = std::exchange(model_, before);
+    Applied applied{};
+    with_failures([&] { applied = expiry_.remove(tree_, points.data(), points.size(), ignore); });
+    model_ = after;
+    require(applied.rows == rows && applied.first_missing == missing, "a batch miscounted its rows");
+  }
+
+  void clear() {
+    expiry_.clear(tree_);
+    model_.clear();
+  }
+
+  void copy() {
+    std::vector<Point> points;
+    std::vector<double> times;
+    for (const Dated& item : expiry_.items()) {
+      points.push_back(item.p);
+      times.push_back(item.time);
+    }
+    Expiry other = expiry_;
+    if (random_.below(2) == 0)
+      with_failures([&] {
+        HullTree empty;
+        other = Expiry(max_age_, max_points_);
+        other.restore(empty, points.data(), times.data(), points.size(), now_);
+      });
+    other.expired = expired_;
+    other.evicted = evicted_;
+    other.late = late_;
+    expiry_ = std::move(other);
+  }
+
+  void check() {
+    const Check checked(tree_);
+    expiry_.check(tree_);
+    std::vector<Dated> expected = model_;
+    std::sort(expected.begin(), expected.end());
+    const std::vector<Dated> items = expiry_.items();
+    require(items.size() == expected.size(), "a point is missing");
+    for (std::size_t i = 0; i < items.size(); ++i)
+      require(items[i].p == expected[i].p && items[i].time == expected[i].time, "a point or its time is off");
+    require(expiry_.now() == now_, "the clock is off");
+    require(expiry_.expired == expired_ && expiry_.evicted == evicted_ && expiry_.late == late_, "a total is off");
+    if (random_.below(4) > 0) return;
+    const Dated* const front = expiry_.front();
+    require((front == nullptr) == expected.empty() && (front == nullptr || front->time == expected.front().time),
+            "the oldest is wrong");
+  }
+
+  Random random_;
+  std::uint64_t spread_;
+  double max_age_;
+  std::size_t max_points_;
+  std::uint64_t clock_ = 0, arrivals_ = 0, expired_ = 0, evicted_ = 0, late_ = 0;
+  double now_ = Expiry::NEVER;
+  HullTree tree_;
+  Expiry expiry_;
+  std::vector<Dated> model_;
+};
+
+class WheelLife {
+ public:
+  explicit WheelLife(std::uint64_t seed) : random_(seed), wheel_(BySlot{&times_}) {}
+
+  void live() {
+    const std::uint64_t steps = 10 + random_.below(40);
+    for (std::uint64_t step = 0; step < steps; ++step) {
+      if (random_.below(2) == 0) push(random_.below(80));
+      grow();
+      if (random_.below(2) == 0) pop_until(base_ + static_cast<double>(random_.below(100)));
+      std::size_t visited = 0;
+      wheel_.for_each([&](std::uint32_t) { ++visited; });
+      require(visited == present_.size() && wheel_.size() == visited, "an item is missing");
+    }
+    pop_until(INFINITE);
+    require(present_.empty(), "an item was lost");
+  }
+
+ private:
+  struct BySlot {
+    const std::vector<double>* times;
+    double time(std::uint32_t slot) const { return (*times)[slot]; }
+    static bool before(std::uint32_t a, std::uint32_t b) { return a < b; }
+  };
+
+  void push(std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) times_.push_back(base_ + static_cast<double>(random_.below(2000)));
+    while (true) {
+      allocations_left = static_cast<long>(random_.below(4));
+      try {
+        wheel_.reserve(count);
+        break;
+      } catch (const std::bad_alloc&) {
+      }
+    }
+    allocations_left = -1;
+    for (std::size_t i = 0; i < count; ++i) {
+      present_.push_back(static_cast<std::uint32_t>(times_.size() - count + i));
+      wheel_.push(present_.back());
+    }
+  }
+
+  void grow() {
+    for (std::size_t i = 0; i < present_.size() / 4; ++i)
+      times_[present_[random_.below(present_.size())]] += static_cast<double>(random_.below(300));
+  }
+
+  void pop_until(double time) {
+    for (;;) {
+      allocations_left = static_cast<long>(random_.below(3));
+      const std::uint32_t* front = nullptr;
+      try {
+        front = wheel_.front();
+      } catch (const std::bad_alloc&) {
+        allocations_left = -1;
+        front = wheel_.front();
+      }
+      allocations_left = -1;
+      require((front == nullptr) == present_.empty(), "the wheel is empty, or is not");
+      if (front == nullptr || times_[*front] > time) break;
+      const auto least = std::min_element(present_.begin(), present_.end(), [&](std::uint32_t a, std::uint32_t b) {
+        return times_[a] == times_[b] ? a < b : times_[a] < times_[b];
+      });
+      require(*front == *least, "the first item is not the oldest");
+      present_.erase(least);
+      wheel_.pop_front();
+    }
+    if (time < INFINITE) base_ = std::max(base_, time);
+  }
+
+  Random random_;
+  std::vector<double> times_;
+  std::vector<std::uint32_t> present_;
+  double base_ = 0;
+  Wheel<std::uint32_t, BySlot> wheel_;
+};
+
+bool survives(std::uint64_t seed) {
+  try {
+    WindowLife(seed).live();
+    WheelLife(seed).live();
+    return true;
+  } catch (const std::exception& error) {
+    std::printf("seed %llu: %s\n", static_cast<unsigned long long>(seed), error.what());
+    return false;
+  }
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  double seconds = 10;
+  std::vector<std::uint64_t> seeds;
+  for (int i = 1; i < count; ++i) {
+    if (std::strcmp(words[i], "--seconds") == 0 && i + 1 < count)
+      seconds = std::atof(words[++i]);
+    else
+      seeds.push_back(std::strtoull(words[i], nullptr, 10));
+  }
+  for (std::uint64_t seed : seeds)
+    if (!survives(seed)) return 1;
+  if (!seeds.empty()) return 0;
+  std::random_device entropy;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  unsigned lives = 0;
+  for (; std::chrono::steady_clock::now() < end; ++lives)
+    if (!survives((std::uint64_t{entropy()} << 32) | entropy())) return 1;
+  std::printf("%u lives of windows, leaves of %u\n", lives, LEAF);
+  return 0;
+}
