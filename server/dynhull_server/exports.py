@@ -71,9 +71,7 @@ def _parts(contents: Contents, progress: Progress) -> Iterator[Contents]:
         progress(first, len(contents))
         rows = slice(first, first + ROWS_A_STEP)
         times, deadlines = (None if each is None else each[rows] for each in (contents.times, contents.deadlines))
-        yield Contents(
-            contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines
-        )
+        yield Contents(contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines)
 
 
 def _features(part: Contents) -> Iterator[dict[str, Any]]:

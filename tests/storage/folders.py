@@ -46,7 +46,7 @@ def same(found, expected):
         assert type(found) is type(expected)
         for field in dataclasses.fields(expected):
             same(getattr(found, field.name), getattr(expected, field.name))
-    elif isinstance(expected, list):
+    elif isinstance(expected, list | tuple):
         assert len(found) == len(expected)
         for one, other in zip(found, expected, strict=True):
             same(one, other)
