@@ -31,11 +31,12 @@ from ..state.events import (
     Stopping,
     Tick,
     WriteBatch,
+    WriteTogether,
 )
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
-from ..state.records import DEFAULT, HullSettings
+from ..state.records import DEFAULT, HullSettings, Kept
 from ..state.trip import Trip
 from ..storage.port import Contents, Progress, Storage
 from .batch_stream import BatchStream
@@ -225,6 +226,14 @@ class Engine:
         applied: Applied = await self.ask(request)
         return applied
 
+    async def apply_together(self, request: WriteTogether) -> list[Applied]:
+        """Apply a batch to each of several hulls, or raise the error that refuses one of them: then none is applied."""
+        request.to = Waiter()
+        for part in request.parts:
+            part.arrived = self.time()
+        results: list[Applied] = await self.ask(request)
+        return results
+
     def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:
         """A stream of batches to one hull; `notify` is called after each that was applied or refused.
 
@@ -302,8 +311,8 @@ class Engine:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Reply():
-                if effect.moved is not None:
-                    self._move(effect.moved)
+                for hull in effect.moved:
+                    self._move(hull)
                 for request in effect.requests:
                     request.to.answer(request)
             case Commit():
@@ -343,7 +352,7 @@ class Engine:
         self._turns.submit(trip.run).add_done_callback(ran)
 
     def _examine(self, effect: Examine) -> None:
-        """Decide earlier commits in the committing thread if necessary, then read the hull in another."""
+        """Decide earlier commits in the committing thread if necessary, then read the hulls in another."""
         if not effect.settle:
             self._read_for(effect)
             return
@@ -362,9 +371,7 @@ class Engine:
 
         def examined() -> Event:
             try:
-                if self._storage.row(effect.number) is None:
-                    return Examined(effect.ticket, None)
-                return Examined(effect.ticket, effect.load(self._storage.read(effect.number)))
+                return Examined(effect.ticket, [self._stored(number, load) for number, load in effect.hulls])
             except Exception as error:  # no error may end the trip
                 return NotExamined(effect.ticket, error)
 
@@ -372,6 +379,9 @@ class Engine:
             self._from_thread(partial(self.dispatch, future.result()))
 
         self.disk.submit(examined).add_done_callback(done)
+
+    def _stored(self, number: int, load: Callable[[Kept], HullState]) -> HullState | None:
+        return None if self._storage.row(number) is None else load(self._storage.read(number))
 
     def _from_thread(self, function: Callable[[], None]) -> None:
         self._loop.call_soon_threadsafe(function)

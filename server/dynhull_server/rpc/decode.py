@@ -22,6 +22,7 @@ LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
 LARGEST_INTEGER = 2**63 - 1
+LEAST_PARTS, MOST_PARTS = 2, 16
 
 
 class InvalidFieldError(Exception):
@@ -139,6 +140,23 @@ def _refuse_rows(bad: npt.NDArray[np.bool_], field: str, xy: Points, problem: st
 def _bad_row(bad: npt.ArrayLike, field: str, xy: Points, problem: str) -> InvalidFieldError:
     row = int(np.argmax(bad))
     return InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
+
+
+def decode_parts(request: hull_service_pb2.ApplyTogetherRequest) -> list[str]:
+    """The names of the hulls of a request to several of them, all different."""
+    if not LEAST_PARTS <= len(request.batches) <= MOST_PARTS:
+        problem = f"must be {LEAST_PARTS} to {MOST_PARTS}, each of another hull"
+        raise InvalidFieldError("batches", f"{len(request.batches)} batches", problem)
+    names: dict[str, int] = {}
+    for index, part in enumerate(request.batches):
+        name = decode_name(part.name, f"batches[{index}].name")
+        if name in names:
+            problem = f"batches[{names[name]}] is of the same hull"
+            raise InvalidFieldError(f"batches[{index}].name", name, problem)
+        if not part.HasField("batch"):
+            raise InvalidFieldError(f"batches[{index}].batch", "", "a batch is required")
+        names[name] = index
+    return list(names)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:

@@ -19,8 +19,8 @@ from .calls import Call
 from .decode_settings import decode_settings
 from .metrics import Metrics
 from .readings import ENTRIES, RISKS
-from .status import MethodUnknownError
-from .writing import StreamedBatches, decode_write
+from .status import ANSWERED, MethodUnknownError, PartRefusedError
+from .writing import StreamedBatches, decode_together, decode_write
 
 
 class HullService:
@@ -79,8 +79,22 @@ class HullService:
         encode.encode_applied(applied, response.result)
         return response
 
-    async def ApplyTogether(self, _: pb.ApplyTogetherRequest, __: Call) -> pb.ApplyTogetherResponse:
-        raise MethodUnknownError
+    async def ApplyTogether(self, request: pb.ApplyTogetherRequest, call: Call) -> pb.ApplyTogetherResponse:
+        begun = time.perf_counter()
+        names = decode.decode_parts(request)
+        for name in names:
+            call.access.require_write(name)
+        write = decode_together(request, names, call.message_bytes, call.owner)
+        try:
+            results = await self._engine.apply_together(write)
+        except ANSWERED as error:
+            self._metrics.batches.refused()
+            raise (error if write.refused is None else PartRefusedError(write.refused, error)) from None
+        response = pb.ApplyTogetherResponse()
+        for applied in results:
+            self._metrics.batches.applied(applied, time.perf_counter() - begun)
+            encode.encode_applied(applied, response.results.add())
+        return response
 
     async def Ingest(self, _: object, call: Call) -> pb.IngestResponse:
         call.batches = 0
@@ -265,7 +279,7 @@ class HullService:
         resume = decode.decode_resume(request)
         view: View
         if directions is not None:
-            view = SketchView(hull, directions, request.include_measures)
+            view = SketchView(hull, directions, vertices=request.include_measures)
         elif resume is None:
             view = VerticesView(hull)
         else:

@@ -41,6 +41,12 @@ def server_clock(clock: int | None, time: int) -> int:
     return reading if clock is None else max(clock, reading)
 
 
+def too_old(settings: HullSettings, clock: int | None) -> int | None:
+    """The greatest time that is too old for the window at `clock`; None if age does not matter."""
+    window = settings.window
+    return clock - window.max_age if clock is not None and window is not None and window.max_age else None
+
+
 def admit(
     settings: HullSettings, times: Times | None, rows: int, field: str, arrived: int, clock: int | None
 ) -> Admission:
@@ -74,8 +80,9 @@ def admit(
     elif rows:
         greatest = int(admission.times.max())
         admission.clock = greatest if clock is None else max(clock, greatest)
-    if window.max_age and admission.clock is not None and rows:
-        young = admission.times > admission.clock - window.max_age
+    limit = too_old(settings, admission.clock)
+    if limit is not None:
+        young = admission.times > limit
         if not young.all():
             admission.young = young
     return admission

@@ -111,11 +111,24 @@ class SequenceGapError(RefusedError):
         expected: the next number.
     """
 
-    def __init__(self, producer: str, sequence: int, expected: int) -> None:
-        super().__init__(f"batch {sequence} of producer {producer!r} arrived, expected {expected}")
+    def __init__(self, producer: str, sequence: int, expected: int, words: str = "") -> None:
+        super().__init__(words or f"batch {sequence} of producer {producer!r} arrived, expected {expected}")
         self.producer = producer
         self.sequence = sequence
         self.expected = expected
+
+
+class SequencesDifferError(SequenceGapError):
+    """A producer's batch to several hulls has been applied to some of them, with the same number, but not to all."""
+
+    def __init__(self, producer: str, sequence: int, expected: int, applied: str, missing: str) -> None:
+        super().__init__(
+            producer,
+            sequence,
+            expected,
+            f"batch {sequence} of producer {producer!r} has been applied to {applied!r}, which expects {expected}, but "
+            f"not to {missing!r}: a producer of batches to several hulls writes to all of them each time",
+        )
 
 
 class HullEmptyError(RefusedError):

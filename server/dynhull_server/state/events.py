@@ -93,6 +93,20 @@ class WriteBatch(Request):
 
 
 @dataclass(slots=True, eq=False)
+class WriteTogether(Request):
+    """Apply one batch to each of several hulls: all of them or none. The result is a list with an `Applied` of each.
+
+    Attributes:
+        parts: the batches, each to a different hull. They have the same producer and sequence.
+        refused: the index of the part that was refused, once it is answered; None where the cause is not a part.
+    """
+
+    to: Any = field(default=None, init=False)
+    parts: "list[WriteBatch]"
+    refused: int | None = field(default=None, init=False)
+
+
+@dataclass(slots=True, eq=False)
 class ReadHull(Request):
     """Read a hull. The result is the counts at one revision, and the value of `function` at it."""
 
@@ -169,10 +183,10 @@ class Failed:
 
 @dataclass(slots=True)
 class Examined:
-    """The state of a hull in the storage; None where the storage has no such hull."""
+    """The state in the storage of each hull of a trip; None for a hull that the storage does not have."""
 
     ticket: "Trip"
-    state: "HullState | None"
+    states: "list[HullState | None]"
 
 
 @dataclass(slots=True)
@@ -233,15 +247,17 @@ class Commit:
 
 @dataclass(slots=True)
 class Examine:
-    """Read a hull from the storage; then send Examined, with the state that `load` makes of it, or NotExamined.
+    """Read hulls from the storage; then send Examined, or NotExamined if one of them cannot be read.
 
     With `settle`, decide a commit with an unknown outcome first.
+
+    Attributes:
+        hulls: the number of each hull, and a function that makes its state of what is stored.
     """
 
     ticket: "Trip"
-    number: int
     settle: bool
-    load: "Callable[[Kept], HullState]"
+    hulls: "list[tuple[int, Callable[[Kept], HullState]]]"
 
 
 @dataclass(slots=True)
@@ -257,11 +273,11 @@ class Retry:
 class Reply:
     """Send the callers of requests their results or errors, in this order.
 
-    Before that, wake the watchers of `moved`: it has a new revision, or was deleted.
+    Before that, wake the watchers of the hulls `moved`: each has a new revision, or was deleted.
     """
 
     requests: list[Request]
-    moved: "Hull | None" = None
+    moved: "tuple[Hull, ...]" = ()
 
 
 Effect = Compute | Commit | Examine | Retry | Reply

@@ -1,8 +1,13 @@
 """One hull: its points, its revision, its producers, and the history of its vertices."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+import numpy.typing as npt
+
+from dynhull import KeyedHull
 from dynhull.arrays import Points
 
 from .batch import Applied
@@ -39,6 +44,10 @@ class Counts:
     cause: Cause = "batch"
 
 
+# The keys of vertices: an array of str, or of uint64.
+VertexKeys = npt.NDArray[Any]
+
+
 class HullState:
     """The points of a hull, and the values derived from them.
 
@@ -60,6 +69,8 @@ class HullState:
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
         self._changed_at = self.counts.revision
+        self._vertex_keys: VertexKeys | None = None
+        self._keys_as_of = -1
         self._history = History(limits.history_bytes, self._vertices, self.counts.revision)
 
     @property
@@ -167,6 +178,29 @@ class HullState:
             self._vertices_as_of = self.hull.changes
             self._history.record(self._changed_at, self._vertices)
         return self._vertices
+
+    def vertex_keys(self) -> VertexKeys:
+        """The key at each vertex of a keyed hull; the same array object while no vertex has changed its key."""
+        revision = self.counts.revision
+        if self._keys_as_of != revision:
+            keys = self._key_array(self._keyed.vertex_keys())
+            if self._vertex_keys is None or not np.array_equal(self._vertex_keys, keys):
+                self._vertex_keys = keys
+            self._keys_as_of = revision
+        assert self._vertex_keys is not None  # set above
+        return self._vertex_keys
+
+    def keys_at(self, places: Points) -> VertexKeys:
+        """The key at each of some places of a keyed hull, all of which have one."""
+        return self._key_array(self._keyed.keys_at(places))
+
+    @property
+    def _keyed(self) -> KeyedHull:
+        assert isinstance(self.hull, KeyedHull)  # nobody asks others for keys
+        return self.hull
+
+    def _key_array(self, keys: Sequence[str | int | None]) -> VertexKeys:
+        return np.array(keys, object if self._keyed.key_type == "str" else np.uint64)
 
     def earlier_vertices(self, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where they were never sent; raises RevisionForgottenError."""

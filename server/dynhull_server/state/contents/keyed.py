@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynhull import DuplicateKeyError, KeyedHull
 from dynhull.keys import PackedKeys
 
-from ..admission import GREATEST_TIME, Admission, admit, server_clock
+from ..admission import GREATEST_TIME, Admission, admit, server_clock, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError
 from ..records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
@@ -119,7 +119,7 @@ class Keyed:
         clock = admitted.clock
         if clock is None:
             return None
-        first, until = self._deadlines.first, self._until(clock)
+        first, until = self._deadlines.first, too_old(self._settings, clock)
         ends = first is not None and first <= clock
         old = until is not None and self._earliest is not None and self._earliest <= until
         return clock if ends or old else None
@@ -156,7 +156,7 @@ class Keyed:
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays."""
         clock = clock if self.clock is None else max(clock, self.clock)
-        until = self._until(clock)
+        until = too_old(self._settings, clock)
         leaving = self._expire(until, clock)
         if not leaving:
             return None
@@ -247,11 +247,6 @@ class Keyed:
 
     # Rules
 
-    def _until(self, clock: int) -> int | None:
-        """The greatest time that is too old at `clock`; None if age does not matter."""
-        window = self._settings.window
-        return clock - window.max_age if window is not None and window.max_age else None
-
     def _admit_deadlines(self, batch: KeyedBatch, rows: KeyRows, admission: Admission, arrived: int) -> None:
         """Set the deadlines of the rows, and the clock of a hull that has one because of them."""
         limited = batch.ttl is not None or batch.deadlines is not None
@@ -288,7 +283,7 @@ class Keyed:
         there = self._has(keys)
         if clock is None:
             return there
-        until = self._until(clock)
+        until = too_old(self._settings, clock)
         if until is not None:
             there &= ~(self.hull.times(keys) <= until)
         first = self._deadlines.first

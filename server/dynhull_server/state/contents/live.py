@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from typing import Any, Protocol
 
-from dynhull import DynamicHull, KeyedHull
+from dynhull import DynamicHull, KeyedHull, WindowHull
 
 from ..batch import Applied, Batch, KeyedBatch
 from ..records import Contents, Expiry, Record, Rows
 
-AnyHull = DynamicHull | KeyedHull
+AnyHull = DynamicHull | KeyedHull | WindowHull
 
 
 class LiveContents(Protocol):
