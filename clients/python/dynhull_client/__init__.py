@@ -11,9 +11,11 @@ from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_watch import AsyncWatch
 from ._async_writer import AsyncWriter
+from ._batch import Batch
 from ._client import HullClient
 from ._errors import (
     DeadlineError,
+    DuplicateKeyError,
     DynhullError,
     HullEmptyError,
     HullExistsError,
@@ -21,6 +23,7 @@ from ._errors import (
     HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
+    KeyMissingError,
     LimitExceededError,
     OutcomeUnknownError,
     PermissionDeniedError,
@@ -42,6 +45,7 @@ from ._messages import (
     Deleted,
     Difference,
     Distances,
+    Entities,
     Event,
     Hull,
     HullInfo,
@@ -49,6 +53,7 @@ from ._messages import (
     Located,
     Measures,
     Points,
+    Positions,
     Progress,
     Sampled,
     Sketch,
@@ -56,6 +61,7 @@ from ._messages import (
     Supported,
     Tangents,
     Verification,
+    Window,
 )
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import Watch
@@ -67,6 +73,7 @@ __all__ = [
     "AsyncIngest",
     "AsyncWatch",
     "AsyncWriter",
+    "Batch",
     "ChanRound",
     "Change",
     "Counted",
@@ -75,8 +82,10 @@ __all__ = [
     "Deleted",
     "Difference",
     "Distances",
+    "DuplicateKeyError",
     "DynhullError",
     "Efficient",
+    "Entities",
     "Event",
     "Hull",
     "HullClient",
@@ -90,6 +99,7 @@ __all__ = [
     "Ingest",
     "Ingested",
     "InvalidRequestError",
+    "KeyMissingError",
     "LimitExceededError",
     "Located",
     "Measured",
@@ -99,6 +109,7 @@ __all__ = [
     "Phases",
     "PointMissingError",
     "Points",
+    "Positions",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -113,6 +124,7 @@ __all__ = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Window",
     "Writer",
     "__version__",
 ]
