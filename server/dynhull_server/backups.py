@@ -59,8 +59,12 @@ def export(
 ) -> None:
     """Write the points of one hull, as of the last commit, to a file.
 
-    CSV and Parquet have columns x and y, and those of key, time and expires (the end of a time to live) that the hull
-    has. In GeoJSON the key is the id of a feature, and its times are properties. Times are in UTC.
+        dynhull export fleet fleet.csv
+        dynhull import copy fleet.csv --key key --time time
+
+    CSV and Parquet have columns x and y, and those of key, time and expires that the hull has; expires is the time at
+    which a point leaves the hull. In GeoJSON the key is the id of a feature, and its times are properties. Times are in
+    UTC.
     """
     from .data_folders import export_hull
 

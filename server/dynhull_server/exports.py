@@ -14,6 +14,7 @@ from .state.records import FOREVER, NO_TIME, Contents, Times
 from .storage.port import Progress
 
 ROWS_A_STEP = 100_000
+LARGEST_JSON_INTEGER = 2**53  # readers with doubles for numbers round larger ones
 
 
 def write_csv(file: Path, contents: Contents, progress: Progress) -> None:
@@ -30,7 +31,10 @@ def write_csv(file: Path, contents: Contents, progress: Progress) -> None:
 
 
 def write_geojson(file: Path, contents: Contents, progress: Progress) -> None:
-    """Write a feature for each point: its key as the id, its times as the properties time and expires."""
+    """Write a feature for each point: its key as the id, its times as the properties time and expires.
+
+    Integer keys above 2**53 are written as strings, because some readers of JSON would round the numbers.
+    """
     with file.open("w", encoding="utf-8") as out:
         out.write('{"type": "FeatureCollection", "features": [\n')
         between = ""
@@ -76,7 +80,7 @@ def _parts(contents: Contents, progress: Progress) -> Iterator[Contents]:
 
 def _features(part: Contents) -> Iterator[dict[str, Any]]:
     points = part.points.tolist()
-    ids = [{}] * len(points) if part.keys is None else [{"id": key} for key in _listed(part.keys)]
+    ids = [{}] * len(points) if part.keys is None else [{"id": _json_key(key)} for key in _listed(part.keys)]
     times, expires = ([""] * len(points) if each is None else _texts(each) for each in (part.times, part.deadlines))
     for point, of_key, *dates in zip(points, ids, times, expires, strict=True):
         properties = {name: text for name, text in zip(("time", "expires"), dates, strict=True) if text}
@@ -87,6 +91,11 @@ def _features(part: Contents) -> Iterator[dict[str, Any]]:
 def _quoted(text: str) -> str:
     doubled = text.replace('"', '""')
     return f'"{doubled}"'
+
+
+def _json_key(key: str | int) -> str | int:
+    """Integers as strings where some readers of JSON would round them."""
+    return str(key) if isinstance(key, int) and key > LARGEST_JSON_INTEGER else key
 
 
 def _listed(keys: PackedKeys | npt.NDArray[np.uint64]) -> list[Any]:

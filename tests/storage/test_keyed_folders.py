@@ -10,8 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import dynhull
 from folders import opened, same
+from server_process import server_process
 
 from dynhull.keys import PackedKeys
+from dynhull_client import HullClient
 from dynhull_server.state.records import (
     FOREVER,
     NO_TIME,
@@ -136,7 +138,9 @@ def test_csv(data, tmp_path):
 def test_geojson(data, tmp_path):
     for name, keys, dates in (("strings", STRINGS, TEXTS), ("integers", INTEGERS, [])):
         features = json.loads(exported(data, tmp_path / "hull.geojson", name).read_text())["features"]
-        assert [feature["id"] for feature in features] == keys
+        assert [feature["id"] for feature in features] == [
+            str(key) if isinstance(key, int) and key > 2**53 else key for key in keys
+        ]
         assert [tuple(feature["geometry"]["coordinates"]) for feature in features] == POINTS
         for column, member in zip(dates, ("time", "expires"), strict=False):
             assert [feature["properties"].get(member, "") for feature in features] == column
@@ -154,3 +158,25 @@ def test_parquet(data, tmp_path):
             expected = [None if time in (NO_TIME, FOREVER) else time for time in column]
             assert table[member].cast(pa.int64()).to_pylist() == expected
     assert pq.read_table(exported(data, tmp_path / "hull.parquet", "window")).column_names == ["x", "y", "time"]
+
+
+@pytest.mark.parametrize(("keyed", "keys"), [("str", PackedKeys.pack(STRINGS)), ("int", np.array(INTEGERS, np.uint64))])
+def test_what_is_exported_is_imported(tmp_path, keyed, keys):
+    times = np.array([time if time != NO_TIME else 1 for time in TIMES])
+    with server_process("--data", str(tmp_path / "data")) as server, HullClient(server.address) as client:
+        client.create_hull("from", keyed=keyed)
+        client.put("from", keys, POINTS, times)
+        first = exported(tmp_path / "data", tmp_path / "first.csv", "from")
+        with first.open(encoding="utf-8", newline="") as read:
+            assert list(csv.reader(read))[1:] == [
+                [str(key), repr(x + 0.0), repr(y + 0.0), text(time)]
+                for key, (x, y), time in zip(keys, POINTS, times.tolist(), strict=True)
+            ]
+        for suffix, key in ((".csv", "key"), (".geojson", "id"), (".parquet", "key")):
+            file = exported(tmp_path / "data", tmp_path / f"hull{suffix}", "from")
+            to = f"to{suffix}"
+            client.create_hull(to, keyed=keyed)
+            done = dynhull("import", to, file, "--key", key, "--time", "time", "--address", server.address)
+            assert done.stdout == f"{to}: 6 points loaded, 6 in the hull\n", done.stderr
+            again = exported(tmp_path / "data", tmp_path / "again.csv", to)
+            assert again.read_bytes() == first.read_bytes()
