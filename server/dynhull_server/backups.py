@@ -59,12 +59,12 @@ def export(
 ) -> None:
     """Write the points of one hull, as of the last commit, to a file.
 
-        dynhull export fleet fleet.csv
-        dynhull import copy fleet.csv --key key --time time
-
     CSV and Parquet have columns x and y, and those of key, time and expires that the hull has; expires is the time at
     which a point leaves the hull. In GeoJSON the key is the id of a feature, and its times are properties. Times are in
-    UTC.
+    UTC. Another hull can read back the points, keys and times, not the column expires:
+
+        dynhull export fleet fleet.csv
+        dynhull import copy fleet.csv --key key --time time
     """
     from .data_folders import export_hull
 
