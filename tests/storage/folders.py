@@ -16,7 +16,7 @@ NOTHING = np.empty((0, 2))
 
 
 def no_progress(done, total):
-    """Nobody watches."""
+    """Ignore the progress."""
 
 
 def opened(path, *options, **more):
@@ -79,7 +79,7 @@ def killed(path, target):
 
 
 def stopped(path, last=9):
-    """A folder with one hull and so many batches."""
+    """A folder with one hull, at revision `last`."""
     storage, _ = opened(path)
     fill(storage, last)
     storage.close()

@@ -7,8 +7,8 @@ the database, of the log, of its frames, of all pages; then bits at random, anyw
 opened and compared with what was acknowledged; where it opens, one more batch is committed, and the folder opened
 again: damage may strike later.
 
-harmless: everything is there. repaired: a note says what was lost or mended. refused: a StorageError says why. Whatever
-else happens is a fault, and makes the exit code 1.
+harmless: everything is there. repaired: a note says what was lost or mended. refused: a StorageError says why. Any
+other outcome is a fault, and makes the exit code 1.
 """
 
 import argparse
@@ -104,7 +104,7 @@ def keys(number: int, rng: np.random.Generator, count: int) -> PackedKeys | np.n
 
 
 def no_progress(done: int, total: int) -> None:
-    """Nobody watches."""
+    """Ignore the progress."""
 
 
 class Builder:
@@ -340,7 +340,7 @@ def main() -> None:
     parser.add_argument("--flips", type=int, default=20_000, help="at random, beside those of the headers")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--every", type=int, default=1, help="of the headers' bits, try one in so many")
+    parser.add_argument("--every", type=int, default=1, help="try each n-th bit of the headers only")
     parser.add_argument("--folder", type=Path, default=None, help="where to work; in memory is quickest")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
