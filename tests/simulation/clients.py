@@ -10,6 +10,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
+from dynhull import KeyedHull
 from dynhull.arrays import Points
 from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
@@ -87,8 +88,7 @@ Outline = tuple[Points, Sequence[Key] | None]
 
 def outline(state: HullState) -> Outline:
     """The vertices, and their keys."""
-    keyed = not hasattr(state.hull, "insert")
-    return state.vertices(), state.vertex_keys().tolist() if keyed else None
+    return state.vertices(), state.vertex_keys().tolist() if isinstance(state.hull, KeyedHull) else None
 
 
 class TornBatch:

@@ -101,14 +101,17 @@ class LiveHull:
         """Record a snapshot, which includes batches with this number of points."""
         self._hull.unsaved -= points
 
-    def keys(self, keys: Keys | None = None) -> Keys:
-        """The keys of a question, none by default; raise HullUnsuitableError if the hull has none of their kind."""
-        identity = self.settings.identity
-        if identity == "multiset":
+    def require_keys(self) -> None:
+        """Raise HullUnsuitableError if the points have no keys."""
+        if self.settings.identity == "multiset":
             raise HullUnsuitableError(self.name, "has points without keys")
-        none: Keys = PackedKeys(b"", b"") if identity == "str" else np.empty(0, np.uint64)
+
+    def keys(self, keys: Keys | None) -> Keys:
+        """The keys of a question, which may be none; raise HullUnsuitableError if the hull has none of their kind."""
+        self.require_keys()
+        none: Keys = PackedKeys(b"", b"") if self.settings.identity == "str" else np.empty(0, np.uint64)
         if keys is not None and type(keys) is not type(none):
-            raise HullUnsuitableError(self.name, f"has keys that are {KINDS[identity]}")
+            raise HullUnsuitableError(self.name, f"has keys that are {KINDS[self.settings.identity]}")
         return none if keys is None else keys
 
     # Reads

@@ -15,13 +15,19 @@ from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
 from ..state.contents.keyed import Found
-from ..state.hull_state import Counts, VertexKeys
+from ..state.hull_state import Cause, Counts, VertexKeys
 from ..state.records import NO_TIME, Contents, HullSettings, Identity, Keys, Times
 
 IDENTITIES: dict[Identity, hull_pb2.Identity] = {
     "multiset": hull_pb2.IDENTITY_MULTISET,
     "str": hull_pb2.IDENTITY_STRING_KEYS,
     "int": hull_pb2.IDENTITY_INTEGER_KEYS,
+}
+
+CAUSES: dict[Cause | None, batch_pb2.Cause] = {
+    None: batch_pb2.CAUSE_UNSPECIFIED,
+    "batch": batch_pb2.CAUSE_BATCH,
+    "expiry": batch_pb2.CAUSE_EXPIRY,
 }
 
 
@@ -32,16 +38,19 @@ def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.
     return points_pb2.Points(packed=np.asarray(xy, "<f8").tobytes())
 
 
-def encode_keys(keys: Keys | VertexKeys, encoding: points_pb2.PointEncoding) -> points_pb2.Keys:
+def encode_keys(keys: Keys, encoding: points_pb2.PointEncoding) -> points_pb2.Keys:
     """Keys: packed, or as lists where points are lists of coordinates."""
-    if not isinstance(keys, PackedKeys) and keys.dtype == object:
-        keys = PackedKeys.pack(keys.tolist())
     lists = encoding == points_pb2.POINT_ENCODING_COORDINATES
     if not isinstance(keys, PackedKeys):
         if lists:
             return points_pb2.Keys(integers=keys.tolist())
         return points_pb2.Keys(packed_integers=keys.astype("<u8", copy=False).tobytes())
     return points_pb2.Keys(strings=keys) if lists else points_pb2.Keys(lengths=keys.lengths, text=keys.data)
+
+
+def encode_key_array(keys: VertexKeys, encoding: points_pb2.PointEncoding) -> points_pb2.Keys:
+    """Keys in an array of str or of uint64."""
+    return encode_keys(PackedKeys.pack(keys.tolist()) if keys.dtype == object else keys, encoding)
 
 
 def encode_times(times: Times, encoding: points_pb2.PointEncoding) -> points_pb2.Times:
@@ -153,22 +162,35 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
 
 def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_service_pb2.WatchResponse:
     """The message of an event, without measures."""
-    message = hull_service_pb2.WatchResponse(revision=event.counts.revision, point_count=event.counts.points)
+    counts = event.counts
+    message = hull_service_pb2.WatchResponse(
+        revision=counts.revision, point_count=counts.points, cause=CAUSES[counts.cause]
+    )
+    if counts.clock is not None:
+        message.clock_time.FromMicroseconds(counts.clock)
     match event:
         case Snapshot():
             message.snapshot.uid = event.uid
             message.snapshot.vertices.CopyFrom(encode_points(event.vertices, encoding))
+            if event.keys is not None:
+                message.snapshot.vertex_keys.CopyFrom(encode_key_array(event.keys, encoding))
         case Change():
-            removed, added = event.difference.removed, event.difference.added
+            removed, added, renamed = event.difference.removed, event.difference.added, event.difference.renamed
             message.change.removed.CopyFrom(encode_points(event.removed, encoding))
             message.change.removed_indices.extend(removed.tolist())
             message.change.added.CopyFrom(encode_points(event.vertices[added], encoding))
             message.change.added_indices.extend(added.tolist())
             message.change.rotation = event.difference.rotation
+            if event.keys is not None:
+                message.change.added_keys.CopyFrom(encode_key_array(event.keys[added], encoding))
+                message.change.renamed_indices.extend(renamed.tolist())
+                message.change.renamed_keys.CopyFrom(encode_key_array(event.keys[renamed], encoding))
         case Progress():
             message.progress.SetInParent()
         case _:
             message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
+            if event.keys is not None:
+                message.sketch.keys.CopyFrom(encode_key_array(event.keys, encoding))
     return message
 
 
@@ -195,7 +217,7 @@ def _rows(event: Event) -> int:
         case Snapshot():
             return len(event.vertices)
         case Change():
-            return len(event.removed) + event.difference.added.size
+            return len(event.removed) + event.difference.added.size + event.difference.renamed.size
         case Progress():
             return 0
         case _:

@@ -180,7 +180,7 @@ class HullService:
     async def ReadEntities(self, request: pb.ReadEntitiesRequest, call: Call) -> None:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        hull.keys()
+        hull.require_keys()
         with call.cutoff():
             counts, contents = await entities.entities(hull, request.min_revision)
         for first in range(0, max(len(contents), 1), ENTITIES_A_PART):
@@ -196,12 +196,12 @@ class HullService:
         if not request.include_keys:
             counts, extremes = await hull.support(directions, request.min_revision)
             return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
-        hull.keys()
+        hull.require_keys()
         counts, extremes, keys = await entities.support(hull, directions, request.min_revision, self._engine.aside)
         return pb.SupportResponse(
             revision=counts.revision,
             vertices=encode.encode_points(extremes, encoding),
-            keys=encode.encode_keys(keys, encoding),
+            keys=encode.encode_key_array(keys, encoding),
         )
 
     async def Tangents(self, request: pb.TangentsRequest, call: Call) -> pb.TangentsResponse:
@@ -252,7 +252,7 @@ class HullService:
             return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
         keys = None
         if request.include_keys:
-            hull.keys()
+            hull.require_keys()
             counts, (vertices, keys) = await hull.read(
                 lambda state: (state.vertices(), state.vertex_keys()), hull.vertex_count, request.min_revision
             )
@@ -263,7 +263,7 @@ class HullService:
             hull=encode.encode_hull(hull, counts),
             vertices=encode.encode_points(vertices, encoding),
             measures=measures,
-            vertex_keys=None if keys is None else encode.encode_keys(keys, encoding),
+            vertex_keys=None if keys is None else encode.encode_key_array(keys, encoding),
         )
 
     async def GetMeasures(self, request: pb.GetMeasuresRequest, call: Call) -> pb.GetMeasuresResponse:
@@ -322,7 +322,7 @@ class HullService:
         encoding = decode.decode_encoding(request.encoding)
         size = decode.decode_sample_size(request.sample_size)
         if request.include_keys:
-            hull.keys()
+            hull.require_keys()
             counts, points, keys = await entities.sample(hull, size, request.min_revision, self._engine.aside)
             return pb.SamplePointsResponse(
                 revision=counts.revision,
@@ -337,13 +337,16 @@ class HullService:
         encoding = decode.decode_encoding(request.encoding)
         directions = decode.decode_directions(request.directions) if request.HasField("directions") else None
         resume = decode.decode_resume(request)
+        keys = request.include_keys
+        if keys:
+            hull.require_keys()
         view: View
         if directions is not None:
-            view = SketchView(hull, directions, vertices=request.include_measures)
+            view = SketchView(hull, directions, vertices=request.include_measures, keys=keys)
         elif resume is None:
-            view = VerticesView(hull)
+            view = VerticesView(hull, keys=keys)
         else:
-            view = ResumedView(hull, resume.uid, resume.revision)
+            view = ResumedView(hull, resume.uid, resume.revision, keys=keys)
         events = watch(
             hull,
             view,

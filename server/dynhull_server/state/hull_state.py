@@ -34,14 +34,14 @@ class Counts:
         points: the number of points, with multiplicity.
         distinct: the number of distinct points.
         clock: the clock of the hull, None for a hull without a clock so far.
-        cause: what made the revision.
+        cause: what made the revision; None for revision 0, and where that is no longer known.
     """
 
     revision: int
     points: int
     distinct: int
     clock: int | None = None
-    cause: Cause = "batch"
+    cause: Cause | None = None
 
 
 # The keys of vertices: an array of str, or of uint64.
@@ -62,8 +62,7 @@ class HullState:
         most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self.contents = contents = replayed(kept, settings, most_points)
         self.hull: AnyHull = contents.hull
-        cause: Cause = "expiry" if kept.records and isinstance(kept.records[-1].rows, Expiry) else "batch"
-        self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct, contents.clock, cause)
+        self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct, contents.clock, _last_cause(kept))
         self._producers = Producers(limits.max_producers, limits.max_producers_per_caller, _last_sequences(kept), now)
         self._vertices = self.hull.vertices()
         self._vertices.setflags(write=False)
@@ -217,6 +216,12 @@ class HullState:
     def kept(self) -> Kept:
         """The hull at this revision, for a snapshot. O(n)."""
         return Kept(self.counts.revision, self.contents.stored(), self._producers.state(), clock=self.contents.clock)
+
+
+def _last_cause(kept: Kept) -> Cause | None:
+    if not kept.records:
+        return None
+    return "expiry" if isinstance(kept.records[-1].rows, Expiry) else "batch"
 
 
 def _last_sequences(kept: Kept) -> dict[str, int]:
