@@ -3,16 +3,22 @@
 from sys import modules as _modules
 
 from . import _hull, static
+from ._entities import DuplicateKeyError, MissingKeyError
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
+from ._keyed import KeyedHull, Put
 from ._predicates import orient2d
 from ._window import WindowHull
 from .static import convex_hull
 
 __all__ = [
     "KERNEL",
+    "DuplicateKeyError",
     "DynamicHull",
+    "KeyedHull",
+    "MissingKeyError",
     "MissingPointError",
+    "Put",
     "WindowHull",
     "__version__",
     "convex_hull",
@@ -32,6 +38,6 @@ def __getattr__(name: str) -> str:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-for _public in (DynamicHull, MissingPointError, WindowHull):
+for _public in (DynamicHull, MissingPointError, KeyedHull, DuplicateKeyError, MissingKeyError, Put, WindowHull):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

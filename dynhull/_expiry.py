@@ -196,8 +196,12 @@ class WindowTree(HullTree):
         if now < self._now:
             raise ValueError(f"now is {now!r}, before the window's time {self._now!r}: time does not go back")
         limit = self._limit(now)
-        expired = [] if limit is None else self._order.pop_until(limit)
         self._now = now
+        return 0 if limit is None else self.expire(limit)
+
+    def expire(self, until: float) -> int:
+        """Remove the points of this time or before, as one batch. Returns their number."""
+        expired = self._order.pop_until(until)
         self.expired += len(expired)
         self._replace_points(expired, [])
         return len(expired)

@@ -142,6 +142,11 @@ class WindowTree(HullTree):
         Move the clock. Returns the number of points that left. ValueError if time would go back.
         """
 
+    def expire(self, until: float) -> int:
+        """
+        Remove the points of this time or before, as one batch. Returns their number.
+        """
+
     def delete(self, x: float, y: float) -> bool:
         """
         Remove the oldest copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).

@@ -139,6 +139,11 @@ class HullTree:
             if not ignore_missing:
                 raise KeyError(*p, row)
             applied -= 1
+        self._apply_net(net)
+        return applied
+
+    def _apply_net(self, net: Counter[Point]) -> None:
+        """Change numbers of copies as one batch. The points with a negative change have enough copies."""
         if self._distinct <= sum(1 for change in net.values() if change > 0):
             changed = self._rebuild(net)
         else:
@@ -149,7 +154,6 @@ class HullTree:
                 elif change < 0:
                     changed |= self._delete(p, -change)
         self.changes += changed
-        return applied
 
     def _insert(self, p: Point, copies: int) -> bool:
         self._size += copies

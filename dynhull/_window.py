@@ -17,6 +17,7 @@ from .arrays import as_coordinate, as_time
 
 if TYPE_CHECKING:
     from . import _kernel
+    from .arrays import Points
 
 
 class WindowHull(Hull):
@@ -102,6 +103,11 @@ class WindowHull(Hull):
         """
         return self._tree.times()
 
+    def oldest_first(self) -> tuple[Points, npt.NDArray[np.float64]]:
+        """(n, 2) points and (n,) times in the order in which they leave. O(n log n)."""
+        points, times, _, _ = self._tree.state()
+        return points, times
+
     # Updates
 
     def add(self, xy: npt.ArrayLike, times: npt.ArrayLike | None = None) -> int:
@@ -132,6 +138,13 @@ class WindowHull(Hull):
             ValueError: `now` is before the window's present time.
         """
         return self._tree.advance(as_time(now, "now"))
+
+    def expire(self, until: float) -> int:
+        """Remove every point with a time of at most `until`, as one batch. Returns their number. O(log² n) each.
+
+        For windows whose clock is kept elsewhere; `now` stays. Points that came before any time leave, too.
+        """
+        return self._tree.expire(as_time(until, "until"))
 
     def delete(self, x: float, y: float) -> bool:
         """Remove the oldest copy of a point. Returns whether the hull changed. O(log² n).

@@ -46,12 +46,12 @@ def test_a_hull_from_create_to_delete(name):
     assert done.stdout == f"{north}: 3 points inserted, 3 in the hull, its shape changed\n"
     done = dynhull("insert", north, "--json", input="0 3.5\n\n-1,3\n")
     applied = {"inserted": 2, "deleted": 0, "missing": 0, "points": 5, "hull_changed": True}
-    assert json.loads(done.stdout) == {"name": north, "revision": 2, **applied}
+    assert json.loads(done.stdout).items() >= {"name": north, "revision": 2, **applied}.items()
     done = dynhull("remove", north, "1,2", "-1,3")
     assert done.stdout == f"{north}: 2 points removed, 3 in the hull, its shape unchanged\n"
     assert dynhull("query", north).stdout == "-3.0\t4.0\n1.0\t2.0\n0.0\t3.5\n"
 
-    assert dynhull("list", f"{name}/").stdout == f"{north}\t3\t3\t3\n{south}\t0\t0\t0\n"
+    assert dynhull("list", f"{name}/").stdout == f"{north}\t3\t3\t3\t-\t-\n{south}\t0\t0\t0\t-\t-\n"
     first = json.loads(dynhull("list", f"{name}/", "--json").stdout.splitlines()[0])
     assert (first["name"], first["points"], first["revision"]) == (north, 3, 3)
 
@@ -79,7 +79,7 @@ def test_what_cannot_be_done_changes_nothing(name):
     done = dynhull("delete", name)
     assert done.exit_code == 2
     assert f"add --yes to delete {name} (2 points)" in done.stderr
-    assert dynhull("list", name).stdout == f"{name}\t2\t2\t1\n"
+    assert dynhull("list", name).stdout == f"{name}\t2\t2\t1\t-\t-\n"
 
 
 @pytest.mark.usefixtures("served")

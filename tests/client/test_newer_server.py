@@ -147,7 +147,7 @@ REFUSALS = [
     refusals.HullExistsError("a"),
     refusals.SequenceGapError("p", 3, 2),
     refusals.HullEmptyError("a"),
-    refusals.HullUnsuitableError("a", (1.0, 2.0), "too large"),
+    refusals.HullUnsuitableError("a", "has the point (1.0, 2.0)", (1.0, 2.0)),
     refusals.HullReplacedError("a", "uid"),
     refusals.RevisionForgottenError(1, 2, 3),
     refusals.LimitExceededError("max_hulls", 1),

@@ -16,7 +16,8 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library.md"
 PACKAGES = {
     "dynhull": {
         *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d"),
-        *("arrays", "measure", "static"),  # imported with it
+        *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError"),
+        *("arrays", "keys", "measure", "static"),  # imported with it
     },
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
     "dynhull.gjk": {"Contact", "contact", "distance_many", "intersect", "intersect_many"},

@@ -65,6 +65,7 @@ class WindowLife {
         case 1: remove(); break;
         case 2: remove_many(); break;
         case 3: random_.below(20) == 0 ? clear() : copy(); break;
+        case 4: expire_until(); break;
         default: add(random_.below(random_.below(4) == 0 ? 600 : 40)); break;
       }
       check();
@@ -146,6 +147,15 @@ class WindowLife {
     const std::uint64_t expected = expire();
     expired_ += expected;
     require(left == expected, "the number of points that left is wrong");
+  }
+
+  void expire_until() {
+    const double until = time();
+    std::size_t left = 0;
+    with_failures([&] { left = expiry_.expire(tree_, until); });
+    const std::uint64_t expected = std::erase_if(model_, [&](const Dated& item) { return item.time <= until; });
+    expired_ += expected;
+    require(left == expected, "the number of points that expired is wrong");
   }
 
   bool take(Point p) {

@@ -74,7 +74,9 @@ def messages(draw: st.DrawFn, descriptor: Descriptor) -> Message:
 
 
 def set_field(draw: st.DrawFn, message: Message, field: FieldDescriptor) -> None:
-    if field.message_type is not None:
+    if field.message_type is not None and field.is_repeated:
+        getattr(message, field.name).extend(draw(st.lists(messages(field.message_type), max_size=3)))
+    elif field.message_type is not None:
         getattr(message, field.name).CopyFrom(draw(messages(field.message_type)))
     elif field.is_repeated:
         getattr(message, field.name).extend(draw(st.lists(FIELDS[field.type], max_size=8)))

@@ -47,6 +47,11 @@ EVERY_CALL = {
     "CreateHull": lambda stub, name: stub.CreateHull(pb.CreateHullRequest(name=name)),
     "DeleteHull": lambda stub, name: stub.DeleteHull(pb.DeleteHullRequest(name=name)),
     "Apply": lambda stub, name: stub.Apply(pb.ApplyRequest(name=name, batch=batch_pb2.Batch())),
+    "ApplyTogether": lambda stub, name: stub.ApplyTogether(
+        pb.ApplyTogetherRequest(
+            batches=[pb.HullBatch(name=each, batch=batch_pb2.Batch()) for each in ("fleet/truck-1", name)]
+        )
+    ),
     "Ingest": lambda stub, name: stub.Ingest(iter([pb.IngestRequest(name=name)])),
     "Stream": lambda stub, name: list(stub.Stream(iter([pb.StreamRequest(name=name)]))),
     "GetProducer": lambda stub, name: stub.GetProducer(pb.GetProducerRequest(name=name, producer="p")),
@@ -65,7 +70,7 @@ EVERY_CALL = {
     "Frontier": lambda stub, name: stub.Frontier(pb.FrontierRequest(name=name)),
     "Verify": lambda stub, name: stub.Verify(pb.VerifyRequest(name=name)),
 }
-WRITES = {"CreateHull", "DeleteHull", "Apply", "Ingest", "Stream", "GetProducer"}
+WRITES = {"CreateHull", "DeleteHull", "Apply", "ApplyTogether", "Ingest", "Stream", "GetProducer"}
 
 
 def test_every_call_is_tried() -> None:

@@ -6,17 +6,21 @@ CancelledError.
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
+from dynhull import KeyedHull
 from dynhull.arrays import Points
+from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
-from dynhull_server.state.batch import Applied, Batch
+from dynhull_server.state.batch import Applied, Batch, KeyedBatch
 from dynhull_server.state.errors import (
     HullExistsError,
     HullNotFoundError,
     HullReplacedError,
+    InvalidBatchError,
+    KeyMissingError,
     LimitExceededError,
     NotStoredError,
     OutcomeUnknownError,
@@ -25,18 +29,26 @@ from dynhull_server.state.errors import (
     SequenceGapError,
     StoppingError,
 )
-from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.events import WriteBatch, WriteTogether
+from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.records import HullSettings, Identity, Window
 
-from .model import Asked, Content, Model
-from .plan import Operation
+from .entities import Key
+from .model import Asked, Content, Model, tag
+from .plan import KEYED, Operation
 
 NO_POINTS = np.empty((0, 2))
+# The points of one batch have an x of their own each, in eighths.
+EIGHT = 8
 
 
 class Server(Protocol):
     """What clients ask of a server, in either layer."""
 
-    async def create(self, name: str, max_points: int) -> str:
+    def time(self) -> int:
+        """Microseconds since 1970."""
+
+    async def create(self, name: str, settings: HullSettings) -> str:
         """Make a hull; its uid."""
 
     async def delete(self, name: str) -> None:
@@ -48,13 +60,16 @@ class Server(Protocol):
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         """Apply a batch."""
 
+    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+        """Apply a batch to each of several hulls."""
+
     def stream(self, name: str, *, create: bool) -> BatchStream:
         """For many batches."""
 
     async def news(self, stream: BatchStream) -> None:
         """Wait until the stream has an answer."""
 
-    async def vertices(self, name: str, rows: int) -> tuple[str, int, Points]:
+    async def vertices(self, name: str, rows: int) -> tuple[str, int, "Outline"]:
         """The uid, a revision and its vertices."""
 
     async def recall(self, name: str, uid: str, revision: int) -> Points | None:
@@ -67,12 +82,22 @@ class Server(Protocol):
         """What one layer has and the other has not."""
 
 
+# The vertices of a hull, and their keys if it has keys.
+Outline = tuple[Points, Sequence[Key] | None]
+
+
+def outline(state: HullState) -> Outline:
+    """The vertices, and their keys."""
+    return state.vertices(), state.vertex_keys().tolist() if isinstance(state.hull, KeyedHull) else None
+
+
 class TornBatch:
     """A batch for which memory runs out when its inserts are looked at for the nth time."""
 
     def __init__(self, batch: Batch, nth: int) -> None:
         self._batch, self._left = batch, nth
         self.deletes, self.moves, self.count_missing, self.growth = batch.deletes, 0, batch.count_missing, batch.growth
+        self.times = batch.times
 
     @property
     def inserts(self) -> Points:
@@ -108,14 +133,16 @@ class Client:
         """Carry out one operation."""
         match op["do"]:
             case "create":
-                await self.create(op["name"], op["max_points"])
+                await self.create(op["name"], _settings(op))
             case "delete" if "crowd" in op:
                 self.model.ask(op["name"], removes=True)
                 await self.server.delete_at_once(op["name"], op["crowd"])
             case "delete":
                 await self.delete(op["name"])
-            case "write":
+            case "write" | "put":
                 await self.write(op)
+            case "together":
+                await self.together(op)
             case "stream":
                 await self.stream(op)
             case "read":
@@ -129,10 +156,10 @@ class Client:
 
     # Hulls
 
-    async def create(self, name: str, max_points: int = 0) -> None:
+    async def create(self, name: str, settings: HullSettings) -> None:
         asked = self.model.ask(name, makes=True)
         try:
-            uid = await self.server.create(name, max_points)
+            uid = await self.server.create(name, settings)
         except Exception as error:
             self.refused(asked, error, (HullExistsError, LimitExceededError))
         else:
@@ -160,6 +187,41 @@ class Client:
             self._batch_refused(op, asked, error, [attempt])
         else:
             self._applied(asked, attempt, applied, producer, sequence)
+            if name in KEYED:
+                self.model.put(attempt, applied, len(op["keys"]))
+
+    async def together(self, op: Operation) -> None:
+        """A batch to each of several hulls; a fault of it is in the last one."""
+        names = op["names"]
+        producer = f"{self.producer}-{'-'.join(names)}" if op["numbered"] else ""
+        sequence = self._next.get(producer, 1) if producer else 0
+        attempts, parts = [], []
+        for name in names:
+            last = name == names[-1]
+            part = {key: value for key, value in op.items() if last or key not in ("delete", "torn")}
+            attempt, write = self._batch(part | {"name": name}, producer, sequence)
+            write.name = name
+            attempts.append(attempt)
+            parts.append(write)
+        self.model.bind(attempts)
+        asked = [self.model.ask(name) for name in names]
+        try:
+            results = await self.server.apply_together(WriteTogether(parts, rows=op["rows"]))
+        except Exception as error:
+            missing = error.name if isinstance(error, HullNotFoundError) else names[0]
+            about = asked[names.index(missing)]
+            self.refused(about, error, (HullNotFoundError, *_reasons(op)), attempts)
+            if isinstance(error, SequenceGapError):
+                self._next[producer] = error.expected
+            return
+        for each, attempt, applied in zip(asked, attempts, results, strict=True):
+            self.model.applied(each, attempt, applied, producer, sequence)
+            if each.name in KEYED:
+                self.model.put(attempt, applied, len(op["keys"]))
+        if len({applied.duplicate for applied in results}) > 1:
+            raise self.model.finds(f"batches {attempts} are a duplicate in one hull alone: {results}")
+        if producer:
+            self._next[producer] = sequence + 1
 
     async def stream(self, op: Operation) -> None:
         name, producer = op["name"], self._producer(op)
@@ -216,6 +278,13 @@ class Client:
 
     def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, WriteBatch]:
         attempt = self.model.attempt()
+        batch: Any = self._puts(op, attempt) if op["name"] in KEYED else self._points(op, attempt)
+        if "torn" in op and isinstance(batch, Batch):
+            self.model.faulty = True
+            batch = TornBatch(batch, op["torn"])
+        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer)
+
+    def _points(self, op: Operation, attempt: int) -> Batch:
         deletes = NO_POINTS
         seen = self.seen.get(op["name"])
         if op.get("delete") == "nowhere" and attempt % 3:  # else nothing that is right would follow a refused batch
@@ -224,11 +293,27 @@ class Client:
             x = float(seen[-1][2][0])
             deletes = np.array([[x, x * x]])
         x = float(attempt)
-        batch: Any = Batch(np.array([[x, x * x]]), deletes, 0, op.get("delete") == "lenient")
-        if "torn" in op:
-            self.model.faulty = True
-            batch = TornBatch(batch, op["torn"])
-        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer)
+        return Batch(np.array([[x, x * x]]), deletes, 0, op.get("delete") == "lenient")
+
+    def _puts(self, op: Operation, attempt: int) -> KeyedBatch:
+        """A batch of keys; those that it puts are not among those that it removes."""
+        kind = KEYED[op["name"]]
+        now = self.server.time()
+        x = attempt + np.arange(len(op["keys"])) / EIGHT
+        named = (str, int)[kind == "int"]
+        removes = [tag(attempt, kind), *(named(key) for key in op["removes"] if key not in op["keys"])]
+        times = np.full(len(x), now + op["time"], np.int64) if "time" in op else None
+        return KeyedBatch(
+            cast("Any", kind),
+            as_keys(list(map(named, op["keys"])), kind),
+            np.column_stack((x, x * x)),
+            as_keys(removes, kind),
+            times,
+            op.get("only"),
+            op.get("ttl"),
+            np.full(len(x), now + op["deadline"], np.int64) if "deadline" in op else None,
+            refuse_missing="refuse" in op,
+        )
 
     def _applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:
         self.model.applied(asked, attempt, applied, producer, sequence)
@@ -236,15 +321,9 @@ class Client:
             self._next[asked.name + producer] = sequence + 1
 
     def _batch_refused(self, op: Operation, asked: Asked, error: Exception, attempts: Sequence[int]) -> None:
-        reasons: list[type[Exception]] = [LimitExceededError]
+        reasons = _reasons(op)
         if not op["create"] or op["do"] == "stream":
             reasons.append(HullNotFoundError)
-        if "delete" in op:
-            reasons.append(PointMissingError)
-        if op["numbered"]:
-            reasons.append(SequenceGapError)
-        if "torn" in op:
-            reasons.append(MemoryError)
         self.refused(asked, error, tuple(reasons), attempts)
         if isinstance(error, SequenceGapError):
             self._next[op["name"] + self._producer(op)] = error.expected
@@ -254,16 +333,19 @@ class Client:
     async def read(self, name: str, rows: int = 1) -> None:
         asked = self.model.ask(name)
         try:
-            uid, revision, vertices = await self.server.vertices(name, rows)
+            uid, revision, seen = await self.server.vertices(name, rows)
         except Exception as error:
             self.refused(asked, error, (HullNotFoundError,))
         else:
-            self.saw(asked, uid, revision, vertices)
+            self.saw(asked, uid, revision, seen)
 
-    def saw(self, asked: Asked, uid: str, revision: int, vertices: Points) -> None:
+    def saw(self, asked: Asked, uid: str, revision: int, outline: Outline) -> None:
         """The vertices at a revision have been told."""
+        vertices, keys = outline
         seen = content(vertices)
         self.model.read(asked, uid, revision, seen)
+        if keys is not None:
+            self.model.named(uid, revision, vertices[:, 0].tolist(), keys)
         self.seen.setdefault(asked.name, []).append((uid, revision, seen))
 
     async def recall(self, op: Operation) -> None:
@@ -323,9 +405,31 @@ class Client:
         self.model.refused(asked, attempts)
 
 
+def _reasons(op: Operation) -> list[type[Exception]]:
+    """Why batches to a hull may be refused."""
+    reasons: list[type[Exception]] = [LimitExceededError]
+    if "delete" in op:
+        reasons.append(PointMissingError)
+    if "refuse" in op:
+        reasons.append(KeyMissingError)
+    if "keys" in op:
+        reasons.append(InvalidBatchError)
+    if op["numbered"]:
+        reasons.append(SequenceGapError)
+    if "torn" in op:
+        reasons.append(MemoryError)
+    return reasons
+
+
 def content(vertices: Points) -> Content:
     """The batches that made these vertices."""
-    return tuple(sorted(map(int, vertices[:, 0].tolist())))
+    return tuple(sorted(vertices[:, 0].tolist()))
+
+
+def _settings(op: Operation) -> HullSettings:
+    identity = cast("Identity", KEYED.get(op["name"], "multiset"))
+    window = Window(**op["window"]) if "window" in op else None
+    return HullSettings(identity, op.get("max_points", 0), window, op.get("by_event_time", False))
 
 
 async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
@@ -336,12 +440,14 @@ async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
     if name in model.alive:
         await client.read(name)
     write: Operation = {"do": "write", "name": name, "create": True, "numbered": False, "rows": 1}
+    if name in KEYED:
+        write |= {"do": "put", "keys": [0], "removes": [1], "time": 0}
     await client.write(write)
     if name not in model.alive:
         return  # there may be no more hulls
     await client.read(name)
     if anew:
         await client.delete(name)
-        await client.create(name)
+        await client.create(name, _settings(write))
         await client.write(write | {"numbered": True})
         await client.read(name)

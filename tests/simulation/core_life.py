@@ -13,7 +13,9 @@ from typing import Any
 from dynhull.arrays import Points
 from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.group_commit import GroupCommit
+from dynhull_server.engine.server_time import ServerTime
 from dynhull_server.engine.threads import Clock
+from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.core import Core
 from dynhull_server.state.errors import HullNotFoundError, HullReplacedError, RefusedError, StoppingError
@@ -40,19 +42,24 @@ from dynhull_server.state.events import (
     Stopping,
     Tick,
     WriteBatch,
+    WriteTogether,
 )
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import HullSettings
+from dynhull_server.state.records import HullSettings, KeyRows
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
-from .clients import Client, content
-from .model import Model
+from .clients import Client, Outline, content, outline
+from .entities import Entities
+from .model import Model, Truth
 from .plan import Operation
 from .schedule import Schedule
 
 DAY = 90_000.0
+# Seconds within which everything leaves that has to.
+MOMENT = 0.5
+EPOCH = 1e9
 
 Condition = Callable[[], object]
 
@@ -80,6 +87,20 @@ class Answer:
 
     def is_answered(self) -> bool:
         return self.answered
+
+
+class StoppedClock(Clock):
+    """Time passes when somebody says so. In each life the wall clock begins at another time, perhaps an earlier one."""
+
+    def __init__(self, begun: float) -> None:
+        self.now = 0.0
+        self._begun = begun
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def wall(self) -> float:
+        return EPOCH + self._begun + self.now
 
 
 class NoThreads:
@@ -121,7 +142,8 @@ class CoreServer:
         self._commits = GroupCommit(storage, threads, Clock(), lambda _: None, lambda _: None)
         self._events: deque[Event] = deque()
         self._stepping = False
-        self._now = 0.0
+        self._clock = StoppedClock(schedule.random.uniform(0, 10))
+        self._time = ServerTime(self._clock, self.core.latest_time)
         self._news: deque[Callable[[], None]] = deque()
         self._examining: deque[Examine] = deque()
         self._computing: deque[Trip] = deque()
@@ -149,8 +171,8 @@ class CoreServer:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Reply():
-                if effect.moved is not None:
-                    self.schedule.note((effect.moved.uid, effect.moved.counts.revision))
+                for hull in effect.moved:
+                    self.schedule.note((hull.uid, hull.counts.revision))
                 for request in effect.requests:
                     self.schedule.note((type(request).__name__, str(request.error)))
                     request.to.answer(request)
@@ -196,8 +218,11 @@ class CoreServer:
         effect = self._examining.popleft()
         event: Event
         try:
-            row = self._storage.row(effect.number)
-            event = Examined(effect.ticket, effect.load(self._storage.read(effect.number)) if row else None)
+            states = []
+            for number, load in effect.hulls:
+                row = self._storage.row(number)
+                states.append(load(self._storage.read(number)) if row else None)
+            event = Examined(effect.ticket, states)
         except Exception as error:
             event = NotExamined(effect.ticket, error)
         self._news.append(partial(self.dispatch, event))
@@ -219,8 +244,11 @@ class CoreServer:
     def _birth(self) -> Birth:
         return Birth(self.model.uid(), 0.0)
 
-    async def create(self, name: str, max_points: int) -> str:
-        uid: str = (await self._ask(CreateHull(Answer(), name, self._birth(), HullSettings(max_points=max_points)))).uid
+    def time(self) -> int:
+        return self._time.now()
+
+    async def create(self, name: str, settings: HullSettings) -> str:
+        uid: str = (await self._ask(CreateHull(Answer(), name, self._birth(), settings))).uid
         return uid
 
     async def delete(self, name: str) -> None:
@@ -233,11 +261,18 @@ class CoreServer:
         await Wait(lambda: all(request.to.answered for request in requests))
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
-        write.to, write.name = Answer(), name
+        write.to, write.name, write.arrived = Answer(), name, self.time()
         if create:
             write.birth = self._birth()
         applied: Applied = await self._ask(write)
         return applied
+
+    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+        write.to = Answer()
+        for part in write.parts:
+            part.arrived = self.time()
+        results: list[Applied] = await self._ask(write)
+        return results
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         hull = self.core.get(name) if name in self.core.hulls or not create else None
@@ -247,10 +282,10 @@ class CoreServer:
     async def news(self, stream: BatchStream) -> None:
         await Wait(lambda: stream.applied or stream.refusal is not None)
 
-    async def vertices(self, name: str, rows: int) -> tuple[str, int, Points]:
+    async def vertices(self, name: str, rows: int) -> tuple[str, int, Outline]:
         hull = self.core.get(name)
-        counts, vertices = await self._ask(ReadHull(Answer(), hull, HullState.vertices, rows=rows))
-        return hull.uid, counts.revision, vertices
+        counts, seen = await self._ask(ReadHull(Answer(), hull, outline, rows=rows))
+        return hull.uid, counts.revision, seen
 
     async def recall(self, name: str, uid: str, revision: int) -> Points | None:
         hull = self.core.get(name)
@@ -266,11 +301,10 @@ class CoreServer:
         return int(last)
 
     async def special(self, client: Client, op: Operation) -> None:
-        """A snapshot, as housekeeping takes it, or a day that passes."""
-        if op["do"] == "day":
-            self.model.days = True
-            self._now += DAY
-            self.dispatch(Tick(self._now))
+        """A snapshot, as housekeeping takes it, or time that passes."""
+        if op["do"] in ("day", "tick"):
+            self.model.days |= op["do"] == "day"
+            self._pass(DAY if op["do"] == "day" else op["seconds"])
             return
         asked = self.model.ask(op["name"])
         try:
@@ -324,6 +358,17 @@ class CoreServer:
         """Compare what is in memory with the truth."""
         compare(self.core, self.model)
 
+    def _pass(self, seconds: float) -> None:
+        self._clock.now += seconds
+        self.dispatch(Tick(self._clock.now, self.time(), Answer()))
+
+    def let_leave(self) -> None:
+        """Time passes, and whoever should leave does."""
+        self._pass(MOMENT)
+        self.rest()
+        if overdue := self.model.overdue(self.time() - TICK):
+            raise self.model.finds(f"{overdue} have not lost what should have left")
+
     def kill(self) -> None:
         """Nothing more happens."""
         for actor in self._clients:
@@ -347,10 +392,31 @@ def compare(core: Core, model: Model) -> None:
         held = (hull.counts.revision, state.counts.revision, content(state.hull.points()))
         if held != (truth.revision, truth.revision, truth.contents[-1]):
             raise model.finds(f"{name} is {held} in memory, kept is {truth.revision, truth.contents[-1]}")
+        if truth.keyed:
+            _compare_entities(name, state, truth, model)
         if not model.days and state.kept().producers != truth.producers:
             raise model.finds(f"producers in memory: {state.kept().producers}, kept: {truth.producers}")
         if core.state_of(name) != "there":
             raise model.finds(f"{name} is {core.state_of(name)} at rest")
+
+
+def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -> None:
+    kept = state.kept()
+    held = Entities(truth.row.settings)
+    if len(kept.contents):
+        held.apply(
+            KeyRows(
+                kept.contents.keys,
+                kept.contents.points,
+                kept.contents.keys[:0],
+                kept.contents.times,
+                kept.contents.deadlines,
+            )
+        )
+    if (held.held, kept.clock) != (truth.entities.held, truth.entities.clock):
+        raise model.finds(
+            f"{name} holds {held.held} at {kept.clock}, kept is {truth.entities.held} at {truth.entities.clock}"
+        )
 
 
 def _remember(failed: list[Exception | None], error: Exception | None, _: bool) -> None:

@@ -4,22 +4,28 @@ The storage reports what it has kept, in order; that is the truth. Each batch in
 its x, and all points of a parabola are vertices: so an answer names the batches that it has seen.
 
 * Acknowledged batches are in the truth when they are acknowledged, at the revision told; refused ones never are.
+* Of batches to several hulls all are kept by one commit, or none; and who has seen one of them sees the others.
 * No batch is there twice, and no two of one producer have the same number.
 * A read at a revision is the truth at that revision, and so is a recall.
 * Whatever is asked after an answer has been seen is not older than that answer.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import Append, Create, Delete, HullRow, PointRows, Record
+from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, PointRows, Record
 
-Content = tuple[int, ...]
+from .entities import Effect, Entities, Key
+
+Content = tuple[float, ...]
+
+# Batches to hulls with keys remove a key of their own, from here on, that nobody puts: it names the batch.
+FIRST_TAG = 1_000
 
 DELETED = 2**62
 
@@ -30,12 +36,26 @@ class Finding(BaseException):
 
 @dataclass(slots=True, eq=False)
 class Truth:
-    """One hull as the storage has kept it: its content at each revision, and the last number of each producer."""
+    """One hull as the storage has kept it: its content at each revision, and the last number of each producer.
+
+    `keys` are the keys at each revision, by their x, and `entities` those that there are; of hulls without keys none.
+    `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
+    """
 
     row: HullRow
     contents: list[Content] = field(default_factory=lambda: [()])
     producers: dict[str, int] = field(default_factory=dict)
     deleted: bool = False
+    bonds: deque[tuple[int, list[int]]] = field(default_factory=deque)
+    keys: list[dict[float, Key]] = field(default_factory=lambda: [{}])
+    entities: Entities = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.entities = Entities(self.row.settings)
+
+    @property
+    def keyed(self) -> bool:
+        return self.row.settings.identity != "multiset"
 
     @property
     def revision(self) -> int:
@@ -80,6 +100,8 @@ class Model:
         self._uids: dict[str, Truth] = {}
         self._places: dict[int, tuple[Truth, int]] = {}
         self._refused: set[int] = set()
+        self._bound: dict[int, list[int]] = {}
+        self._effects: dict[int, tuple[Effect, int]] = {}
         self._floor: dict[str, tuple[int, int]] = {}
         self._attempts = self._uids_given = 0
         self._open: Counter[tuple[str, str]] = Counter()
@@ -110,18 +132,26 @@ class Model:
     # What is kept
 
     def landed(self, changes: Sequence[Any]) -> None:
-        """The storage has kept these changes."""
+        """The storage has kept these changes, by one commit."""
+        appended: list[int | None] = []
         for change in changes:
             match change:
                 case Create():
                     self._create(change.row)
                 case Append():
-                    for record in change.records:
-                        self._append(self._hulls[change.number], record)
+                    truth = self._hulls[change.number]
+                    appended += [self._append(truth, record) for record in change.records]
                 case Delete():
                     truth = self._hulls[change.number]
                     truth.deleted = True
                     del self.alive[truth.row.name]
+        for attempt in filter(None, appended):
+            together = self._bound.get(attempt, [])
+            if not set(together) <= set(appended):
+                raise self.finds(f"of the batches {together} only {attempt} is kept")
+            if together:
+                truth, revision = self._places[attempt]
+                truth.bonds.append((revision, together))
 
     def _create(self, row: HullRow) -> None:
         if row.number in self._numbers:
@@ -131,30 +161,63 @@ class Model:
         self._numbers.add(row.number)
         self.alive[row.name] = self._hulls[row.number] = self._uids[row.uid] = Truth(row)
 
-    def _append(self, truth: Truth, record: Record) -> None:
+    def _append(self, truth: Truth, record: Record) -> int | None:
+        """Take a revision into the truth. Returns the number of its batch, None for an expiry."""
         if truth.deleted:
             raise self.finds("a batch is kept of a hull that has been deleted")
         if record.revision != truth.revision + 1:
             raise self.finds(f"revision {record.revision} is kept after revision {truth.revision}")
+        if isinstance(record.rows, Expiry):
+            self._expire(truth, record, record.rows)
+            return None
         rows = record.rows
-        assert isinstance(rows, PointRows)
-        attempt = int(rows.inserts[0, 0])
+        attempt = int(rows.inserts[0, 0]) if isinstance(rows, PointRows) else _attempt(rows.removes[0])
         if attempt in self._refused:
             raise self.finds(f"batch {attempt} is kept after it was refused")
         if attempt in self._places:
             raise self.finds(f"batch {attempt} is kept twice")
-        content = {*truth.contents[-1], attempt}
-        for x in rows.deletes[:, 0].tolist():
-            if x not in content and not rows.lenient:
-                raise self.finds(f"batch {attempt} deletes a point that is not there")
-            content.discard(int(x))
+        if isinstance(rows, PointRows):
+            content = {*truth.contents[-1], attempt}
+            for x in rows.deletes[:, 0].tolist():
+                if x not in content and not rows.lenient:
+                    raise self.finds(f"batch {attempt} deletes a point that is not there")
+                content.discard(x)
+            truth.contents.append(tuple(sorted(content)))
+        else:
+            self._effects[attempt] = truth.entities.apply(rows), len(rows.keys)
+            self._revise(truth, record)
         if record.producer:
             if record.sequence != truth.producers.get(record.producer, 0) + 1 and not self.days:
                 raise self.finds(f"batch {record.sequence} of {record.producer} is kept out of its turn")
             truth.producers[record.producer] = record.sequence
             self._numbered[truth.row.name, record.producer, record.sequence].append(truth)
-        truth.contents.append(tuple(sorted(content)))
         self._places[attempt] = truth, record.revision
+        return attempt
+
+    def _expire(self, truth: Truth, record: Record, rows: Expiry) -> None:
+        if record.clock is None or not truth.entities.expire(rows, record.clock):
+            raise self.finds(f"revision {record.revision} of {truth.row.name} lets others leave: {record}")
+        self._revise(truth, record)
+
+    def _revise(self, truth: Truth, record: Record) -> None:
+        """A hull with keys has a new revision."""
+        entities = truth.entities
+        if entities.clock is not None and (record.clock is None or record.clock < entities.clock):
+            raise self.finds(f"the clock of {truth.row.name} goes back from {entities.clock} to {record.clock}")
+        entities.clock = record.clock
+        if record.clock is not None and entities.overdue(record.clock):
+            overdue = entities.overdue(record.clock)
+            raise self.finds(f"{overdue} are in {truth.row.name} at {record.clock}, and should have left")
+        truth.keys.append({entity.x: key for key, entity in entities.held.items()})
+        truth.contents.append(tuple(sorted(truth.keys[-1])))
+
+    def overdue(self, time: int) -> list[str]:
+        """The hulls that hold what should have left at a time by the server's clock."""
+        return [
+            name
+            for name, truth in self.alive.items()
+            if truth.keyed and truth.entities.follows_server and truth.entities.overdue(time)
+        ]
 
     # What is asked
 
@@ -162,6 +225,10 @@ class Model:
         """The x of a new batch."""
         self._attempts += 1
         return self._attempts
+
+    def bind(self, attempts: list[int]) -> None:
+        """These batches are applied together or not at all."""
+        self._bound |= dict.fromkeys(attempts, attempts)
 
     def uid(self) -> str:
         """Of a new hull."""
@@ -188,6 +255,13 @@ class Model:
     def _see(self, name: str, place: tuple[int, int]) -> None:
         if place > self._floor.get(name, (0, 0)):
             self._floor[name] = place
+        if place[0] not in self._hulls:
+            return
+        bonds = self._hulls[place[0]].bonds
+        while bonds and bonds[0][0] <= place[1]:
+            for other in bonds.popleft()[1]:
+                truth, revision = self._places[other]
+                self._see(truth.row.name, (truth.row.number, revision))
 
     def _answered(self, asked: Asked, place: tuple[int, int]) -> None:
         self._count(asked.name, asked.makes, asked.removes, -1)
@@ -230,6 +304,15 @@ class Model:
             raise self.finds(f"batch {attempt} was seen before it was sent")
         self._answered(asked, (truth.row.number, revision))
 
+    def put(self, attempt: int, applied: Applied, puts: int) -> None:
+        """A batch of keys has been acknowledged: what it is said to have done must be what it did."""
+        if applied.duplicate:
+            return
+        effect, rows = self._effects[attempt]
+        said = applied.inserted, applied.moved, applied.stale, applied.skipped, applied.deleted, applied.evicted
+        if (said, applied.late) != (effect, puts - rows):
+            raise self.finds(f"batch {attempt} is said to have done {applied}, and did {effect} of {rows} rows")
+
     def refused(self, asked: Asked, attempts: Sequence[int] = ()) -> None:
         """Nothing of a request is done, nor ever will be."""
         for attempt in attempts:
@@ -264,6 +347,12 @@ class Model:
             raise self.finds(f"revision {revision} of {asked.name} was told as {seen}, and is kept as {kept}")
         self._answered(asked, (self._uids[uid].row.number, revision))
 
+    def named(self, uid: str, revision: int, seen: Sequence[float], keys: Sequence[Key]) -> None:
+        """The keys of the points with these x were read."""
+        kept = self._uids[uid].keys[revision]
+        if list(map(kept.get, seen)) != list(keys):
+            raise self.finds(f"at revision {revision} the keys of {seen} were told as {keys}, and are {kept}")
+
     def recalled(self, uid: str, revision: int, seen: Content) -> None:
         """An earlier revision was read."""
         kept = self.content(uid, revision)
@@ -275,3 +364,12 @@ class Model:
         kept = [each.producers.get(producer, 0) for each in self._hulls.values() if each.row.name == asked.name]
         if sequence > max(kept, default=0):
             raise self.finds(f"number {sequence} of {producer} was told, and is not kept")
+
+
+def tag(attempt: int, kind: str) -> Key:
+    """A key that is never there: a batch that removes it can be told from others."""
+    return f"{FIRST_TAG + attempt}" if kind == "str" else FIRST_TAG + attempt
+
+
+def _attempt(key: Key) -> int:
+    return int(key) - FIRST_TAG

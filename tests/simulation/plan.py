@@ -17,11 +17,15 @@ Plan = dict[str, Any]
 Operation = dict[str, Any]
 
 NAMES = ("a", "b", "c")
+# Hulls with keys, and of which type these are.
+KEYED = {"k": "str", "l": "int"}
 
 # What can be asked for, and how often. Each plan has some of it much more often, and some not at all: faults hide where
 # a few operations meet (swarm testing: Groce and others, 2012).
 CORE = {
     "write": 40,
+    "put": 30,
+    "together": 14,
     "stream": 14,
     "read": 12,
     "delete": 10,
@@ -29,10 +33,13 @@ CORE = {
     "recall": 5,
     "snapshot": 5,
     "last": 4,
+    "tick": 10,
     "day": 1,
 }
 SHELL = {
     "write": 34,
+    "put": 26,
+    "together": 12,
     "stream": 14,
     "read": 10,
     "delete": 9,
@@ -62,8 +69,12 @@ def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     draw = random.Random(seed)
     names = NAMES[: draw.randint(1, 3)]
+    keyed = tuple(KEYED)[: draw.randint(0, 2)]
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
     weights["write"] += 1
+    if not keyed:
+        weights["put"] = 0
+        weights["together"] *= len(names) > 1
     immediate = layer != "sqlite" and draw.random() < 0.1
     return {
         "seed": seed,
@@ -76,14 +87,16 @@ def random_plan(seed: int, layer: str) -> Plan:
             "max_producers_per_caller": draw.choice((1, 10, 10)),
             "history_bytes": draw.choice((0, 0, 700, 1_000_000)),
         },
-        "lives": [_life(draw, names, weights) for _ in range(draw.choice((1, 1, 2, 3)))],
+        "lives": [_life(draw, names, keyed, weights) for _ in range(draw.choice((1, 1, 2, 3)))],
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
     }
 
 
-def _life(draw: random.Random, names: tuple[str, ...], weights: dict[str, int]) -> dict[str, Any]:
+def _life(
+    draw: random.Random, names: tuple[str, ...], keyed: tuple[str, ...], weights: dict[str, int]
+) -> dict[str, Any]:
     clients = [
-        [_operation(draw, names, weights) for _ in range(draw.randint(1, 4))]
+        [_operation(draw, names, keyed, weights) for _ in range(draw.randint(1, 4))]
         for _ in range(draw.choice((1, 2, 2, 3, 4)))
     ]
     life: dict[str, Any] = {"clients": clients, "end": draw.choice(ENDS)}
@@ -92,10 +105,18 @@ def _life(draw: random.Random, names: tuple[str, ...], weights: dict[str, int]) 
     return life
 
 
-def _operation(draw: random.Random, names: tuple[str, ...], weights: dict[str, int]) -> Operation:
+def _operation(
+    draw: random.Random, names: tuple[str, ...], keyed: tuple[str, ...], weights: dict[str, int]
+) -> Operation:
     do = draw.choices(list(weights), list(weights.values()))[0]
-    op: Operation = {"do": do, "name": draw.choice(names)}
-    if do in ("write", "stream"):
+    every = (*names, *keyed)
+    op: Operation = {"do": do, "name": draw.choice({"write": names, "stream": names, "put": keyed}.get(do, every))}
+    if do == "put":
+        op["create"] = draw.random() < 0.5
+        op["numbered"] = draw.random() < 0.5
+        op["rows"] = draw.choice((1, 1, 1, 200))
+        op |= _puts(draw)
+    elif do in ("write", "stream"):
         op["create"] = draw.random() < 0.7
         op["numbered"] = draw.random() < 0.5
         op["rows"] = draw.choice((1, 1, 1, 200, 200, 200_000))
@@ -108,12 +129,23 @@ def _operation(draw: random.Random, names: tuple[str, ...], weights: dict[str, i
             op["window"] = draw.randint(1, 5)
         elif draw.random() < 0.05:
             op["shared"] = True
+    elif do == "together":
+        op["names"] = draw.sample(every, draw.randint(2, len(every)))
+        op["numbered"] = draw.random() < 0.5
+        op["rows"] = draw.choice((1, 1, 200))
+        if draw.random() < 0.3:
+            op["delete"] = draw.choice(("strict", "lenient", "nowhere"))
+        if draw.random() < 0.05:
+            op["torn"] = draw.randint(1, 4)
+        op |= _puts(draw)
     elif do == "delete":
         if draw.random() < 0.01:
             op["crowd"] = 400
     elif do == "create":
         op["max_points"] = draw.choice((0, 0, 2))
-    elif do == "rest":
+        if op["name"] in keyed:
+            op |= _settings(draw)
+    elif do in ("rest", "tick"):
         op["seconds"] = 10 ** draw.uniform(-3, 0.8)
     elif do in ("recall", "watch"):
         op["back"] = draw.randint(0, 3)
@@ -122,6 +154,35 @@ def _operation(draw: random.Random, names: tuple[str, ...], weights: dict[str, i
     if draw.random() < 0.2:
         op["leave"] = int(draw.expovariate(1 / 3))
     return op
+
+
+def _settings(draw: random.Random) -> dict[str, Any]:
+    """Of a hull with keys; times in microseconds."""
+    settings: dict[str, Any] = {"by_event_time": draw.random() < 0.5}
+    if draw.random() < 0.8:
+        window = {"max_age": draw.choice((0, 300_000, 1_000_000)), "clock": draw.choice(("server", "data"))}
+        window["max_points"] = draw.choice((0, 0, 2) if window["max_age"] else (1, 2))
+        if draw.random() < 0.5:
+            window |= {"max_skew": draw.choice((0, 500_000)), "clamps": draw.random() < 0.5}
+        settings["window"] = window
+    return settings
+
+
+def _puts(draw: random.Random) -> dict[str, Any]:
+    """What a batch does to keys; times in microseconds from now on."""
+    puts: dict[str, Any] = {
+        "keys": draw.sample(range(4), draw.randint(0, 3)),
+        "removes": draw.sample(range(4), draw.choice((0, 0, 1, 2))),
+    }
+    if draw.random() < 0.8:
+        puts["time"] = draw.choice((0, 0, 200_000, 700_000, -200_000, -700_000, -5_000_000))
+    if draw.random() < 0.2:
+        puts["only"] = draw.choice(("absent", "present"))
+    if draw.random() < 0.2:
+        puts[draw.choice(("ttl", "deadline"))] = draw.choice((1, 200_000, 900_000))
+    if draw.random() < 0.1:
+        puts["refuse"] = True
+    return puts
 
 
 def _fault(draw: random.Random, layer: str) -> dict[str, Any]:

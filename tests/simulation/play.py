@@ -110,5 +110,6 @@ def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, st
     anew = schedule.random.choice(names)
     for name in names:
         server.probe(probe(server, model, name, anew=name == anew))
+    server.let_leave()
     server.check()
     storage.calm = False

@@ -12,14 +12,14 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import TRANSIENT, Supervisor
 from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.engine.watch import watch
+from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
-from dynhull_server.state.events import WriteBatch
-from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings
 
-from .clients import Client
+from .clients import Client, Outline, outline
 from .core_life import compare
 from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
 from .model import Finding, Model
@@ -105,8 +105,11 @@ class ShellServer:
 
     # What clients ask for
 
-    async def create(self, name: str, max_points: int) -> str:
-        return (await self._engine.create(name, HullSettings(max_points=max_points))).uid
+    def time(self) -> int:
+        return self._engine.time()
+
+    async def create(self, name: str, settings: HullSettings) -> str:
+        return (await self._engine.create(name, settings)).uid
 
     async def delete(self, name: str) -> None:
         await self._engine.delete(name)
@@ -116,6 +119,9 @@ class ShellServer:
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         return await self._engine.apply(name, write, create=create)
+
+    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+        return await self._engine.apply_together(write)
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         event = asyncio.Event()
@@ -129,10 +135,10 @@ class ShellServer:
             event.clear()
             await event.wait()
 
-    async def vertices(self, name: str, rows: int) -> tuple[str, int, Points]:
+    async def vertices(self, name: str, rows: int) -> tuple[str, int, Outline]:
         hull = self._engine.get(name)
-        counts, vertices = await hull.read(HullState.vertices, rows)
-        return hull.uid, counts.revision, vertices
+        counts, seen = await hull.read(outline, rows)
+        return hull.uid, counts.revision, seen
 
     async def recall(self, name: str, uid: str, revision: int) -> Points | None:
         async with self._engine.get(name).recalled(uid, revision) as vertices:
@@ -154,14 +160,15 @@ class ShellServer:
 
     async def _watch(self, client: Client, op: Operation) -> None:
         hull = self._engine.get(op["name"])
-        async with aclosing(watch(hull, VerticesView(hull), progress_interval=1.0)) as events:
-            held: Points | None = None
+        view = VerticesView(hull, keys=hull.settings.identity != "multiset")
+        async with aclosing(watch(hull, view, progress_interval=1.0)) as events:
+            held: Outline | None = None
             for _ in range(1 + op["back"]):
                 asked = self.model.ask(op["name"])
                 event = await anext(events)
                 match event:
                     case Snapshot() | Change():
-                        held = event.vertices
+                        held = event.vertices, None if event.keys is None else event.keys.tolist()
                     case Progress():
                         pass
                 assert held is not None
@@ -189,8 +196,14 @@ class ShellServer:
         """Run a probe to its end."""
         self._drive(probe, "a probe")
 
+    def let_leave(self) -> None:
+        """Whoever should have left by now leaves."""
+        time = self.time() - TICK
+        self._until(lambda: not self.model.overdue(time), "what should leave")
+
     def check(self) -> None:
         """Compare what is in memory with the truth, and let background work succeed again."""
+        self._until(lambda: not self._engine._core.busy, "the core")  # points may just be leaving
         compare(self._engine._core, self.model)
         # Of a commit that failed the supervisor hears when the next one succeeds.
         self._until(lambda: not set(self._supervisor.failing()) - {"commits", "examination"}, "the background work")

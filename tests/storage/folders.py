@@ -1,5 +1,6 @@
 """Data folders in the states that tests need them in."""
 
+import dataclasses
 import shutil
 from pathlib import Path
 
@@ -9,13 +10,13 @@ from dynhull_server.state.records import Append, Contents, Create, HullRow, Kept
 from dynhull_server.storage.sqlite.folder import DATABASE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
-FORMAT_1 = Path(__file__).parent.parent / "data" / "format1"
+OLD_FOLDERS = Path(__file__).parent.parent / "data"
 LOG = f"{DATABASE}-wal"
 NOTHING = np.empty((0, 2))
 
 
 def no_progress(done, total):
-    """Nobody watches."""
+    """Ignore the progress."""
 
 
 def opened(path, *options, **more):
@@ -37,9 +38,20 @@ def records(first, last):
 
 
 def same(found, expected):
-    assert [each.revision for each in found] == [each.revision for each in expected]
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(one.rows.inserts, other.rows.inserts)
+    """Assert that values are equal, field by field and row by row."""
+    if isinstance(expected, np.ndarray):
+        assert found.dtype == expected.dtype
+        np.testing.assert_array_equal(found, expected)
+    elif dataclasses.is_dataclass(expected):
+        assert type(found) is type(expected)
+        for field in dataclasses.fields(expected):
+            same(getattr(found, field.name), getattr(expected, field.name))
+    elif isinstance(expected, list | tuple):
+        assert len(found) == len(expected)
+        for one, other in zip(found, expected, strict=True):
+            same(one, other)
+    else:
+        assert found == expected
 
 
 def fill(storage, last, name="fleet", number=1):
@@ -67,7 +79,7 @@ def killed(path, target):
 
 
 def stopped(path, last=9):
-    """A folder with one hull and so many batches."""
+    """A folder with one hull, at revision `last`."""
     storage, _ = opened(path)
     fill(storage, last)
     storage.close()

@@ -1,4 +1,4 @@
-"""What every storage promises, whatever is behind it."""
+"""The promises of the port, which every storage keeps."""
 
 import io
 import itertools
@@ -7,27 +7,36 @@ import threading
 
 import numpy as np
 import pytest
+from folders import same
 
+from dynhull.keys import PackedKeys
 from dynhull_server.state.records import (
+    FOREVER,
+    NO_TIME,
     Append,
     Contents,
     Create,
     Delete,
+    Expiry,
     HullRow,
     HullSettings,
     Kept,
+    KeyRows,
     PointRows,
     Record,
+    Window,
 )
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NEWEST, DamagedError, NotCommittedError
+from dynhull_server.storage.sqlite.chunks import CHUNK_BYTES
 from dynhull_server.storage.sqlite.disk import Disk
 from dynhull_server.storage.sqlite.folder import DATABASE
-from dynhull_server.storage.sqlite.storage import CHUNK_POINTS, SQLiteStorage
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 NOTHING = np.empty((0, 2))
 SIMULATED = itertools.count()
+CHUNK_POINTS = CHUNK_BYTES // 16
 
 
 class MemoryDisk(Disk):
@@ -131,14 +140,6 @@ def records(first, last):
     return [record(revision) for revision in range(first, last + 1)]
 
 
-def same(found, expected):
-    assert [each.revision for each in found] == [each.revision for each in expected]
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(one.rows.inserts, other.rows.inserts)
-        np.testing.assert_array_equal(one.rows.deletes, other.rows.deletes)
-        assert (one.producer, one.sequence, one.rows.lenient) == (other.producer, other.sequence, other.rows.lenient)
-
-
 def test_what_was_committed_comes_back(opened):
     assert (opened.contents.hulls, opened.contents.next_number, opened.contents.notes) == ([], 1, [])
     batches = [
@@ -195,6 +196,73 @@ def test_a_snapshot_stands_for_the_batches_before_it(opened):
         with pytest.raises(DamagedError, match="no longer kept"):
             opened.storage.read(1, 29)
         opened.reopen()
+
+
+def strings(n, seed=0):
+    """Keys of 1 to 255 bytes."""
+    return PackedKeys.pack([f"{seed}.{i} é".ljust(i % 240 + 1, "x")[:254] for i in range(n)])
+
+
+def integers(n, seed=0):
+    return np.random.default_rng(seed).integers(0, 2**64 - 1, n, np.uint64, endpoint=True)
+
+
+def times(n, seed=0):
+    found = np.random.default_rng(seed).integers(-(2**53), 2**53, n)
+    found[:1], found[1:2] = NO_TIME, FOREVER
+    return found
+
+
+def windowed(revision):
+    rows = PointRows(points(4, revision), points(revision % 3, revision), False, times(4, revision))
+    return Record(revision, Expiry(revision - 5, 2) if revision % 4 == 0 else rows, clock=-revision)
+
+
+def keyed(keys):
+    def record(revision):
+        conditions = (None, "absent", "present")
+        columns = keys(6, revision), points(6, revision), keys(revision % 3, -revision % 7)
+        rows = KeyRows(*columns, times(6, revision), times(6, -revision % 7), conditions[revision % 3])
+        some = KeyRows(*columns) if revision % 2 else KeyRows(keys(0), NOTHING, keys(1))
+        of = {0: rows, 1: some, 2: Expiry(None, 3)}[revision // 3 % 3]
+        return Record(revision, of, f"gateway {revision % 2}", revision, clock=2**53 - revision)
+
+    return record
+
+
+WINDOW = Window(max_age=5, max_points=7, clock="data", max_skew=0, clamps=True)
+KINDS = {
+    "windowed": (HullSettings(window=WINDOW), windowed, lambda n: Contents(points(n), times=times(n))),
+    "strings": (
+        HullSettings("str", 9, Window(max_points=1), by_event_time=True),
+        keyed(strings),
+        lambda n: Contents(points(n), strings(n), times(n), times(n, 1)),
+    ),
+    "integers": (HullSettings("int"), keyed(integers), lambda n: Contents(points(n), integers(n))),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_hulls_with_keys_and_times(opened, kind):
+    settings, record, contents = KINDS[kind]
+    hull = HullRow(3, kind, "uid", 0.5, settings)
+    opened.commit(Create(hull))
+    everything = [record(revision) for revision in range(1, 31)]
+    kept = {20: Kept(20, contents(40_000), {"gateway 1": 19}, [], -7), 30: Kept(30, contents(0), {}, [], 2**53)}
+    for revision in (10, 20, 30):
+        opened.commit(Append(3, everything[revision - 10 : revision]))
+        if revision in kept:
+            opened.carry_out(opened.storage.snapshot(3, kept[revision]))
+    for _ in range(2):
+        assert opened.storage.row(3) == hull
+        for revision in range(20, 31):
+            base = kept[revision // 10 * 10]
+            expected = Kept(
+                base.revision, base.contents, base.producers, everything[base.revision : revision], base.clock
+            )
+            same(opened.storage.read(3, revision), expected)
+        opened.reopen()
+        assert opened.contents.hulls == [hull]
 
 
 def test_a_snapshot_counts_once_it_is_whole(opened):

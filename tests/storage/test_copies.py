@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from folders import (
     DATABASE,
-    FORMAT_1,
     LOG,
+    OLD_FOLDERS,
     append,
     fill,
     flip,
@@ -125,14 +125,21 @@ def test_restore_takes_the_log_along(paths, tmp_path):
     assert served(tmp_path / "newer", 12).notes == []
 
 
-@pytest.mark.parametrize("name", ["stopped", "killed"])
-def test_a_backup_of_format_1_is_checked_restored_and_exported(tmp_path, name):
-    old = killed(FORMAT_1 / name, tmp_path / "old")
+@pytest.mark.parametrize(
+    ("folder", "hulls", "points", "revision"),
+    [
+        ("format1/stopped", 2, 83, 30),
+        ("format1/killed", 2, 92, 33),
+        ("format2/stopped", 3, 128, 40),
+        ("format2/killed", 3, 139, 43),
+    ],
+)
+def test_a_backup_of_an_earlier_format_is_checked_restored_and_exported(tmp_path, folder, hulls, points, revision):
+    old = killed(OLD_FOLDERS / folder, tmp_path / "old")
     before = Counter(file.read_bytes() for file in old.iterdir())
-    done("check", old, says=f"{old}: 2 hulls, all whole")
-    done("restore", old, "--data", tmp_path / "new", says=f"{tmp_path / 'new'}: 2 hulls")
-    done("check", tmp_path / "new", says=f"{tmp_path / 'new'}: 2 hulls, all whole")
-    points, revision = {"stopped": (83, 30), "killed": (92, 33)}[name]
+    done("check", old, says=f"{old}: {hulls} hulls, all whole")
+    done("restore", old, "--data", tmp_path / "new", says=f"{tmp_path / 'new'}: {hulls} hulls")
+    done("check", tmp_path / "new", says=f"{tmp_path / 'new'}: {hulls} hulls, all whole")
     file = tmp_path / "points.csv"
     done("export", "fleet", file, "--data", old, says=f"{file}: {points} points of fleet at revision {revision}")
     assert before <= Counter(file.read_bytes() for file in old.iterdir())

@@ -5,11 +5,14 @@ import resource
 import shutil
 import sqlite3
 import threading
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from folders import DATABASE, LOG, append, fill, killed, no_progress, opened, points, record, records, same
 
-from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept
+from dynhull.keys import PackedKeys
+from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, Kept, KeyRows, Record
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import NotCommittedError, StorageError
 from dynhull_server.storage.sqlite.disk import Access, Disk
@@ -24,7 +27,7 @@ def failure(code):
 
 
 class FaultyDisk(Disk):
-    """Fails once, where it is told to.
+    """Fails once, at a given statement.
 
     Attributes:
         statement: how the statement begins that fails.
@@ -334,8 +337,19 @@ def test_a_folder_is_closed_while_an_outcome_is_unknown(folder, disk):
 
 
 def test_values_that_no_row_can_hold_change_nothing(storage):
-    with pytest.raises(NotCommittedError, match="nothing was written"):
-        storage.commit([Create(HullRow(2, "b", "", 0.0, HullSettings(max_points=2**63)))])
+    new = HullRow(2, "b", "", 0.0)
+    rows = record(4).rows
+    mixed = KeyRows(PackedKeys.pack(["a"]), points(1), np.array([1], np.uint64))
+    for change in (
+        Create(replace(new, number=2**63)),
+        Create(replace(new, name="\ud800")),
+        Append(1, [Record(4, rows, "x" * 2**16)]),
+        Append(1, [Record(4, rows, sequence=2**64)]),
+        Append(1, [Record(4, rows, clock=2**63)]),
+        Append(1, [Record(4, mixed)]),
+    ):
+        with pytest.raises(NotCommittedError, match="nothing was written"):
+            storage.commit([change])
     append(storage, 4, 5)
     same(storage.read(1).records, records(1, 5))
 

@@ -1,4 +1,4 @@
-"""The SQLite folder: who may open it, older formats, and what damage does."""
+"""The SQLite folder: who may open it, and what damage does."""
 
 import shutil
 import sqlite3
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from folders import (
     DATABASE,
-    FORMAT_1,
     LOG,
     append,
     fill,
@@ -21,8 +20,7 @@ from folders import (
     stopped,
 )
 
-from dynhull_server.state.hull_state import replayed
-from dynhull_server.state.records import Append, Delete, HullRow, HullSettings
+from dynhull_server.state.records import Append, Create, Delete, HullRow, HullSettings, Window
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
 from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES, HEADER_BYTES
@@ -87,43 +85,6 @@ def test_another_programs_database_is_refused(folder):
         opened(folder)
 
 
-@pytest.mark.parametrize(("name", "fleet", "zones"), [("stopped", (30, 83), (3, 5)), ("killed", (33, 92), (4, 6))])
-def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
-    shutil.copytree(FORMAT_1 / name, folder)
-    for _ in range(2):
-        storage, contents = opened(folder)
-        assert contents.hulls == [
-            HullRow(1, "fleet", "00aa00aa00aa00aa", 1700000000.5),
-            HullRow(2, "zones/é", "00bb00bb00bb00bb", 1700000001.0, HullSettings(max_points=500)),
-        ]
-        assert (contents.next_number, contents.notes) == (3, [])
-        for number, (revision, count) in ((1, fleet), (2, zones)):
-            kept = storage.read(number)
-            assert (kept.last_revision, len(replayed(kept))) == (revision, count)
-        assert (storage.oldest(1), storage.oldest(2)) == (20, 0)
-        assert storage.read(1).producers == {"p0": 24, "p1": 25, "p2": 23}
-        assert storage.read(2).records[0].producer == "truck"
-        storage.close()
-
-
-def test_a_folder_of_format_1_goes_on(folder):
-    shutil.copytree(FORMAT_1 / "killed", folder)
-    storage, _ = opened(folder)
-    append(storage, 34, 40)
-    snapshot(storage, 40)
-    storage.commit([Delete(2)])
-    for step in storage.sweep():
-        storage.commit([step])
-    storage.close()
-    storage, contents = opened(folder)
-    assert ([hull.name for hull in contents.hulls], contents.notes) == (["fleet"], [])
-    assert (storage.read(1).revision, storage.oldest(1)) == (40, 25)
-    storage.close()
-    with sqlite3.connect(folder / DATABASE) as database:
-        assert database.execute("SELECT min(first) FROM batches").fetchone() == (26,)
-        assert database.execute("SELECT count(*) FROM chunks").fetchone() == (2,)
-
-
 def test_what_a_snapshot_makes_superfluous_is_dropped(folder):
     storage, _ = opened(folder)
     fill(storage, 10)
@@ -161,6 +122,21 @@ def test_a_damaged_schema_is_refused(folder, bit):
     (folder / DATABASE).write_bytes(content)
     with pytest.raises(StorageError, match=r"restore a backup|cannot be opened"):
         opened(folder)
+
+
+def test_damaged_settings_are_refused(folder):
+    storage, _ = opened(folder)
+    settings = HullSettings("int", 7, Window(max_age=25, max_skew=0, clamps=True), by_event_time=True)
+    storage.commit([Create(HullRow(1, "fleet", "", 0.0, settings))])
+    storage.close()
+    whole = (folder / DATABASE).read_bytes()
+    first = whole.index(b'{"by_event_time"')
+    for byte in range(first, whole.index(b"}}", first) + 2):
+        content = bytearray(whole)
+        content[byte] ^= 1 << byte % 8
+        (folder / DATABASE).write_bytes(content)
+        with pytest.raises(DamagedError, match=r"the row of hull 1, .* is damaged|cannot be read"):
+            opened(folder)
 
 
 @pytest.mark.parametrize("gone", ["first IN (4, 5)", "first = 9", "first = 1"])

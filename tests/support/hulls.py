@@ -2,7 +2,8 @@
 
 from itertools import product
 
-from dynhull import DynamicHull, convex_hull, static
+from dynhull import DynamicHull, KeyedHull, convex_hull, static
+from dynhull._entities import Entities
 from dynhull._implementation import kernel
 from dynhull._tree import HullTree
 from dynhull.arrays import as_points
@@ -24,7 +25,22 @@ class TinyLeafHull(DynamicHull):
     _tree_type = TinyLeafTree
 
 
+class PythonKeyedHull(KeyedHull):
+    __slots__ = ()
+    _tree_type = Entities
+
+
+class TinyLeafEntities(Entities):
+    LEAF = 4
+
+
+class TinyLeafKeyedHull(KeyedHull):
+    __slots__ = ()
+    _tree_type = TinyLeafEntities
+
+
 HULLS = {"python": PythonHull, "python, tiny leaves": TinyLeafHull}
+KEYED_HULLS = {"python": PythonKeyedHull, "python, tiny leaves": TinyLeafKeyedHull}
 
 if kernel is not None:
 

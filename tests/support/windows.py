@@ -44,7 +44,7 @@ class Model:
         moments = [-inf if self.now is None else self.now] * len(points) if times is None else times
         if times:
             self.now = max(times if self.now is None else [*times, self.now])
-        self.expired += self.expire()
+        self.expired += self.expire_old()
         late = 0
         for (x, y), time in zip(points, moments, strict=True):
             if self.too_old(time):
@@ -60,13 +60,19 @@ class Model:
 
     def advance(self, now):
         self.now = now
-        left = self.expire()
+        left = self.expire_old()
         self.expired += left
         return left
 
-    def expire(self):
+    def expire_old(self):
         before = len(self.items)
         self.items = [item for item in self.items if not self.too_old(item[0])]
+        return before - len(self.items)
+
+    def expire(self, until):
+        before = len(self.items)
+        self.items = [item for item in self.items if item[0] > until]
+        self.expired += before - len(self.items)
         return before - len(self.items)
 
     def delete(self, p):

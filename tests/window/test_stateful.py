@@ -83,6 +83,14 @@ class WindowMachine(RuleBasedStateMachine):
     def advance_both(self, time):
         assert self.window.advance(time) == self.model.advance(time)
 
+    @rule(data=st.data())
+    def expire(self, data):
+        (until,) = self.times_of(data, 1)
+        self.expect_one_change(lambda: self.expire_both(until))
+
+    def expire_both(self, until):
+        assert self.window.expire(until) == self.model.expire(until)
+
     @precondition(lambda self: self.model.items)
     @rule(data=st.data())
     def delete(self, data):
@@ -123,6 +131,8 @@ class WindowMachine(RuleBasedStateMachine):
     def refuse_to_advance(self, bad):
         with pytest.raises((ValueError, TypeError)):
             self.window.advance(bad)
+        with pytest.raises((ValueError, TypeError)):
+            self.window.expire(bad)
 
     @rule(copied=st.booleans())
     def go_on_with_a_copy(self, copied):

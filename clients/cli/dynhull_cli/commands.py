@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 
 GROUP = "dynhull.commands"
 PANELS = {
-    "Hulls and their points": ("list", "create", "delete", "insert", "remove", "load", "import"),
+    "Hulls and their points": ("list", "create", "delete", "insert", "put", "remove", "load", "import"),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Server": ("serve", "config", "token", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export"),

@@ -17,6 +17,7 @@ def watch(
     as_json: AsJson = False,
     max_rate: Annotated[float, typer.Option(min=0, help="At most this many events per second; 0 for all.")] = 10.0,
     events: Annotated[int | None, typer.Option(min=1, help="End after this many events.")] = None,
+    keys: Annotated[bool, typer.Option("--keys", help="Name the vertices of a keyed hull by their keys.")] = False,
 ) -> None:
     """Follow the changes of a hull: a live table on a terminal, one line per event elsewhere.
 
@@ -25,7 +26,9 @@ def watch(
     With --json, each event has the revision, the number of points, the measures, and the vertices added and removed
     since the event before. The first event has "snapshot": true and adds all vertices. After a lost connection the
     watch resumes by itself, with the changes it missed or, if the server no longer has them, with a new snapshot.
+
+    With --keys, lines also show the keys that joined and left the vertices of the hull; JSON has "joined" and "left".
     """
     from .changes import follow
 
-    follow(client, name, max_rate=max_rate, events=events, as_json=as_json)
+    follow(client, name, max_rate=max_rate, events=events, as_json=as_json, keys=keys)

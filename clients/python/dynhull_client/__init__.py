@@ -19,9 +19,11 @@ from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_watch import AsyncWatch
 from ._async_writer import AsyncWriter
+from ._batch import Batch
 from ._client import HullClient
 from ._errors import (
     DeadlineError,
+    DuplicateKeyError,
     DynhullError,
     HullEmptyError,
     HullExistsError,
@@ -29,6 +31,7 @@ from ._errors import (
     HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
+    KeyMissingError,
     LimitExceededError,
     OutcomeUnknownError,
     PermissionDeniedError,
@@ -50,6 +53,7 @@ from ._messages import (
     Deleted,
     Difference,
     Distances,
+    Entities,
     Event,
     Hull,
     HullInfo,
@@ -57,6 +61,7 @@ from ._messages import (
     Located,
     Measures,
     Points,
+    Positions,
     Progress,
     Sampled,
     Sketch,
@@ -64,6 +69,7 @@ from ._messages import (
     Supported,
     Tangents,
     Verification,
+    Window,
 )
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import Watch
@@ -75,6 +81,7 @@ __all__ = [
     "AsyncIngest",
     "AsyncWatch",
     "AsyncWriter",
+    "Batch",
     "ChanRound",
     "Change",
     "Counted",
@@ -83,8 +90,10 @@ __all__ = [
     "Deleted",
     "Difference",
     "Distances",
+    "DuplicateKeyError",
     "DynhullError",
     "Efficient",
+    "Entities",
     "Event",
     "Hull",
     "HullClient",
@@ -98,6 +107,7 @@ __all__ = [
     "Ingest",
     "Ingested",
     "InvalidRequestError",
+    "KeyMissingError",
     "LimitExceededError",
     "Located",
     "Measured",
@@ -107,6 +117,7 @@ __all__ = [
     "Phases",
     "PointMissingError",
     "Points",
+    "Positions",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -121,6 +132,7 @@ __all__ = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Window",
     "Writer",
     "__version__",
 ]

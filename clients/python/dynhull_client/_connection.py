@@ -100,7 +100,8 @@ class BlockingConnection(Connection):
         attempts = self._attempts(call)
         while True:
             try:
-                return call.decode(self._begin(call, attempts))
+                begun = self._begin(call, attempts)
+                return call.decode(list(begun) if call.in_parts else begun)
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, error_of(failure))
             time.sleep(pause)
@@ -121,7 +122,8 @@ class AsyncConnection(Connection):
         attempts = self._attempts(call)
         while True:
             try:
-                return call.decode(await self._begin(call, attempts))
+                begun = self._begin(call, attempts)
+                return call.decode([part async for part in begun] if call.in_parts else await begun)
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, error_of(failure))
             await asyncio.sleep(pause)

@@ -120,6 +120,8 @@ void add_window_tree(nb::module_& module) {
            "number of points added.")
       .def("advance", &Window::advance, "now"_a,
            "Move the clock. Returns the number of points that left. ValueError if time would go back.")
+      .def("expire", &Window::expire, "until"_a,
+           "Remove the points of this time or before, as one batch. Returns their number.")
       .def("delete", &Window::remove, nb::sig("def delete(self, x: float, y: float) -> bool"), "x"_a.none(),
            "y"_a.none(),
            "Remove the oldest copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).")

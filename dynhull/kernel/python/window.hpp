@@ -67,6 +67,12 @@ class Window : public Hull {
     return left;
   }
 
+  std::size_t expire(double until) {
+    lock_.await_writable();
+    const WriteLock lock(lock_, expiry_.many_until(until, FEW_ROWS) ? ALL_ROWS : 0);
+    return expiry_.expire(tree_, until);
+  }
+
   bool remove(nb::handle x, nb::handle y) {
     const Point p = {coordinate(x, "x"), coordinate(y, "y")};
     const HullTree::Removal removal = expiry_.remove(writable(), p);

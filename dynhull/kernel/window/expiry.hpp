@@ -69,13 +69,19 @@ class Expiry {
 
   // Moves the clock, which does not go back. Returns the number of points that left.
   std::size_t advance(HullTree& tree, double now) {
+    const std::size_t left = expire(tree, limit(now));
+    now_ = now;
+    return left;
+  }
+
+  // Removes the points of this time or before, without moving the clock. Returns their number.
+  std::size_t expire(HullTree& tree, double until) {
     Entering nothing(*this, nullptr, nullptr, 0);
     Leaving leaving(*this);
-    leaving.take_until(limit(now));
+    leaving.take_until(until);
     apply(tree, leaving, nothing);
     nothing.commit();
     leaving.commit();
-    now_ = now;
     expired += leaving.size();
     return leaving.size();
   }
@@ -160,9 +166,12 @@ class Expiry {
     return items;
   }
 
-  // Whether more than `few` points may have to leave at this time.
-  bool many_due(double now, std::size_t few) const {
-    return wheel_.size() > few || (queue_.size() > few && queue_[few].time <= limit(std::max(now, now_)));
+  // Whether more than `few` points may have to leave when the clock is at `now`.
+  bool many_due(double now, std::size_t few) const { return many_until(limit(std::max(now, now_)), few); }
+
+  // Whether more than `few` points may have this time or an earlier one.
+  bool many_until(double until, std::size_t few) const {
+    return wheel_.size() > few || (queue_.size() > few && queue_[few].time <= until);
   }
 
   // Throws std::logic_error if an invariant is broken.

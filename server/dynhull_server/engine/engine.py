@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, assert_never
 
 from ..state.batch import Applied
 from ..state.core import Core
+from ..state.errors import StoppingError
 from ..state.events import (
     Birth,
     Commit,
@@ -30,11 +31,12 @@ from ..state.events import (
     Stopping,
     Tick,
     WriteBatch,
+    WriteTogether,
 )
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
-from ..state.records import DEFAULT, HullSettings
+from ..state.records import DEFAULT, HullSettings, Kept
 from ..state.trip import Trip
 from ..storage.port import Contents, Progress, Storage
 from .batch_stream import BatchStream
@@ -42,6 +44,7 @@ from .group_commit import GroupCommit
 from .housekeeping import Housekeeping
 from .live_hull import LiveHull
 from .recalls import Recalls
+from .server_time import ServerTime
 from .supervisor import Supervisor
 from .threads import Machine, Pool
 from .waiter import Waiter
@@ -51,10 +54,24 @@ if TYPE_CHECKING:
 
 # The number of threads for trips, for large reads outside of trips, and for the disk.
 TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
-# Seconds between updates of the core's clock, which serves only to drop producers idle for a day.
-TICK = 1.0
+# Seconds between updates of the core's clock, which makes points leave that have become too old.
+TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
+
+
+class Expiries:
+    """Receives the answers to the core's own requests, and reports their failures."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+
+    def answer(self, request: Request) -> None:
+        """Report the outcome of a request; at a shutdown there is none."""
+        if request.error is None:
+            self._supervisor.succeeded("expiry")
+        elif not isinstance(request.error, StoppingError):
+            self._supervisor.failed("expiry", request.error)
 
 
 class Engine:
@@ -76,6 +93,7 @@ class Engine:
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
         self._stepping = False
+        self._expiries = Expiries(supervisor)
         self._idle: asyncio.Event | None = None
         self._started = False
 
@@ -110,6 +128,7 @@ class Engine:
             unsaved = sum(len(record.rows) for record in kept.records)
             self._core.restore(row, state, unsaved)
             progress(done, len(contents.hulls))
+        self._time = ServerTime(clock, self._core.latest_time)
         self._commits = GroupCommit(
             self._storage,
             threads,
@@ -203,8 +222,17 @@ class Engine:
         request.to, request.name = Waiter(), name
         if create:
             request.birth = self._birth()
+        request.arrived = self.time()
         applied: Applied = await self.ask(request)
         return applied
+
+    async def apply_together(self, request: WriteTogether) -> list[Applied]:
+        """Apply a batch to each of several hulls, or raise the error that refuses one of them: then none is applied."""
+        request.to = Waiter()
+        for part in request.parts:
+            part.arrived = self.time()
+        results: list[Applied] = await self.ask(request)
+        return results
 
     def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:
         """A stream of batches to one hull; `notify` is called after each that was applied or refused.
@@ -214,6 +242,10 @@ class Engine:
         """
         hull = self._core.get(name) if self.has(name) or not create else None
         return BatchStream(self, name, hull, notify, self._birth)
+
+    def time(self) -> int:
+        """The server's clock, in microseconds since 1970."""
+        return self._time.now()
 
     # The core
 
@@ -279,8 +311,8 @@ class Engine:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Reply():
-                if effect.moved is not None:
-                    self._move(effect.moved)
+                for hull in effect.moved:
+                    self._move(hull)
                 for request in effect.requests:
                     request.to.answer(request)
             case Commit():
@@ -320,7 +352,7 @@ class Engine:
         self._turns.submit(trip.run).add_done_callback(ran)
 
     def _examine(self, effect: Examine) -> None:
-        """Decide earlier commits in the committing thread if necessary, then read the hull in another."""
+        """Decide earlier commits in the committing thread if necessary, then read the hulls in another."""
         if not effect.settle:
             self._read_for(effect)
             return
@@ -339,9 +371,7 @@ class Engine:
 
         def examined() -> Event:
             try:
-                if self._storage.row(effect.number) is None:
-                    return Examined(effect.ticket, None)
-                return Examined(effect.ticket, effect.load(self._storage.read(effect.number)))
+                return Examined(effect.ticket, [self._stored(number, load) for number, load in effect.hulls])
             except Exception as error:  # no error may end the trip
                 return NotExamined(effect.ticket, error)
 
@@ -349,6 +379,9 @@ class Engine:
             self._from_thread(partial(self.dispatch, future.result()))
 
         self.disk.submit(examined).add_done_callback(done)
+
+    def _stored(self, number: int, load: Callable[[Kept], HullState]) -> HullState | None:
+        return None if self._storage.row(number) is None else load(self._storage.read(number))
 
     def _from_thread(self, function: Callable[[], None]) -> None:
         self._loop.call_soon_threadsafe(function)
@@ -367,7 +400,7 @@ class Engine:
 
     async def _tick(self) -> None:
         now = self._machine.clock.monotonic()
-        self.dispatch(Tick(now))
+        self.dispatch(Tick(now, self.time(), self._expiries))
         since = self._commits.since
         if since is not None and now - since > STUCK:
             self._supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))

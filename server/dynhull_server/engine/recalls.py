@@ -10,10 +10,10 @@ from typing import Any
 
 from dynhull.arrays import Points
 
+from ..state.contents import replayed
 from ..state.errors import HullNotFoundError, NotStoredError, RevisionForgottenError
 from ..state.hull import Hull
-from ..state.hull_state import replay, replayed
-from ..state.records import Kept
+from ..state.records import HullSettings, Kept
 from ..storage.port import DamagedError, Storage, StorageError
 
 Answer = Points | Exception
@@ -135,7 +135,7 @@ class Recalls:
                 return answers | {revision: RevisionForgottenError(revision, oldest, newest) for revision in left}
             if kept.last_revision != left[-1]:
                 raise DamagedError(f"revision {left[-1]} of {hull.name} is missing from the storage")
-            found = _vertices_at(kept, covered)
+            found = _vertices_at(hull.row.settings, kept, covered)
             answers |= found
             if len(found) < len(covered):
                 return answers
@@ -143,16 +143,16 @@ class Recalls:
         return answers
 
 
-def _vertices_at(kept: Kept, revisions: list[int]) -> dict[int, Points]:
+def _vertices_at(settings: HullSettings, kept: Kept, revisions: list[int]) -> dict[int, Points]:
     """The vertices at the first of some revisions, as many as there is room for."""
-    live = replayed(replace(kept, records=[]))
+    contents = replayed(replace(kept, records=[]), settings)
     found: dict[int, Points] = {}
     position = total = 0
     for revision in revisions:
         end = revision - kept.revision
-        replay(live, kept.records[position:end])
+        contents.replay(kept.records[position:end])
         position = end
-        found[revision] = live.vertices()
+        found[revision] = contents.hull.vertices()
         total += found[revision].nbytes
         if total >= MOST_BYTES:
             break

@@ -7,37 +7,43 @@ import numpy as np
 
 from dynhull.arrays import Points
 
-from ..state.hull_state import Counts, HullState
+from ..state.hull_state import Counts, HullState, VertexKeys
 from .difference import Difference
 from .live_hull import LiveHull
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The whole hull."""
+    """The whole hull; `keys` are those of the vertices if the watcher requested them."""
 
     counts: Counts
     vertices: Points
     uid: str
+    keys: VertexKeys | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The change of the hull since the previous event; `removed` are the vertices that it lost."""
+    """The change of the hull since the previous event.
+
+    `removed` are the vertices that it lost, and `keys` those of all vertices if the watcher requested them.
+    """
 
     counts: Counts
     removed: Points
     vertices: Points
     difference: Difference
+    keys: VertexKeys | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """The extreme vertices, one per direction, and all vertices if the watcher requested measures."""
+    """The extreme vertices, one per direction, their keys if requested, and all vertices for requested measures."""
 
     counts: Counts
     extremes: Points
     vertices: Points | None
+    keys: VertexKeys | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,27 +67,41 @@ class View(Protocol):
 
 
 class VerticesView:
-    """The vertices: a snapshot, then changes."""
+    """The vertices: a snapshot, then changes.
 
-    def __init__(self, hull: LiveHull) -> None:
+    Args:
+        hull: the hull.
+        keys: whether to include the keys of the vertices, in a keyed hull.
+    """
+
+    def __init__(self, hull: LiveHull, *, keys: bool = False) -> None:
         self._hull = hull
+        self._with_keys = keys
         self._held = np.empty((0, 2))
+        self._held_keys: VertexKeys | None = None
+
+    async def _look(self, min_revision: int = 0) -> tuple[Counts, Points, VertexKeys | None]:
+        if not self._with_keys:
+            return *await self._hull.vertices(min_revision), None
+        counts, (vertices, keys) = await self._hull.read(
+            lambda state: (state.vertices(), state.vertex_keys()), self._hull.vertex_count, min_revision
+        )
+        return counts, vertices, keys
 
     async def first(self, min_revision: int) -> Event:
         """A snapshot."""
-        counts, self._held = await self._hull.vertices(min_revision)
-        return Snapshot(counts, self._held, self._hull.uid)
+        counts, self._held, self._held_keys = await self._look(min_revision)
+        return Snapshot(counts, self._held, self._hull.uid, self._held_keys)
 
     async def next(self) -> Event:
         """The change since the previous event."""
-        counts, vertices = await self._hull.vertices()
-        held, self._held = self._held, vertices
-        if vertices is held:
+        held, held_keys = self._held, self._held_keys
+        counts, vertices, keys = await self._look()
+        self._held, self._held_keys = vertices, keys
+        if vertices is held and keys is held_keys:
             return Progress(counts)
-        change = await self._hull.differences.between(held, vertices)
-        if change.removed.size or change.added.size:
-            return Change(counts, held[change.removed], vertices, change)
-        return Progress(counts)
+        change = await self._hull.differences.between(held, vertices, held_keys, keys)
+        return Change(counts, held[change.removed], vertices, change, keys) if change else Progress(counts)
 
 
 class ResumedView(VerticesView):
@@ -91,10 +111,11 @@ class ResumedView(VerticesView):
         hull: the hull.
         uid: of the hull that the watcher holds.
         revision: its revision.
+        keys: whether to include the keys of the vertices; the first change has those of all vertices.
     """
 
-    def __init__(self, hull: LiveHull, uid: str, revision: int) -> None:
-        super().__init__(hull)
+    def __init__(self, hull: LiveHull, uid: str, revision: int, *, keys: bool = False) -> None:
+        super().__init__(hull, keys=keys)
         self._uid = uid
         self._revision = revision
 
@@ -112,6 +133,10 @@ class ResumedView(VerticesView):
             return await self.next()
 
 
+# Extreme vertices, all vertices, and the keys of the extreme ones.
+_Looked = tuple[Points, Points | None, VertexKeys | None]
+
+
 class SketchView:
     """The extreme vertices in some directions; each event has all of them.
 
@@ -119,18 +144,21 @@ class SketchView:
         hull: the hull.
         directions: (k, 2) non-zero vectors.
         vertices: whether to include the vertices.
+        keys: whether to include the keys of the extreme vertices, in a keyed hull.
     """
 
-    def __init__(self, hull: LiveHull, directions: Points, vertices: bool) -> None:
+    def __init__(self, hull: LiveHull, directions: Points, *, vertices: bool, keys: bool = False) -> None:
         self._hull = hull
         self._directions = directions
         self._with_vertices = vertices
+        self._with_keys = keys
         self._rows = len(directions) + (hull.vertex_count if vertices else 0)
-        self._held: tuple[Points, Points | None] = np.empty((0, 2)), None
+        self._held: _Looked = np.empty((0, 2)), None, None
 
-    def _look(self, state: HullState) -> tuple[Points, Points | None]:
+    def _look(self, state: HullState) -> _Looked:
         extremes = state.hull.support(self._directions) if len(state.hull) else np.empty((0, 2))
-        return extremes, state.vertices() if self._with_vertices else None
+        vertices = state.vertices() if self._with_vertices else None
+        return extremes, vertices, state.keys_at(extremes) if self._with_keys else None
 
     async def first(self, min_revision: int) -> Event:
         """A sketch."""
@@ -146,5 +174,5 @@ class SketchView:
         return Sketch(counts, *self._held)
 
 
-def _same(a: Points | None, b: Points | None) -> bool:
+def _same(a: Points | VertexKeys | None, b: Points | VertexKeys | None) -> bool:
     return a is b or (a is not None and b is not None and np.array_equal(a, b))

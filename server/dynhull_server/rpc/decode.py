@@ -9,10 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points, packed_points, plain_points
-from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+from dynhull_proto.v1 import hull_service_pb2, points_pb2
 
-from ..state.batch import Batch
-from ..state.records import HullSettings
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
@@ -24,9 +22,8 @@ DEFAULT_SAMPLE = 1000
 LARGEST_SAMPLE = 100_000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
-NO_POINTS = np.empty((0, 2))
-MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
 LARGEST_INTEGER = 2**63 - 1
+LEAST_PARTS, MOST_PARTS = 2, 16
 
 
 class InvalidFieldError(Exception):
@@ -68,15 +65,6 @@ def decode_sequence(producer: str, sequence: int) -> int:
     if producer and not 1 <= sequence <= LARGEST_INTEGER:
         raise InvalidFieldError("sequence", sequence, f"a sequence number is from 1 to {LARGEST_INTEGER}")
     return sequence
-
-
-def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
-    """The settings of a new hull."""
-    if config.identity not in (hull_pb2.IDENTITY_UNSPECIFIED, hull_pb2.IDENTITY_MULTISET):
-        raise InvalidFieldError("config.identity", config.identity, "not an identity that this server supports")
-    if config.max_points > LARGEST_INTEGER:
-        raise InvalidFieldError("config.max_points", config.max_points, f"must be at most {LARGEST_INTEGER}")
-    return HullSettings(max_points=config.max_points)
 
 
 def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:
@@ -130,6 +118,18 @@ def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Point
     return origins, targets
 
 
+def decode_subjects(request: hull_service_pb2.LocateRequest | hull_service_pb2.DistanceRequest) -> bool:
+    """Whether the request is about keys, rather than points."""
+    if not request.HasField("keys"):
+        for field in ("keys_of", "keys_min_revision"):
+            if getattr(request, field):
+                raise InvalidFieldError(field, getattr(request, field), "only for a request with keys")
+        return False
+    if request.HasField("points"):
+        raise InvalidFieldError("keys", "points and keys", "use one or the other")
+    return True
+
+
 def decode_read(points: points_pb2.Points, field: str, reading: Reading) -> Points:
     """An (n, 2) array of points that suit the reading."""
     xy = decode_points(points, field)
@@ -155,22 +155,21 @@ def _bad_row(bad: npt.ArrayLike, field: str, xy: Points, problem: str) -> Invali
     return InvalidFieldError(field, tuple(xy[row].tolist()), problem, row)
 
 
-def decode_batch(batch: batch_pb2.Batch) -> Batch:
-    """A batch whose moves have equally many origins and destinations."""
-    if batch.missing_points not in MISSING_POINT_POLICIES:
-        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy that this server supports")
-    inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
-    deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
-    moves = 0
-    if batch.HasField("moves"):
-        origins = decode_points(batch.moves.origins, "batch.moves.origins")
-        destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
-        moves = len(origins)
-        if len(destinations) != moves:
-            problem = f"must be as many as the origins, {moves}"
-            raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
-        inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
-    return Batch(inserts, deletes, moves, batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT)
+def decode_parts(request: hull_service_pb2.ApplyTogetherRequest) -> list[str]:
+    """The names of the hulls of a request to several of them, all different."""
+    if not LEAST_PARTS <= len(request.batches) <= MOST_PARTS:
+        problem = f"must be {LEAST_PARTS} to {MOST_PARTS}, each of another hull"
+        raise InvalidFieldError("batches", f"{len(request.batches)} batches", problem)
+    names: dict[str, int] = {}
+    for index, part in enumerate(request.batches):
+        name = decode_name(part.name, f"batches[{index}].name")
+        if name in names:
+            problem = f"batches[{names[name]}] is of the same hull"
+            raise InvalidFieldError(f"batches[{index}].name", name, problem)
+        if not part.HasField("batch"):
+            raise InvalidFieldError(f"batches[{index}].batch", "", "a batch is required")
+        names[name] = index
+    return list(names)
 
 
 def decode_encoding(encoding: points_pb2.PointEncoding) -> points_pb2.PointEncoding:

@@ -6,6 +6,7 @@ import numpy as np
 
 from dynhull import measure
 from dynhull.arrays import Points
+from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ..engine.live_hull import LiveHull
@@ -13,7 +14,21 @@ from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
-from ..state.hull_state import Counts
+from ..state.contents.keyed import Found
+from ..state.hull_state import Cause, Counts, VertexKeys
+from ..state.records import NO_TIME, Contents, HullSettings, Identity, Keys, Times
+
+IDENTITIES: dict[Identity, hull_pb2.Identity] = {
+    "multiset": hull_pb2.IDENTITY_MULTISET,
+    "str": hull_pb2.IDENTITY_STRING_KEYS,
+    "int": hull_pb2.IDENTITY_INTEGER_KEYS,
+}
+
+CAUSES: dict[Cause | None, batch_pb2.Cause] = {
+    None: batch_pb2.CAUSE_UNSPECIFIED,
+    "batch": batch_pb2.CAUSE_BATCH,
+    "expiry": batch_pb2.CAUSE_EXPIRY,
+}
 
 
 def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.Points:
@@ -23,18 +38,91 @@ def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.
     return points_pb2.Points(packed=np.asarray(xy, "<f8").tobytes())
 
 
+def encode_keys(keys: Keys, encoding: points_pb2.PointEncoding) -> points_pb2.Keys:
+    """Keys: packed, or as lists where points are lists of coordinates."""
+    lists = encoding == points_pb2.POINT_ENCODING_COORDINATES
+    if not isinstance(keys, PackedKeys):
+        if lists:
+            return points_pb2.Keys(integers=keys.tolist())
+        return points_pb2.Keys(packed_integers=keys.astype("<u8", copy=False).tobytes())
+    return points_pb2.Keys(strings=keys) if lists else points_pb2.Keys(lengths=keys.lengths, text=keys.data)
+
+
+def encode_key_array(keys: VertexKeys, encoding: points_pb2.PointEncoding) -> points_pb2.Keys:
+    """Keys in an array of str or of uint64."""
+    return encode_keys(PackedKeys.pack(keys.tolist()) if keys.dtype == object else keys, encoding)
+
+
+def encode_times(times: Times, encoding: points_pb2.PointEncoding) -> points_pb2.Times:
+    """Times: packed, or as timestamps where points are lists of coordinates; NO_TIME becomes 1970-01-01T00:00:00Z."""
+    known = np.where(times == NO_TIME, 0, times)
+    if encoding != points_pb2.POINT_ENCODING_COORDINATES:
+        return points_pb2.Times(packed=known.astype("<i8", copy=False).tobytes())
+    message = points_pb2.Times()
+    for time in known.tolist():
+        message.timestamps.add().FromMicroseconds(time)
+    return message
+
+
+def encode_settings(settings: HullSettings) -> hull_pb2.HullConfig:
+    """The settings of a hull."""
+    config = hull_pb2.HullConfig(identity=IDENTITIES[settings.identity], max_points=settings.max_points)
+    if settings.identity != "multiset":
+        by_time = settings.by_event_time
+        config.ordering = hull_pb2.ORDERING_EVENT_TIME if by_time else hull_pb2.ORDERING_ARRIVAL
+    window = settings.window
+    if window is None:
+        return config
+    if window.max_age:
+        config.window.max_age.FromMicroseconds(window.max_age)
+    config.window.max_points = window.max_points
+    config.window.clock = hull_pb2.CLOCK_DATA if window.clock == "data" else hull_pb2.CLOCK_SERVER
+    if window.max_skew is not None:
+        config.window.max_skew.FromMicroseconds(window.max_skew)
+        config.window.ahead = hull_pb2.AHEAD_POLICY_CLAMP if window.clamps else hull_pb2.AHEAD_POLICY_REFUSE
+    return config
+
+
 def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     """A hull with its counts at one revision."""
     message = hull_pb2.Hull(
         name=hull.name,
-        config=hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_MULTISET, max_points=hull.settings.max_points),
+        config=encode_settings(hull.settings),
         revision=counts.revision,
         point_count=counts.points,
         distinct_point_count=counts.distinct,
         uid=hull.uid,
     )
     message.create_time.FromDatetime(hull.created)
+    if counts.clock is not None:
+        message.clock_time.FromMicroseconds(counts.clock)
     return message
+
+
+def encode_positions(
+    counts: Counts, found: Found, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.GetPositionsResponse:
+    """The positions of keys."""
+    return hull_service_pb2.GetPositionsResponse(
+        revision=counts.revision,
+        positions=encode_points(found.points, encoding),
+        present=found.present.tobytes(),
+        times=None if found.times is None else encode_times(found.times, encoding),
+    )
+
+
+def encode_entities(
+    counts: Counts, entities: Contents, rows: slice, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.ReadEntitiesResponse:
+    """Some rows of the keys of a hull with their positions."""
+    assert entities.keys is not None  # those of a keyed hull
+    times = None if entities.times is None else encode_times(entities.times[rows], encoding)
+    return hull_service_pb2.ReadEntitiesResponse(
+        revision=counts.revision,
+        keys=encode_keys(entities.keys[rows], encoding),
+        positions=encode_points(entities.points[rows], encoding),
+        times=times,
+    )
 
 
 async def encode_measures(vertices: Points, run: Run) -> hull_pb2.Measures:
@@ -62,26 +150,47 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
     result.hull_changed = applied.hull_changed
     result.point_count = applied.points
     result.duplicate = applied.duplicate
+    result.moved = applied.moved
+    result.stale = applied.stale
+    result.late = applied.late
+    result.skipped = applied.skipped
+    result.clamped = applied.clamped
+    result.evicted = applied.evicted
+    if applied.clock is not None:
+        result.clock_time.FromMicroseconds(applied.clock)
 
 
 def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_service_pb2.WatchResponse:
     """The message of an event, without measures."""
-    message = hull_service_pb2.WatchResponse(revision=event.counts.revision, point_count=event.counts.points)
+    counts = event.counts
+    message = hull_service_pb2.WatchResponse(
+        revision=counts.revision, point_count=counts.points, cause=CAUSES[counts.cause]
+    )
+    if counts.clock is not None:
+        message.clock_time.FromMicroseconds(counts.clock)
     match event:
         case Snapshot():
             message.snapshot.uid = event.uid
             message.snapshot.vertices.CopyFrom(encode_points(event.vertices, encoding))
+            if event.keys is not None:
+                message.snapshot.vertex_keys.CopyFrom(encode_key_array(event.keys, encoding))
         case Change():
-            removed, added = event.difference.removed, event.difference.added
+            removed, added, renamed = event.difference.removed, event.difference.added, event.difference.renamed
             message.change.removed.CopyFrom(encode_points(event.removed, encoding))
             message.change.removed_indices.extend(removed.tolist())
             message.change.added.CopyFrom(encode_points(event.vertices[added], encoding))
             message.change.added_indices.extend(added.tolist())
             message.change.rotation = event.difference.rotation
+            if event.keys is not None:
+                message.change.added_keys.CopyFrom(encode_key_array(event.keys[added], encoding))
+                message.change.renamed_indices.extend(renamed.tolist())
+                message.change.renamed_keys.CopyFrom(encode_key_array(event.keys[renamed], encoding))
         case Progress():
             message.progress.SetInParent()
         case _:
             message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
+            if event.keys is not None:
+                message.sketch.keys.CopyFrom(encode_key_array(event.keys, encoding))
     return message
 
 
@@ -108,7 +217,7 @@ def _rows(event: Event) -> int:
         case Snapshot():
             return len(event.vertices)
         case Change():
-            return len(event.removed) + event.difference.added.size
+            return len(event.removed) + event.difference.added.size + event.difference.renamed.size
         case Progress():
             return 0
         case _:
@@ -124,6 +233,7 @@ def encode_verification(
         equal=verification.difference is None,
         point_count=verification.points,
         vertex_count=verification.vertices,
+        keys_equal=verification.keys_equal,
         rounds=[
             hull_service_pb2.ChanRound(
                 guess=each.guess, groups=each.groups, steps=each.steps, cost=each.cost, closed=each.closed

@@ -29,7 +29,7 @@ HEALTH = health_pb2.DESCRIPTOR.services_by_name["Health"]
 REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 
 # A draining server lets these calls finish, and cuts off the others.
-FINISHED = {"CreateHull", "DeleteHull", "ListHulls", "Apply"}
+FINISHED = {"CreateHull", "DeleteHull", "ListHulls", "Apply", "ApplyTogether"}
 
 # The name of all unknown methods in the counts of calls.
 UNKNOWN_METHOD = "unknown"

@@ -28,7 +28,7 @@ class Reading:
         misfits = vertices[self.misfits(vertices)]
         if len(misfits):
             x, y = misfits[0].tolist()
-            raise HullUnsuitableError(name, (x, y), self.rule)
+            raise HullUnsuitableError(name, f"has the point {(x, y)}: {self.rule}", (x, y))
 
 
 ENTRIES = Reading("a composition is from 0 to 1", lambda xy: (xy[:, 0] < 0) | (xy[:, 0] > 1))

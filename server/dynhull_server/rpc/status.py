@@ -16,6 +16,9 @@ from ..state.errors import (
     HullNotFoundError,
     HullReplacedError,
     HullUnsuitableError,
+    InvalidBatchError,
+    KeyMissingError,
+    KeyRepeatedError,
     LimitExceededError,
     NotStoredError,
     OutcomeUnknownError,
@@ -61,40 +64,65 @@ class MethodUnknownError(RefusedError):
         super().__init__("there is no such method")
 
 
+class PartRefusedError(Exception):
+    """One of the batches of a request to several hulls was refused, and so none was applied.
+
+    Attributes:
+        index: the index of the batch in the request.
+        reason: why it was refused.
+    """
+
+    def __init__(self, index: int, reason: Exception) -> None:
+        super().__init__(index, reason)
+        self.index = index
+        self.reason = reason
+
+
 ANSWERED = (
     RefusedError,
     InvalidFieldError,
     DecodeError,
     DrainingError,
     OutcomeUnknownError,
+    PartRefusedError,
     StartingError,
     StoppingError,
 )
 
 
-def error_status(error: Exception, batch: int | None = None) -> Status:
+def error_status(error: Exception, batch: int | None = None, within: str = "") -> Status:
     """The status for `error`, one of ANSWERED.
 
-    `batch` is the number of batches that the call applied before it.
+    Args:
+        error: the error.
+        batch: the number of batches that the call applied before it, or the index of the batch that was refused.
+        within: the path of the message in the request whose fields the error names, with a point at its end.
     """
     where = {} if batch is None else {"batch": str(batch)}
     match error:
         case InvalidFieldError():
-            row = {} if error.row is None else {"row": str(error.row)}
-            value = _short(error.value)
-            field = error.field if error.row is None else f"{error.field}[{error.row}]"
-            detail = BadRequest()
-            detail.field_violations.add(field=field, description=f"{error.problem}, got {_quoted(value)}")
-            message = f"{field} is {_quoted(value)}: {error.problem}"
-            metadata = {"field": error.field, **row, "value": value, **where}
-            return _status(code.INVALID_ARGUMENT, message, "INVALID_FIELD", metadata, detail)
+            return _invalid_field(within, error, where)
+        case KeyRepeatedError():
+            first = {"first_field": f"{within}batch.{error.first[0]}", "first_row": str(error.first[1])}
+            return _invalid_field(within, _of_batch(error), first | where, "KEY_REPEATED")
+        case InvalidBatchError():
+            return _invalid_field(within, _of_batch(error), where)
         case PointMissingError():
-            field, value = PART_FIELDS[error.part], _short(error.point)
+            field, value = within + PART_FIELDS[error.part], _short(error.point)
             failure = PreconditionFailure()
             failure.violations.add(type="POINT_MISSING", subject=f"{field}[{error.row}]", description=str(error))
             message = f"{field}[{error.row}] is {value}: no such point to delete; nothing of the batch was applied"
             metadata = {"field": field, "row": str(error.row), "value": value, **where}
             return _status(code.FAILED_PRECONDITION, message, "POINT_MISSING", metadata, failure)
+        case KeyMissingError():
+            field, value = f"{within}batch.removes", _short(error.key)
+            failure = PreconditionFailure()
+            failure.violations.add(type="KEY_MISSING", subject=f"{field}[{error.row}]", description=str(error))
+            message = f"{field}[{error.row}] is {value}: no such key to remove; nothing of the batch was applied"
+            metadata = {"field": field, "row": str(error.row), "value": value, **where}
+            return _status(code.FAILED_PRECONDITION, message, "KEY_MISSING", metadata, failure)
+        case PartRefusedError():
+            return error_status(error.reason, error.index, f"batches[{error.index}].")
         case HullNotFoundError():
             resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
             return _status(code.NOT_FOUND, str(error), "HULL_NOT_FOUND", {"value": error.name, **where}, resource)
@@ -113,7 +141,8 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
         case HullUnsuitableError():
             failure = PreconditionFailure()
             failure.violations.add(type="HULL_UNSUITABLE", subject=error.name, description=str(error))
-            metadata = {"value": error.name, "point": str(error.point)}
+            point = {} if error.point is None else {"point": str(error.point)}
+            metadata = {"value": error.name, **point, **where}
             return _status(code.FAILED_PRECONDITION, str(error), "HULL_UNSUITABLE", metadata, failure)
         case RevisionForgottenError():
             metadata = {"field": "resume.revision", "value": str(error.revision)}
@@ -153,6 +182,24 @@ def error_status(error: Exception, batch: int | None = None) -> Status:
         case DrainingError() | StoppingError():
             return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error
+
+
+def _of_batch(error: InvalidBatchError) -> InvalidFieldError:
+    return InvalidFieldError(f"batch.{error.field}", error.value, error.problem, error.row)
+
+
+def _invalid_field(
+    within: str, error: InvalidFieldError, where: Mapping[str, str], reason: str = "INVALID_FIELD"
+) -> Status:
+    row = {} if error.row is None else {"row": str(error.row)}
+    value = _short(error.value)
+    name = within + error.field
+    field = name if error.row is None else f"{name}[{error.row}]"
+    detail = BadRequest()
+    detail.field_violations.add(field=field, description=f"{error.problem}, got {_quoted(value)}")
+    message = f"{field} is {_quoted(value)}: {error.problem}"
+    metadata = {"field": name, **row, "value": value, **where}
+    return _status(code.INVALID_ARGUMENT, message, reason, metadata, detail)
 
 
 def _status(number: int, message: str, reason: str, metadata: Mapping[str, str], *details: Message) -> Status:

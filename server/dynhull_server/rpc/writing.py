@@ -3,14 +3,18 @@
 import asyncio
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, Self
+
+from dynhull_proto.v1 import hull_service_pb2
 
 from ..engine.engine import Engine
 from ..state.batch import Applied
-from ..state.events import WriteBatch
+from ..state.events import WriteBatch, WriteTogether
 from . import decode
 from .calls import Call
+from .decode_batch import decode_batch
 from .metrics import Metrics
 
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
@@ -23,11 +27,25 @@ def decode_write(request: Any, message_bytes: int, producer: str, owner: str) ->
     batch = request.batch
     return WriteBatch(
         message_bytes // decode.BYTES_PER_POINT,  # an estimate: reading the points would copy them
-        lambda: decode.decode_batch(batch),
+        lambda: decode_batch(batch),
         producer,
         decode.decode_sequence(producer, request.sequence),
         owner,
     )
+
+
+def decode_together(
+    request: hull_service_pb2.ApplyTogetherRequest, names: Sequence[str], message_bytes: int, owner: str
+) -> WriteTogether:
+    """The batches of a request to the hulls of these names, decoded when they run."""
+    producer = decode.decode_producer(request.producer)
+    sequence = decode.decode_sequence(producer, request.sequence)
+    parts = []
+    for name, each in zip(names, request.batches, strict=True):
+        part = WriteBatch(0, partial(decode_batch, each.batch), producer, sequence, owner)
+        part.name = name
+        parts.append(part)
+    return WriteTogether(parts, rows=message_bytes // decode.BYTES_PER_POINT)
 
 
 class StreamedBatches:

@@ -1,27 +1,28 @@
-"""A batch: inserts, deletes and moves that are applied together or not at all."""
+"""A batch: changes that are applied together or not at all."""
 
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 
-from dynhull import DynamicHull, MissingPointError
 from dynhull.arrays import Points
 
-from .errors import PointMissingError
+from .records import Condition, Keys, Times
 
 
 @dataclass(slots=True)
 class Batch:
     """Points as (n, 2) arrays. The last `moves` of each are the origins and the destinations of moves.
 
-    With `count_missing`, deletes of missing points are counted instead of refused.
+    With `count_missing`, deletes of missing points are counted instead of refused. `times` are the event times of the
+    inserts without those of the moves, or None.
     """
 
     inserts: Points
     deletes: Points
     moves: int
     count_missing: bool
+    times: Times | None = None
 
     @property
     def growth(self) -> int:
@@ -30,8 +31,52 @@ class Batch:
 
 
 @dataclass(slots=True)
+class KeyedBatch:
+    """Positions of keys, and keys to remove; all keys are of the kind `kind`.
+
+    Attributes:
+        kind: whether the keys are strings or integers.
+        keys: n keys to put.
+        points: (n, 2) their positions.
+        removes: keys to remove.
+        times: (n,) event times of the puts, or None.
+        condition: which keys to put: all, or only those that are absent or present.
+        ttl: the microseconds after which the puts leave, or None.
+        deadlines: (n,) the times at which the puts leave, or None.
+        refuse_missing: whether a missing key among the removes refuses the batch, rather than being counted.
+    """
+
+    kind: Literal["str", "int"]
+    keys: Keys
+    points: Points
+    removes: Keys
+    times: Times | None = None
+    condition: Condition | None = None
+    ttl: int | None = None
+    deadlines: Times | None = None
+    refuse_missing: bool = False
+
+
+@dataclass(slots=True)
 class Applied:
-    """The effect of a batch, and the counts after it. For a `duplicate`, `revision` is one that includes it."""
+    """The effect of a batch, and the counts after it. For a `duplicate`, `revision` is one that includes it.
+
+    Attributes:
+        revision: the revision after the batch.
+        inserted: points inserted; in a keyed hull, new keys.
+        deleted: points deleted; in a keyed hull, keys removed.
+        missing: deletes and removes ignored because the point or the key was missing.
+        hull_changed: whether the vertices have changed.
+        points: the number of points.
+        duplicate: whether the batch had already been applied.
+        moved: known keys whose position was written.
+        stale: puts that changed nothing because the stored position has a later event time.
+        late: rows that changed nothing because they are too old.
+        skipped: puts that changed nothing because of their condition.
+        clamped: rows whose event time was reduced.
+        evicted: the oldest points, removed because the window has room for no more.
+        clock: the clock of the hull, None for a hull without a clock.
+    """
 
     revision: int
     inserted: int
@@ -40,36 +85,13 @@ class Applied:
     hull_changed: bool
     points: int
     duplicate: bool = False
+    moved: int = 0
+    stale: int = 0
+    late: int = 0
+    skipped: int = 0
+    clamped: int = 0
+    evicted: int = 0
+    clock: int | None = None
 
 
-def apply_batch(hull: DynamicHull, batch: Batch, revision: int) -> Applied:
-    """Apply `batch` to `hull` as `revision`.
-
-    Raises:
-        PointMissingError: a point to delete is missing, and `count_missing` is False; nothing has changed.
-    """
-    inserted, to_delete = len(batch.inserts), len(batch.deletes)
-    changes = hull.changes
-    deleted = _apply(hull, batch)
-    return Applied(revision, inserted, deleted, to_delete - deleted, hull.changes != changes, len(hull))
-
-
-def _apply(hull: DynamicHull, batch: Batch) -> int:
-    """Returns the number of points deleted."""
-    inserts, deletes = batch.inserts, batch.deletes
-    missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
-    try:
-        if not len(deletes):
-            hull.insert_many(inserts)
-            return 0
-        if not len(inserts):
-            return hull.delete_many(deletes, missing)
-        ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
-        applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
-    except MissingPointError as error:
-        row = cast("int", error.row) - len(inserts)  # always given for a batch
-        first_origin = len(deletes) - batch.moves
-        if row < first_origin:
-            raise PointMissingError("deletes", row, error.point) from None
-        raise PointMissingError("origins", row - first_origin, error.point) from None
-    return applied - len(inserts)
+NO_POINTS: Points = np.empty((0, 2))

@@ -7,9 +7,14 @@ Each name has a queue. The requests that wait in it make one *trip* together: th
 changes are committed in one transaction, and their callers are answered only after the commit. Requests that arrive
 during a commit therefore share the next one, and no reader sees a change that could be undone. A queue has one trip at
 a time. The trip belongs to the server: when a caller disconnects, it is not answered, and nothing else changes.
+
+A request to several hulls waits in all of their queues, and begins when it is the first in each of them: then one trip
+occupies all of these queues. It enters the queues in one step, so any two such requests are in the same order wherever
+they meet, and there is no deadlock.
 """
 
 from functools import partial
+from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
 from sortedcontainers import SortedDict
@@ -34,6 +39,7 @@ from .events import (
     Event,
     Examine,
     Examined,
+    Expire,
     Failed,
     Gone,
     NotExamined,
@@ -45,15 +51,16 @@ from .events import (
     Stopping,
     Tick,
     WriteBatch,
+    WriteTogether,
 )
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import Append, HullRow, Record
-from .trip import Place, Trip, write
+from .records import Append, HullRow, Kept, Record
+from .trip import Leg, Place, Trip, write
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Sequence
 
 # Requests for at most this many points together run at once: a tenth of a millisecond.
 SMALL = 128
@@ -70,29 +77,31 @@ class _Queue:
         name: the name.
         hull: the committed hull of that name, or None.
         trip: the trip in progress, or None.
-        waiting: the requests for later trips.
-        ill: set while a commit has failed and the storage cannot be read: the error of the last attempt.
-        pause: seconds before the next attempt.
+        waiting: the requests for later trips. While there is no trip, the first one waits in other queues, too.
     """
 
-    __slots__ = ("hull", "ill", "name", "pause", "trip", "waiting")
+    __slots__ = ("hull", "name", "trip", "waiting")
 
     def __init__(self, name: str, hull: Hull | None = None) -> None:
         self.name = name
         self.hull = hull
         self.trip: Trip | None = None
         self.waiting: list[Request] = []
-        self.ill: Exception | None = None
-        self.pause = FIRST_PAUSE
+
+    @property
+    def ill(self) -> Exception | None:
+        """Why the storage cannot be read after a failed commit, None unless that is so."""
+        return None if self.trip is None else self.trip.ill
 
     @property
     def state(self) -> str:
         """One of absent, there, creating, deleting and unknown."""
-        if self.ill is not None or (self.trip is not None and self.trip.failure is not None):
+        trip = self.trip
+        if trip is not None and trip.failure is not None:
             return "unknown"
-        if self.trip is None or self.trip.after is self.hull:
+        if trip is None or len(trip.legs) > 1 or trip.legs[0].after is self.hull:
             return "absent" if self.hull is None else "there"
-        return "deleting" if self.trip.after is None else "creating"
+        return "deleting" if trip.legs[0].after is None else "creating"
 
 
 class Core:
@@ -125,8 +134,12 @@ class Core:
         self._creating = 0
         self._trips = 0
         self._stopping = False
+        # A heap of the times at which points leave, with the number and name of the hull. An entry is outdated if its
+        # time is not that of the hull's plan.
+        self._due: list[tuple[int, int, str]] = []
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
             WriteBatch: self._asked,
+            WriteTogether: self._asked_together,
             ReadHull: self._asked,
             CreateHull: self._asked,
             DeleteHull: self._asked,
@@ -154,6 +167,12 @@ class Core:
         """The hulls by name."""
         return self._hulls
 
+    @property
+    def latest_time(self) -> int | None:
+        """The latest time of the server's clock that a hull has recorded, None if there is none. O(hulls)."""
+        clocks = (hull.counts.clock for hull in self._hulls.values() if hull.state.contents.follows_server)
+        return max((clock for clock in clocks if clock is not None), default=None)
+
     def get(self, name: str) -> Hull:
         """The hull of that name, or raise HullNotFoundError."""
         hull: Hull | None = self._hulls.get(name)
@@ -180,29 +199,38 @@ class Core:
         """Add a hull that the storage has kept. Call this before the first step."""
         hull = self._hulls[row.name] = Hull(row, state, unsaved)
         self._queues[row.name] = _Queue(row.name, hull)
+        self._plan(hull)
 
     # Requests
 
-    def _asked(self, request: CreateHull | DeleteHull | ReadHull | WriteBatch, effects: list[Effect]) -> None:
+    def _asked(self, request: CreateHull | DeleteHull | Expire | ReadHull | WriteBatch, effects: list[Effect]) -> None:
         name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
-        queue = self._queues.get(name)
-        if queue is None:
-            queue = self._queues[name] = _Queue(name)
-        if queue.trip is None and not self._stopping and not request.abandoned:
+        queue = self._queue(name)
+        if queue.trip is None and not queue.waiting and not self._stopping and not request.abandoned:
             if request.rows <= SMALL and type(request) is ReadHull:
                 self._read(queue, request)
                 effects.append(Reply([request]))
             elif self._immediate and queue.hull is not None and request.rows <= SMALL and type(request) is WriteBatch:
                 self._write(queue, queue.hull, request, effects)
             else:
-                self._begin(queue, [request], request.rows, effects)
-                if queue.hull is None or queue.waiting:
-                    self._go_on(queue, effects)
+                self._begin([queue], [request], request.rows, effects)
+                if queue.hull is None:
+                    self._rest(queue)
             return
         queue.waiting.append(request)
-        if queue.ill is not None:
-            self._refuse_waiting(queue, _ill(queue.ill), effects)
-        self._go_on(queue, effects)
+        self._go_on([queue], effects)
+
+    def _asked_together(self, request: WriteTogether, effects: list[Effect]) -> None:
+        queues = [self._queue(part.name) for part in request.parts]
+        for queue in queues:
+            queue.waiting.append(request)
+        self._go_on(queues, effects)
+
+    def _queue(self, name: str) -> _Queue:
+        queue = self._queues.get(name)
+        if queue is None:
+            queue = self._queues[name] = _Queue(name)
+        return queue
 
     def _read(self, queue: _Queue, request: ReadHull) -> None:
         """Run a small read. It needs no trip while the queue is idle."""
@@ -226,74 +254,85 @@ class Core:
             if records:
                 effects.append(Commit(None, [Append(hull.row.number, records)]))
             hull.counts = hull.state.counts
-            effects.append(Reply([request], None if applied.duplicate else hull))
+            effects.append(Reply([request], () if applied.duplicate else (hull,)))
+            self._plan(hull)
         elif hull.state.torn:
-            trip = queue.trip = Trip(queue.name, hull, [request], self._now, keeps=self._keeps)
+            trip = self._new_trip([queue], [request])
             trip.torn = True
-            self._trips += 1
-            self._ran(queue, trip, effects)
+            self._ran(trip, effects)
         else:
             effects.append(Reply([request]))
 
-    def _gone(self, event: Gone, _: list[Effect]) -> None:
+    def _gone(self, event: Gone, effects: list[Effect]) -> None:
         event.what.leave()
+        if type(event.what) is WriteTogether:
+            self._go_on(self._remove(event.what), effects)
 
-    def _go_on(self, queue: _Queue, effects: list[Effect]) -> None:
-        """Begin trips for the waiting requests, until one of them does not complete at once."""
-        while queue.trip is None and queue.waiting:
-            if self._stopping:
-                self._refuse_waiting(queue, StoppingError(), effects)
-            requests, rows = self._take(queue)
-            if requests:
-                self._begin(queue, requests, rows, effects)
-        self._rest(queue)
+    def _remove(self, request: WriteTogether) -> list[_Queue]:
+        """Remove a request from the queues where it waits. Returns these queues: they may go on without it."""
+        queues = [self._queues[part.name] for part in request.parts if part.name in self._queues]
+        left = [queue for queue in queues if request in queue.waiting]
+        for queue in left:
+            queue.waiting.remove(request)
+        return left
 
-    def _begin(self, queue: _Queue, requests: list[Request], rows: int, effects: list[Effect]) -> None:
-        hull = queue.hull
-        trip = queue.trip = Trip(queue.name, hull, requests, self._now, keeps=self._keeps)
-        self._trips += 1
-        if hull is None:
-            trip.may_make(Place(self._next_number, self._no_more_hulls(), self._limits))
-            self._next_number += 1
-            self._creating += 1
+    def _go_on(self, queues: "Iterable[_Queue]", effects: list[Effect]) -> None:
+        """Begin trips for the waiting requests of these queues, until no queue can begin one."""
+        left = list(queues)
+        while left:
+            queue = left.pop()
+            if queue.waiting and (queue.ill is not None or (self._stopping and queue.trip is None)):
+                error = StoppingError() if queue.ill is None else _ill(queue.ill)
+                left += self._refuse_waiting(queue, error, effects)
+            while queue.trip is None and queue.waiting:
+                first = queue.waiting[0]
+                together = self._at(first.parts) if type(first) is WriteTogether else [queue]
+                if not all(each.trip is None and each.waiting and each.waiting[0] is first for each in together):
+                    break  # the last of these queues that comes so far begins it
+                requests, rows = _take(queue) if len(together) == 1 else _take_together(together)
+                if requests:
+                    self._begin(together, requests, rows, effects)
+                    left += [each for each in together if each is not queue]
+            self._rest(queue)
+
+    def _begin(self, queues: list[_Queue], requests: list[Request], rows: int, effects: list[Effect]) -> None:
+        trip = self._new_trip(queues, requests)
         if rows > SMALL:
             effects.append(Compute(trip))
             return
         trip.run()
-        self._ran(queue, trip, effects)
+        self._ran(trip, effects)
 
-    def _take(self, queue: _Queue) -> tuple[list[Request], int]:
-        """The requests of the next trip: at most TRIP_ROWS points, and a DeleteHull always alone."""
-        waiting, queue.waiting = queue.waiting, []
-        requests: list[Request] = []
-        rows = 0
-        for i, request in enumerate(waiting):
-            if request.abandoned or (type(request) is WriteBatch and request.stream and request.stream.stopped):
-                continue
-            deletes = type(request) is DeleteHull
-            if requests and (deletes or rows + request.rows > TRIP_ROWS):
-                queue.waiting = waiting[i:]
-                break
-            requests.append(request)
-            rows += request.rows
-            if deletes:
-                queue.waiting = waiting[i + 1 :]
-                break
-        return requests, rows
+    def _new_trip(self, queues: list[_Queue], requests: list[Request]) -> Trip:
+        place = None
+        if queues[0].hull is None and len(queues) == 1:
+            place = Place(self._next_number, self._no_more_hulls(), self._limits)
+            self._next_number += 1
+            self._creating += 1
+        legs = [Leg(queue.name, queue.hull, keeps=self._keeps) for queue in queues]
+        trip = Trip(legs, requests, self._now, FIRST_PAUSE, place)
+        for queue in queues:
+            queue.trip = trip
+        self._trips += 1
+        return trip
 
     def _no_more_hulls(self) -> Exception | None:
         most = self._limits.max_hulls
         return LimitExceededError("max_hulls", most) if len(self._hulls) + self._creating >= most else None
 
+    def _at(self, parts: "Sequence[Leg | WriteBatch]") -> list[_Queue]:
+        """The queues of the hulls that these belong to."""
+        return [self._queues[part.name] for part in parts]
+
     def _computed(self, event: Computed, effects: list[Effect]) -> None:
         trip = event.ticket
-        queue = self._queues[trip.name]
-        self._ran(queue, trip, effects)
-        self._go_on(queue, effects)
+        queues = self._at(trip.legs)
+        self._ran(trip, effects)
+        self._go_on(queues, effects)
 
-    def _ran(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
+    def _ran(self, trip: Trip, effects: list[Effect]) -> None:
         if trip.torn:
-            self._fail(queue, trip, MemoryError("a batch was applied in part"), effects)
+            self._fail(trip, MemoryError("a batch was applied in part"), effects)
             return
         changes = trip.changes()
         if changes:
@@ -301,71 +340,79 @@ class Core:
             if not self._immediate:
                 return
         elif not trip.applied:
-            self._end(queue, trip, effects, None)
+            self._end(trip, effects, ())
             return
-        self._keep(queue, trip, effects)
+        self._keep(trip, effects)
 
-    def _end(self, queue: _Queue, trip: Trip, effects: list[Effect], moved: Hull | None) -> None:
+    def _end(self, trip: Trip, effects: list[Effect], moved: tuple[Hull, ...]) -> None:
         """Complete the trip: answer its callers."""
         requests = trip.requests
         if len(requests) != 1 or requests[0].abandoned:
             requests = [request for request in requests if not request.abandoned]
         effects.append(Reply(requests, moved))
-        self._over(queue, trip)
+        self._over(trip)
 
-    def _over(self, queue: _Queue, trip: Trip) -> None:
-        queue.trip = None
-        queue.ill = None
-        queue.pause = FIRST_PAUSE
+    def _over(self, trip: Trip) -> None:
         self._trips -= 1
-        if trip.before is None:
+        if trip.place is not None:
             self._creating -= 1
+        for leg in trip.legs:
+            queue = self._queues[leg.name]
+            queue.trip = None
+            if queue.hull is not None:
+                self._plan(queue.hull)
 
     def _rest(self, queue: _Queue) -> None:
-        """Remove the queue of a name that has neither a hull nor a trip."""
-        if queue.hull is None and queue.trip is None:
-            del self._queues[queue.name]
+        """Remove the queue of a name that has neither a hull nor work."""
+        if queue.hull is None and queue.trip is None and not queue.waiting:
+            self._queues.pop(queue.name, None)
 
     # Commits
 
     def _committed(self, event: Committed, effects: list[Effect]) -> None:
-        queue = self._queues[event.ticket.name]
-        self._keep(queue, event.ticket, effects)
-        self._go_on(queue, effects)
+        trip = event.ticket
+        queues = self._at(trip.legs)
+        self._keep(trip, effects)
+        self._go_on(queues, effects)
 
-    def _keep(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
-        """Publish the changes of the trip, which are committed."""
-        before, after = trip.before, trip.after
-        if after is not None:
-            after.counts = after.state.counts
-            after.unsaved += trip.unsaved
-        if after is not before:
-            queue.hull = after
-            if before is not None:
-                before.ended = True
-                del self._hulls[queue.name]
+    def _keep(self, trip: Trip, effects: list[Effect]) -> None:
+        """Publish the changes of the trip, which are committed: those of all its hulls in one step."""
+        moved = []
+        for leg in trip.legs:
+            before, after = leg.before, leg.after
             if after is not None:
-                self._hulls[queue.name] = after
-        self._end(queue, trip, effects, after or before)
+                after.counts = after.state.counts
+                after.unsaved += leg.unsaved
+            if after is not before:
+                self._queues[leg.name].hull = after
+                if before is not None:
+                    before.ended = True
+                    del self._hulls[leg.name]
+                if after is not None:
+                    self._hulls[leg.name] = after
+            hull = after or before
+            if hull is not None:
+                moved.append(hull)
+        self._end(trip, effects, tuple(moved))
 
     def _failed(self, event: Failed, effects: list[Effect]) -> None:
         trip = event.ticket
-        queue = self._queues[trip.name]
         if event.unknown:
             trip.failure, trip.unknown = event.error, True
             self._examine(trip, effects)
             return
-        self._fail(queue, trip, event.error, effects)
-        self._go_on(queue, effects)
+        queues = self._at(trip.legs)
+        self._fail(trip, event.error, effects)
+        self._go_on(queues, effects)
 
-    def _fail(self, queue: _Queue, trip: Trip, error: Exception, effects: list[Effect]) -> None:
+    def _fail(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
         """Handle a trip whose changes were not committed."""
         trip.failure = error
         self._refuse_changes(trip, _not_stored(error), effects)
-        if trip.before is not None and (trip.applied or trip.torn):
-            self._examine(trip, effects)  # its state in memory includes the batches
+        if trip.place is None and (trip.applied or trip.torn):
+            self._examine(trip, effects)  # the states in memory include the batches
         else:
-            self._again(queue, trip)
+            self._again(trip)
 
     def _refuse_changes(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
         """Refuse the changes of the trip, and stop the streams that sent them."""
@@ -385,71 +432,77 @@ class Core:
                 streams.add(id(stream))
         effects.append(Reply(refused))
 
-    def _again(self, queue: _Queue, trip: Trip) -> None:
+    def _again(self, trip: Trip) -> None:
         """Repeat the reads of a trip whose changes were not committed."""
         reads = [request for request in trip.requests if type(request) is ReadHull and not request.abandoned]
         for request in reads:
             request.result = request.error = None
-        self._over(queue, trip)
+        queue = self._queues[trip.legs[0].name]  # a trip with reads has one
+        self._over(trip)
         queue.waiting[:0] = reads
 
     # Examination of the storage
 
     def _examine(self, trip: Trip, effects: list[Effect]) -> None:
-        hull = trip.before or trip.after
-        assert hull is not None  # a trip without a hull changes nothing
-        row = hull.row
-        load = partial(HullState, self._limits, row.settings, now=self._now)
-        effects.append(Examine(trip, row.number, trip.unknown, load))
+        hulls: list[tuple[int, Callable[[Kept], HullState]]] = []
+        for leg in trip.legs:
+            hull = leg.before or leg.after
+            assert hull is not None  # a trip without a hull changes nothing
+            load = partial(HullState, self._limits, hull.row.settings, now=self._now)
+            hulls.append((hull.row.number, load))
+        effects.append(Examine(trip, trip.unknown, hulls))
 
-    def _under_way(self, trip: Trip) -> _Queue | None:
-        """The queue of a trip; None where the server is stopping and did not wait for it."""
-        queue = self._queues.get(trip.name)
-        return queue if queue is not None and queue.trip is trip else None
+    def _under_way(self, trip: Trip) -> bool:
+        """Whether a trip is in progress; False where the server is stopping and did not wait for it."""
+        queue = self._queues.get(trip.legs[0].name)
+        return queue is not None and queue.trip is trip
 
     def _examined(self, event: Examined, effects: list[Effect]) -> None:
-        trip, found = event.ticket, event.state
-        queue = self._under_way(trip)
-        if queue is None:
+        trip = event.ticket
+        if not self._under_way(trip):
             return
-        if trip.unknown and trip.landed(found):
-            self._keep(queue, trip, effects)
-        elif trip.before is not None and found is None:
+        queues = self._at(trip.legs)
+        found = list(zip(trip.legs, event.states, strict=True))
+        if trip.unknown and trip.landed(event.states):
+            self._keep(trip, effects)
+        elif any(leg.before is not None and state is None for leg, state in found):
             self._not_examined(NotExamined(trip, LookupError("the hull is not in the storage")), effects)
         else:
-            if trip.before is not None and found is not None:
-                trip.before.state = found
+            for leg, state in found:
+                if leg.before is not None and state is not None:
+                    leg.before.state = state
             assert trip.failure is not None  # a trip is examined only after a failure
             if trip.unknown:
                 self._refuse_changes(trip, _not_stored(trip.failure), effects)
-            self._again(queue, trip)
-        self._go_on(queue, effects)
+            self._again(trip)
+        self._go_on(queues, effects)
 
     def _not_examined(self, event: NotExamined, effects: list[Effect]) -> None:
         trip = event.ticket
-        queue = self._under_way(trip)
-        if queue is None:
+        if not self._under_way(trip):
             return
-        queue.ill = event.error
+        queues = self._at(trip.legs)
+        trip.ill = event.error
         if trip.unknown:
             self._refuse_changes(trip, OutcomeUnknownError(words(event.error)), effects)
-        reads = [request for request in trip.requests if not request.abandoned]
+        queues[0].waiting[:0] = [request for request in trip.requests if not request.abandoned]
         trip.requests = []
-        queue.waiting[:0] = reads
         if self._stopping:
-            self._abandon(queue, trip, effects)
-            return
-        self._refuse_waiting(queue, _ill(event.error), effects)
-        effects.append(Retry(trip, queue.pause, event.error))
-        queue.pause = min(2 * queue.pause, LONGEST_PAUSE)
+            self._over(trip)  # the next start reads the outcome from the storage
+        else:
+            effects.append(Retry(trip, trip.pause, event.error))
+            trip.pause = min(2 * trip.pause, LONGEST_PAUSE)
+        self._go_on(queues, effects)
 
     def _retried(self, event: Retried, effects: list[Effect]) -> None:
-        if self._under_way(event.ticket) is not None:
+        if self._under_way(event.ticket):
             self._examine(event.ticket, effects)
 
-    def _refuse_waiting(self, queue: _Queue, error: Exception, effects: list[Effect]) -> None:
+    def _refuse_waiting(self, queue: _Queue, error: Exception, effects: list[Effect]) -> list[_Queue]:
+        """Refuse the waiting requests. Returns the other queues in which some of them waited."""
         waiting, queue.waiting = queue.waiting, []
         refused: list[Request] = []
+        others: list[_Queue] = []
         for request in waiting:
             stream = request.stream if type(request) is WriteBatch else None
             if request.abandoned or (stream is not None and stream.stopped):
@@ -458,24 +511,75 @@ class Core:
                 stream.stopped = True
             request.error = error
             refused.append(request)
+            if type(request) is WriteTogether:
+                others += self._remove(request)
         effects.append(Reply(refused))
+        return others
 
     # Time and shutdown
 
-    def _tick(self, event: Tick, _: list[Effect]) -> None:
+    def _tick(self, event: Tick, effects: list[Effect]) -> None:
+        """Make points leave where that is due."""
         self._now = event.now
+        while self._due and self._due[0][0] <= event.time and not self._stopping:
+            due, number, name = heappop(self._due)
+            hull = self._hulls.get(name)
+            if hull is not None and hull.row.number == number and hull.due == due:
+                hull.due = None
+                self._asked(Expire(event.to, hull, event.time, rows=hull.counts.points), effects)
+
+    def _plan(self, hull: Hull) -> None:
+        """Plan when points of a hull leave next. No trip of the hull is in progress."""
+        due = hull.state.contents.due
+        if due is not None and (hull.due is None or due < hull.due):
+            hull.due = due
+            heappush(self._due, (due, hull.row.number, hull.name))
 
     def _stop(self, _: Stopping, effects: list[Effect]) -> None:
         self._stopping = True
         for queue in list(self._queues.values()):
-            if queue.ill is not None and queue.trip is not None:
-                self._abandon(queue, queue.trip, effects)
+            trip = queue.trip
+            if trip is not None and trip.ill is not None:
+                queues = self._at(trip.legs)
+                self._over(trip)  # the next start reads the outcome from the storage
+                self._go_on(queues, effects)
             # Requests that wait for a trip are refused after it, so that the answers of a stream keep their order.
 
-    def _abandon(self, queue: _Queue, trip: Trip, effects: list[Effect]) -> None:
-        """End a trip with an unknown outcome; the next start reads the outcome from the storage."""
-        self._over(queue, trip)
-        self._go_on(queue, effects)
+
+def _take(queue: _Queue) -> tuple[list[Request], int]:
+    """The requests of the next trip, and their points: at most TRIP_ROWS, and a DeleteHull always alone."""
+    waiting, queue.waiting = queue.waiting, []
+    requests: list[Request] = []
+    rows = 0
+    for i, request in enumerate(waiting):
+        if request.abandoned or (type(request) is WriteBatch and request.stream and request.stream.stopped):
+            continue
+        deletes = type(request) is DeleteHull
+        if type(request) is WriteTogether or (requests and (deletes or rows + request.rows > TRIP_ROWS)):
+            queue.waiting = waiting[i:]
+            break
+        requests.append(request)
+        rows += request.rows
+        if deletes:
+            queue.waiting = waiting[i + 1 :]
+            break
+    return requests, rows
+
+
+def _take_together(queues: list[_Queue]) -> tuple[list[Request], int]:
+    """The requests of the next trip to these hulls, the first ones in all of their queues, and their points."""
+    requests: list[Request] = []
+    rows = 0
+    for request, *others in zip(*(queue.waiting for queue in queues), strict=False):
+        if type(request) is not WriteTogether or len(request.parts) != len(queues):
+            break
+        if any(other is not request for other in others) or (requests and rows + request.rows > TRIP_ROWS):
+            break
+        requests.append(request)
+        rows += request.rows
+    for queue in queues:
+        del queue.waiting[: len(requests)]
+    return requests, rows
 
 
 def _not_stored(error: Exception) -> NotStoredError:

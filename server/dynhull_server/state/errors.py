@@ -42,6 +42,52 @@ class PointMissingError(RefusedError):
         self.point = point
 
 
+class InvalidBatchError(RefusedError):
+    """A batch has an invalid value, given the settings of the hull.
+
+    Attributes:
+        field: the path of the field in the batch.
+        row: the row of the value, None if the field as a whole is invalid.
+        value: the value.
+        problem: the reason why it is invalid.
+    """
+
+    def __init__(self, field: str, value: object, problem: str, row: int | None = None) -> None:
+        super().__init__(f"{field if row is None else f'{field} row {row}'} is {value}: {problem}")
+        self.field = field
+        self.row = row
+        self.value = value
+        self.problem = problem
+
+
+class KeyRepeatedError(InvalidBatchError):
+    """A batch names a key twice.
+
+    Attributes:
+        first: the field and the row in which the key comes first; `field` and `row` say where it comes again.
+    """
+
+    def __init__(self, key: str | int, first: tuple[str, int], second: tuple[str, int]) -> None:
+        field, row = first
+        problem = f"a batch names a key once, and {field} row {row} is the same key; nothing of the batch was applied"
+        super().__init__(second[0], key, problem, second[1])
+        self.first = first
+
+
+class KeyMissingError(RefusedError):
+    """A batch removes a key that the hull does not have.
+
+    Attributes:
+        row: its row among the removes.
+        key: the key.
+    """
+
+    def __init__(self, row: int, key: str | int) -> None:
+        super().__init__(f"removes row {row}: the hull has no key {key!r} to remove; nothing of the batch was applied")
+        self.row = row
+        self.key = key
+
+
 class LimitExceededError(RefusedError):
     """A request exceeds one of the server's limits.
 
@@ -65,11 +111,24 @@ class SequenceGapError(RefusedError):
         expected: the next number.
     """
 
-    def __init__(self, producer: str, sequence: int, expected: int) -> None:
-        super().__init__(f"batch {sequence} of producer {producer!r} arrived, expected {expected}")
+    def __init__(self, producer: str, sequence: int, expected: int, words: str = "") -> None:
+        super().__init__(words or f"batch {sequence} of producer {producer!r} arrived, expected {expected}")
         self.producer = producer
         self.sequence = sequence
         self.expected = expected
+
+
+class SequencesDifferError(SequenceGapError):
+    """A producer's batch to several hulls has been applied to some of them, with the same number, but not to all."""
+
+    def __init__(self, producer: str, sequence: int, expected: int, applied: str, missing: str) -> None:
+        super().__init__(
+            producer,
+            sequence,
+            expected,
+            f"batch {sequence} of producer {producer!r} has been applied to {applied!r}, which expects {expected}, but "
+            f"not to {missing!r}: a producer of batches to several hulls writes to all of them each time",
+        )
 
 
 class HullEmptyError(RefusedError):
@@ -81,15 +140,15 @@ class HullEmptyError(RefusedError):
 
 
 class HullUnsuitableError(RefusedError):
-    """The query is undefined for a hull with a certain point.
+    """The request does not suit the hull: a batch of another kind, or a query undefined for its points.
 
     Attributes:
         name: the name of the hull.
-        point: the coordinates of the point.
+        point: the coordinates of the point for which the query is undefined; None if that is not the reason.
     """
 
-    def __init__(self, name: str, point: tuple[float, float], rule: str) -> None:
-        super().__init__(f"the hull {name!r} has the point {point}: {rule}")
+    def __init__(self, name: str, reason: str, point: tuple[float, float] | None = None) -> None:
+        super().__init__(f"the hull {name!r} {reason}")
         self.name = name
         self.point = point
 

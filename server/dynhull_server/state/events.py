@@ -8,7 +8,7 @@ from .records import DEFAULT, Change, HullSettings, Kept
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .batch import Batch
+    from .batch import Batch, KeyedBatch
     from .hull import Hull
     from .hull_state import HullState
     from .trip import Trip
@@ -75,19 +75,35 @@ class WriteBatch(Request):
         sequence: its number.
         owner: the caller that the producer belongs to.
         name: the name of the hull. The engine sets this, the attributes below and `to`.
+        arrived: the time of its arrival by the server's clock, in microseconds since 1970.
         birth: the origin of the hull, if a missing hull shall be created; None if it shall be refused.
         stream: the stream that the batch is part of, or None.
     """
 
     to: Any = field(default=None, init=False)
     rows: int
-    make: "Callable[[], Batch]"
+    make: "Callable[[], Batch | KeyedBatch]"
     producer: str = ""
     sequence: int = 0
     owner: str = ""
     name: str = field(default="", init=False)
+    arrived: int = field(default=0, init=False)
     birth: Birth | None = field(default=None, init=False)
     stream: "Stream | None" = field(default=None, init=False)
+
+
+@dataclass(slots=True, eq=False)
+class WriteTogether(Request):
+    """Apply one batch to each of several hulls: all of them or none. The result is a list with an `Applied` of each.
+
+    Attributes:
+        parts: the batches, each to a different hull. They have the same producer and sequence.
+        refused: the index of the part that was refused, once it is answered; None where the cause is not a part.
+    """
+
+    to: Any = field(default=None, init=False)
+    parts: "list[WriteBatch]"
+    refused: int | None = field(default=None, init=False)
 
 
 @dataclass(slots=True, eq=False)
@@ -96,6 +112,19 @@ class ReadHull(Request):
 
     hull: "Hull"
     function: "Callable[[HullState], Any]"
+
+
+@dataclass(slots=True, eq=False)
+class Expire(Request):
+    """Remove the points of a hull that leave at `time`, by the server's clock. The core makes it at a Tick."""
+
+    hull: "Hull"
+    time: int
+
+    @property
+    def name(self) -> str:
+        """The name of the hull."""
+        return self.hull.name
 
 
 @dataclass(slots=True, eq=False)
@@ -154,10 +183,10 @@ class Failed:
 
 @dataclass(slots=True)
 class Examined:
-    """The state of a hull in the storage; None where the storage has no such hull."""
+    """The state in the storage of each hull of a trip; None for a hull that the storage does not have."""
 
     ticket: "Trip"
-    state: "HullState | None"
+    states: "list[HullState | None]"
 
 
 @dataclass(slots=True)
@@ -177,9 +206,17 @@ class Retried:
 
 @dataclass(slots=True)
 class Tick:
-    """The time, in seconds on a monotonic clock."""
+    """The time.
+
+    Attributes:
+        now: seconds on a monotonic clock.
+        time: microseconds since 1970 by the server's clock, which never goes back.
+        to: the recipient of the answers to the Expire requests that this makes.
+    """
 
     now: float
+    time: int = 0
+    to: Any = None
 
 
 @dataclass(slots=True)
@@ -210,15 +247,17 @@ class Commit:
 
 @dataclass(slots=True)
 class Examine:
-    """Read a hull from the storage; then send Examined, with the state that `load` makes of it, or NotExamined.
+    """Read hulls from the storage; then send Examined, or NotExamined if one of them cannot be read.
 
     With `settle`, decide a commit with an unknown outcome first.
+
+    Attributes:
+        hulls: the number of each hull, and a function that makes its state of what is stored.
     """
 
     ticket: "Trip"
-    number: int
     settle: bool
-    load: "Callable[[Kept], HullState]"
+    hulls: "list[tuple[int, Callable[[Kept], HullState]]]"
 
 
 @dataclass(slots=True)
@@ -234,11 +273,11 @@ class Retry:
 class Reply:
     """Send the callers of requests their results or errors, in this order.
 
-    Before that, wake the watchers of `moved`: it has a new revision, or was deleted.
+    Before that, wake the watchers of the hulls `moved`: each has a new revision, or was deleted.
     """
 
     requests: list[Request]
-    moved: "Hull | None" = None
+    moved: "tuple[Hull, ...]" = ()
 
 
 Effect = Compute | Commit | Examine | Retry | Reply

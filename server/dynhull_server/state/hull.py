@@ -12,10 +12,11 @@ class Hull:
         state: its points; read and change them only in a trip of its queue.
         counts: the counts at the latest committed revision.
         unsaved: points in batches since the last snapshot.
+        due: the time at which the core makes points leave, None where it has no such plan.
         ended: whether it has been deleted.
     """
 
-    __slots__ = ("counts", "ended", "row", "state", "unsaved")
+    __slots__ = ("counts", "due", "ended", "row", "state", "unsaved")
 
     def __init__(self, row: HullRow, state: HullState, unsaved: int = 0) -> None:
         self.row = row
@@ -23,6 +24,7 @@ class Hull:
         self.counts: Counts = state.counts
         self.unsaved = unsaved
         self.ended = False
+        self.due: int | None = None
 
     @property
     def name(self) -> str:

@@ -1,56 +1,75 @@
 """One hull: its points, its revision, its producers, and the history of its vertices."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from dynhull import DynamicHull
+from dynhull import KeyedHull
 from dynhull.arrays import Points
 
-from .batch import Applied, apply_batch
-from .errors import LimitExceededError, PointMissingError
+from .batch import Applied
+from .contents import replayed
+from .errors import HullUnsuitableError, RefusedError
 from .history import History
 from .limits import Limits
 from .producers import Producers
-from .records import Contents, HullSettings, Kept, PointRows, Record
+from .records import Contents, Expiry, HullSettings, Kept, Record
 
 if TYPE_CHECKING:
+    from .contents.live import AnyHull
     from .events import WriteBatch
 
-# Batches are replayed as one set of up to this many points, which is many times faster.
-REPLAYED_TOGETHER = 65_536
+Cause = Literal["batch", "expiry"]
 
 
 @dataclass(slots=True)
 class Counts:
-    """The counts of a hull at a revision; `points` with multiplicity."""
+    """The counts of a hull at a revision.
+
+    Attributes:
+        revision: the revision.
+        points: the number of points, with multiplicity.
+        distinct: the number of distinct points.
+        clock: the clock of the hull, None for a hull without a clock so far.
+        cause: what made the revision; None for revision 0, and where that is no longer known.
+    """
 
     revision: int
     points: int
     distinct: int
+    clock: int | None = None
+    cause: Cause | None = None
+
+
+# The keys of vertices: an array of str, or of uint64.
+VertexKeys = npt.NDArray[Any]
 
 
 class HullState:
     """The points of a hull, and the values derived from them.
 
     Attributes:
-        hull: the points.
+        contents: the points, and the times at which they leave.
         counts: the counts after the last batch.
         torn: whether a batch has been applied in part, because memory ran out in the middle of it.
     """
 
     def __init__(self, limits: Limits, settings: HullSettings, kept: Kept, now: float) -> None:
-        self._most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self.torn = False
-        self.hull = replayed(kept)
-        self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct)
+        most_points = min(settings.max_points or limits.max_points, limits.max_points)
+        self.contents = contents = replayed(kept, settings, most_points)
+        self.hull: AnyHull = contents.hull
+        self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct, contents.clock, _last_cause(kept))
         self._producers = Producers(limits.max_producers, limits.max_producers_per_caller, _last_sequences(kept), now)
         self._vertices = self.hull.vertices()
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
         self._changed_at = self.counts.revision
+        self._vertex_keys: VertexKeys | None = None
+        self._keys_as_of = -1
         self._history = History(limits.history_bytes, self._vertices, self.counts.revision)
 
     @property
@@ -58,35 +77,97 @@ class HullState:
         """The number of vertices when they were last read."""
         return len(self._vertices)
 
+    # Changes
+
     def apply(self, write: "WriteBatch", now: float, records: list[Record] | None) -> Applied:
         """Apply a batch as the next revision, and append it to `records` unless that is None.
+
+        Points that leave at the time of the batch do so before it, as a revision of their own.
 
         Raises:
             Exception: the batch is refused; nothing has changed.
         """
+        if not self.is_new(write, now):
+            return self.duplicate()
+        return self.apply_decoded(write, self.decoded(write), now, records)
+
+    def is_new(self, write: "WriteBatch", now: float) -> bool:
+        """Whether a batch is the next one of its producer, or not numbered; False where it has already been applied.
+
+        Raises:
+            SequenceGapError: batches before it are missing.
+            LimitExceededError: the hull has too many producers to add one.
+        """
+        return not write.producer or self._producers.is_new(write.producer, write.sequence, write.owner, now)
+
+    def duplicate(self) -> Applied:
+        """The result of a batch that has already been applied."""
         counts = self.counts
-        if write.producer and not self._producers.is_new(write.producer, write.sequence, write.owner, now):
-            return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True)
+        return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True, clock=counts.clock)
+
+    def decoded(self, write: "WriteBatch") -> Any:
+        """The batch, admitted; raises the error that refuses it, unless that depends on the points of the hull."""
         batch = write.make()
-        if counts.points + batch.growth > self._most_points:
-            raise LimitExceededError("max_points", self._most_points)
+        misfit = self.contents.misfit(batch)
+        if misfit:
+            raise HullUnsuitableError(write.name, misfit)
+        return self.contents.admit(batch, write.arrived)
+
+    def checked(self, write: "WriteBatch") -> Any:
+        """The batch, if it can be applied; raises the error that refuses it. O(k log n)."""
+        batch = self.decoded(write)
+        self.contents.check(batch)
+        return batch
+
+    def apply_decoded(self, write: "WriteBatch", batch: Any, now: float, records: list[Record] | None) -> Applied:
+        """Apply a new batch as the next revision, and append it to `records` unless that is None.
+
+        Raises:
+            Exception: the batch is refused; nothing has changed.
+        """
+        contents = self.contents
+        clock = contents.expires_before(batch)
+        if clock is not None:
+            contents.check(batch)  # a refused batch makes no points leave
+            self.expire(clock, records)
         self.torn = True
         try:
-            applied = apply_batch(self.hull, batch, counts.revision + 1)
-        except PointMissingError:
+            applied, rows = contents.apply(batch, self.counts.revision + 1)
+        except RefusedError:
             self.torn = False
             raise
-        if applied.hull_changed:
-            self._changed_at = applied.revision
-            self._history.changed(applied.revision)
         if write.producer:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
-        self.counts = Counts(applied.revision, applied.points, self.hull.distinct)
+        self._applied("batch", hull_changed=applied.hull_changed)
         if records is not None:
-            rows = PointRows(batch.inserts, batch.deletes, lenient=applied.missing > 0)
-            records.append(Record(applied.revision, rows, write.producer, write.sequence))
+            records.append(Record(applied.revision, rows, write.producer, write.sequence, contents.clock))
         self.torn = False
         return applied
+
+    def expire(self, clock: int, records: list[Record] | None) -> bool:
+        """Advance the hull's clock, and remove the points that leave then as a revision of its own.
+
+        Returns whether any did; otherwise nothing has changed.
+        """
+        changes = self.hull.changes
+        self.torn = True
+        rows = self.contents.expire(clock)
+        if rows is not None:
+            self._applied("expiry", hull_changed=self.hull.changes != changes)
+            if records is not None:
+                records.append(Record(self.counts.revision, rows, clock=self.contents.clock))
+        self.torn = False
+        return rows is not None
+
+    def _applied(self, cause: Cause, *, hull_changed: bool) -> None:
+        """Update the counts and the history after a change."""
+        revision = self.counts.revision + 1
+        if hull_changed:
+            self._changed_at = revision
+            self._history.changed(revision)
+        self.counts = Counts(revision, len(self.hull), self.hull.distinct, self.contents.clock, cause)
+
+    # Reads
 
     def vertices(self) -> Points:
         """The vertices; the same array object while the hull has not changed."""
@@ -96,6 +177,33 @@ class HullState:
             self._vertices_as_of = self.hull.changes
             self._history.record(self._changed_at, self._vertices)
         return self._vertices
+
+    def vertex_keys(self) -> VertexKeys:
+        """The key at each vertex of a keyed hull; the same array object while no vertex has changed its key."""
+        revision = self.counts.revision
+        if self._keys_as_of != revision:
+            keys = self._key_array(self._keyed.vertex_keys())
+            if self._vertex_keys is None or not np.array_equal(self._vertex_keys, keys):
+                self._vertex_keys = keys
+            self._keys_as_of = revision
+        assert self._vertex_keys is not None  # set above
+        return self._vertex_keys
+
+    def entities(self) -> Contents | None:
+        """The keys of a keyed hull with their positions, None for a hull without keys. O(n log n)."""
+        return self.contents.stored() if isinstance(self.hull, KeyedHull) else None
+
+    def keys_at(self, places: Points) -> VertexKeys:
+        """The key at each of some places of a keyed hull, all of which have one."""
+        return self._key_array(self._keyed.keys_at(places))
+
+    @property
+    def _keyed(self) -> KeyedHull:
+        assert isinstance(self.hull, KeyedHull)  # nobody asks others for keys
+        return self.hull
+
+    def _key_array(self, keys: Sequence[str | int | None]) -> VertexKeys:
+        return np.array(keys, object if self._keyed.key_type == "str" else np.uint64)
 
     def earlier_vertices(self, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where they were never sent; raises RevisionForgottenError."""
@@ -107,23 +215,13 @@ class HullState:
 
     def kept(self) -> Kept:
         """The hull at this revision, for a snapshot. O(n)."""
-        return Kept(self.counts.revision, Contents(self.hull.points()), self._producers.state())
+        return Kept(self.counts.revision, self.contents.stored(), self._producers.state(), clock=self.contents.clock)
 
 
-def replayed(kept: Kept) -> DynamicHull:
-    """The hull of a snapshot and the batches after it. O(n log n)."""
-    hull = DynamicHull(kept.contents.points)
-    replay(hull, kept.records)
-    return hull
-
-
-def replay(hull: DynamicHull, records: Iterable[Record]) -> None:
-    """Apply recorded batches, many at a time."""
-    for group in _together(records):
-        inserts = np.concatenate([rows.inserts for rows in group])
-        deletes = np.concatenate([rows.deletes for rows in group])
-        ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
-        hull.apply(ops, np.concatenate([inserts, deletes]), missing="ignore" if group[0].lenient else "raise")
+def _last_cause(kept: Kept) -> Cause | None:
+    if not kept.records:
+        return None
+    return "expiry" if isinstance(kept.records[-1].rows, Expiry) else "batch"
 
 
 def _last_sequences(kept: Kept) -> dict[str, int]:
@@ -132,19 +230,3 @@ def _last_sequences(kept: Kept) -> dict[str, int]:
         if record.producer:
             last[record.producer] = record.sequence
     return last
-
-
-def _together(records: Iterable[Record]) -> Iterable[list[PointRows]]:
-    """Groups of batches to apply as one set. A lenient one stays alone: its deletes depend on the points before it."""
-    group: list[PointRows] = []
-    size = 0
-    for record in records:
-        rows = record.rows
-        assert isinstance(rows, PointRows)
-        if group and (rows.lenient or group[-1].lenient or size >= REPLAYED_TOGETHER):
-            yield group
-            group, size = [], 0
-        group.append(rows)
-        size += len(rows)
-    if group:
-        yield group

@@ -1,23 +1,18 @@
 """The data that the storage keeps: hulls, and the batches applied to them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points
-
-if TYPE_CHECKING:
-    from dynhull.keys import PackedKeys
-
-    Keys: TypeAlias = PackedKeys | npt.NDArray[np.uint64]
+from dynhull.keys import PackedKeys
 
 Identity = Literal["multiset", "str", "int"]
 Clock = Literal["server", "data"]
 Condition = Literal["absent", "present"]
+Keys = PackedKeys | npt.NDArray[np.uint64]
 Times = npt.NDArray[np.int64]  # microseconds since 1970
 NO_TIME = -(2**63)
 FOREVER = 2**63 - 1

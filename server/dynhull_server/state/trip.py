@@ -1,14 +1,15 @@
-"""One trip of a hull: requests that run together, and whose changes are committed together."""
+"""One trip: requests that run together, and whose changes are committed together."""
 
 from dataclasses import dataclass
 
-from .batch import Applied
+from .batch import Applied, Batch, KeyedBatch
 from .errors import HullExistsError, HullNotFoundError
-from .events import CreateHull, DeleteHull, ReadHull, Request, WriteBatch
+from .events import CreateHull, DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import DEFAULT, Append, Change, Create, Delete, HullRow, Kept, Record
+from .records import DEFAULT, Append, Change, Create, Delete, HullRow, HullSettings, Kept, Record
+from .together import apply_together
 
 
 @dataclass(slots=True)
@@ -20,72 +21,32 @@ class Place:
     limits: Limits
 
 
-class Trip:
-    """Runs requests on a hull, in order. Clients see the changes only after the trip is committed.
+class Leg:
+    """The part of a trip at one hull.
 
     Args:
         name: the name of the hull.
         hull: the hull of that name, or None.
-        requests: the requests to run.
-        now: seconds on a monotonic clock.
         keeps: whether the storage keeps batches.
 
     Attributes:
         before: the hull before the trip, or None.
         after: the hull after it, or None.
-        applied: whether any batch was applied.
-        unsaved: the number of points in the batches applied.
-        torn: whether a batch was applied in part, because memory ran out in the middle of it.
-        failure: the error of the commit, or None.
-        unknown: whether it may have been committed despite the failure.
+        records: the batches applied; None where the storage keeps none.
+        unsaved: the number of points in them.
     """
 
-    __slots__ = (
-        "_now",
-        "_place",
-        "_records",
-        "after",
-        "applied",
-        "before",
-        "failure",
-        "name",
-        "requests",
-        "torn",
-        "unknown",
-        "unsaved",
-    )
-    _place: Place
+    __slots__ = ("after", "before", "name", "records", "unsaved")
 
-    def __init__(self, name: str, hull: Hull | None, requests: list[Request], now: float, *, keeps: bool) -> None:
+    def __init__(self, name: str, hull: Hull | None, *, keeps: bool) -> None:
         self.name = name
         self.before = self.after = hull
-        self.requests = requests
-        self.applied = self.torn = self.unknown = False
+        self.records: list[Record] | None = [] if keeps else None
         self.unsaved = 0
-        self.failure: Exception | None = None
-        self._now = now
-        self._records: list[Record] | None = [] if keeps else None
-
-    def may_make(self, place: Place) -> None:
-        """Allow the trip to create the hull, which does not exist."""
-        self._place = place
-
-    def run(self) -> None:
-        """Run the requests; their results and errors are stored in them."""
-        for request in self.requests:
-            try:
-                if type(request) is WriteBatch:
-                    self._write(request)
-                else:
-                    request.result = self._do(request)
-            except Exception as error:  # any error is the answer to the caller
-                refuse(request, error)
-            if self.torn:  # later requests would see a part of a batch
-                return
 
     def changes(self) -> list[Change]:
         """The changes to commit."""
-        before, after, records = self.before, self.after, self._records
+        before, after, records = self.before, self.after, self.records
         if after is before:
             return [Append(after.row.number, records)] if records and after is not None else []
         changes: list[Change] = []
@@ -98,61 +59,168 @@ class Trip:
         return changes
 
     def landed(self, found: HullState | None) -> bool:
-        """Whether the trip was committed, given the state of the hull in the storage: it has all changes, or none."""
+        """Whether the changes were committed, given the state of the hull in the storage."""
         if self.after is None:
             return found is None
         return found is not None and found.counts.revision >= self.after.state.counts.revision
 
-    def _do(self, request: Request) -> object:
+
+class Trip:
+    """Runs requests in order. Clients see the changes only after the trip is committed.
+
+    Args:
+        legs: the hulls: one, or those of the WriteTogether that are the requests.
+        requests: the requests to run.
+        now: seconds on a monotonic clock.
+        place: for a hull that the trip may create, or None.
+
+    Attributes:
+        applied: whether any batch was applied.
+        torn: whether the requests were applied in part, because memory ran out in the middle of one.
+        failure: the error of the commit, or None.
+        unknown: whether it may have been committed despite the failure.
+        ill: set while the commit has failed and the storage cannot be read: the error of the last attempt.
+        pause: seconds before the next attempt.
+    """
+
+    __slots__ = (
+        "_now",
+        "applied",
+        "failure",
+        "ill",
+        "legs",
+        "pause",
+        "place",
+        "requests",
+        "torn",
+        "unknown",
+    )
+
+    def __init__(self, legs: list[Leg], requests: list[Request], now: float, pause: float, place: Place | None) -> None:
+        self.legs = legs
+        self.requests = requests
+        self.place = place
+        self.pause = pause
+        self.applied = self.torn = self.unknown = False
+        self.failure: Exception | None = None
+        self.ill: Exception | None = None
+        self._now = now
+
+    def run(self) -> None:
+        """Run the requests; their results and errors are stored in them."""
+        for request in self.requests:
+            try:
+                if type(request) is WriteBatch:
+                    self._write(request)
+                elif type(request) is WriteTogether:
+                    self._write_together(request)
+                else:
+                    request.result = self._do(request, self.legs[0])
+            except Exception as error:  # any error is the answer to the caller
+                refuse(request, error)
+            if self.torn:  # later requests would see a part of a batch
+                return
+
+    def changes(self) -> list[Change]:
+        """The changes to commit."""
+        if len(self.legs) == 1:
+            return self.legs[0].changes()
+        return [change for leg in self.legs for change in leg.changes()]
+
+    def landed(self, found: list[HullState | None]) -> bool:
+        """Whether the trip was committed, given the state of each hull in the storage: it has all changes, or none."""
+        return all(leg.landed(state) for leg, state in zip(self.legs, found, strict=True))
+
+    def _do(self, request: Request, leg: Leg) -> object:
         match request:
             case ReadHull():
-                return self._read(request)
+                return _read(request, leg)
             case CreateHull():
-                if self.after is not None:
-                    raise HullExistsError(self.name)
-                self.after = self._new_hull(request)
-                return self.after
+                if leg.after is not None:
+                    raise HullExistsError(leg.name)
+                leg.after = self._new_hull(request, leg)
+                return leg.after
+            case Expire():
+                self._expire(request, leg)
+                return None
             case DeleteHull():
-                if self.after is None:
-                    raise HullNotFoundError(self.name)
-                if self.after is not self.before:
+                if leg.after is None:
+                    raise HullNotFoundError(leg.name)
+                if leg.after is not leg.before:
                     raise AssertionError("a hull is deleted in a trip of its own")
-                self.after = None
+                leg.after = None
                 return None
         raise AssertionError(f"not a request: {request}")
 
     def _write(self, request: WriteBatch) -> None:
-        stream, hull = request.stream, self.after
+        leg = self.legs[0]
+        stream, hull = request.stream, leg.after
         if stream is not None and stream.stopped:
             request.abandoned = True
             return
         if hull is None:
             if request.birth is None or (stream is not None and stream.hull is not None):
-                raise HullNotFoundError(self.name)
-            hull = self._new_hull(request)
-        applied = write(request, hull, self._now, self._records)
+                raise HullNotFoundError(leg.name)
+            hull = self._new_hull(request, leg)
+        applied = write(request, hull, self._now, leg.records)
         self.torn = hull.state.torn
         if applied is None:
             return
-        self.after = hull
+        leg.after = hull
+        self._count(leg, applied)
+
+    def _write_together(self, request: WriteTogether) -> None:
+        """Apply a batch to each hull. All requests of such a trip name the same hulls, perhaps in another order."""
+        legs = {leg.name: leg for leg in self.legs}
+        ordered = [legs[part.name] for part in request.parts]
+        hulls: list[Hull] = []
+        for index, leg in enumerate(ordered):
+            if leg.after is None:
+                request.refused = index
+                raise HullNotFoundError(leg.name)
+            hulls.append(leg.after)
+        try:
+            request.result = apply_together(request, hulls, [leg.records for leg in ordered], self._now)
+        finally:
+            self.torn = any(hull.state.torn for hull in hulls)
+        for leg, applied in zip(ordered, request.result, strict=True):
+            self._count(leg, applied)
+
+    def _count(self, leg: Leg, applied: Applied) -> None:
         if not applied.duplicate:
             self.applied = True
-            self.unsaved += applied.inserted + applied.deleted
+            leg.unsaved += applied.inserted + applied.moved + applied.deleted
 
-    def _read(self, request: ReadHull) -> object:
-        hull = self.after
-        if hull is None or request.hull is not hull:
-            raise HullNotFoundError(self.name)
-        return hull.state.counts, request.function(hull.state)
+    def _expire(self, request: Expire, leg: Leg) -> None:
+        hull = leg.after
+        if hull is None or hull is not request.hull:
+            return
+        try:
+            self.applied |= hull.state.expire(request.time, leg.records)
+        finally:
+            self.torn = hull.state.torn
 
-    def _new_hull(self, request: CreateHull | WriteBatch) -> Hull:
-        place, birth = self._place, request.birth
+    def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
+        place, birth = self.place, request.birth
+        assert place is not None  # the hull is missing, so it may be created
         if place.refusal is not None:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
-        settings = request.settings if type(request) is CreateHull else DEFAULT
-        row = HullRow(place.number, self.name, birth.uid, birth.created, settings)
+        settings = request.settings if isinstance(request, CreateHull) else settings_for(request.make())
+        row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
         return Hull(row, HullState(place.limits, settings, Kept(), self._now))
+
+
+def settings_for(batch: Batch | KeyedBatch) -> HullSettings:
+    """The settings of a hull that its first batch creates: keyed if the batch names keys."""
+    return HullSettings(batch.kind) if isinstance(batch, KeyedBatch) else DEFAULT
+
+
+def _read(request: ReadHull, leg: Leg) -> object:
+    hull = leg.after
+    if hull is None or request.hull is not hull:
+        raise HullNotFoundError(leg.name)
+    return hull.state.counts, request.function(hull.state)
 
 
 def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:

@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..durations import duration
+
 if TYPE_CHECKING:
+    from datetime import timedelta
+
     from .scene import Scene
 
 # Snow: the longest mean delay of the year, 180 flights cancelled.
@@ -36,16 +40,24 @@ def demo(
     ] = None,
     time: Annotated[str | None, typer.Option(help="Column to order by: one batch for each value.")] = None,
     batches: Annotated[int, typer.Option(min=1, help="Without --time: number of batches to cut the file into.")] = 100,
+    window: Annotated[
+        str | None,
+        typer.Option(
+            help="Replay all positions of the last 30m (or 90s, 2h) in place of the latest ones: points without keys, "
+            "which the server removes when they are that old."
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(dir_okay=False, help="PNG file to write the picture to.")] = Path(
         "dynhull-demo.png"
     ),
 ) -> None:
     """Replay real points through a real server and verify every step.
 
-    The command starts a server of its own and streams one batch per minute of the day: each flight is deleted where it
-    was and inserted where it is. A watcher follows. After every batch the command compares the live hull with Chan's
-    static recomputation and with the watcher's copy. It ends with VERIFIED and exit code 0, or with the first
-    difference and exit code 1.
+    The command starts a server of its own and sends one batch per minute of the day, which puts each flight, by its
+    number, where it is, and removes those that have landed. The server names the corners of the hull. A watcher
+    follows. After every batch the command compares the live hull with Chan's static recomputation, its keys and their
+    positions with those sent, and the watcher's copy with the live hull. It ends with VERIFIED and exit code 0, or with
+    the first difference and exit code 1.
 
     Your own points: dynhull demo --points fleet.csv --x lon --y lat --id vehicle --time minute
     """
@@ -58,7 +70,7 @@ def demo(
 
     console = Console(highlight=False, soft_wrap=True)
     try:
-        scene = _scene(day, points, x, y, identity, time, batches)
+        scene = _scene(day, points, x, y, identity, time, batches, duration(window, "--window"))
         verified = show(console, scene, out)
     except (ValueError, OSError, RuntimeError, DynhullError) as error:
         message = Text.assemble(("error: ", "red"), str(error))
@@ -76,11 +88,19 @@ def _scene(
     identity: str | None,
     time: str | None,
     batches: int,
+    max_age: "timedelta | None",
 ) -> "Scene":
     if points is not None:
+        if max_age is not None:
+            raise ValueError("--window is for the flights, not for --points")
         from .table import Table
 
         return Table(points, x, y, identity, time, batches)
     from .flights import Flights  # pandas and pyproj, which a CSV file does not need
 
-    return Flights(day.date())
+    flights = Flights(day.date())
+    if max_age is None:
+        return flights
+    from .window import RecentPositions
+
+    return RecentPositions(flights, max_age)

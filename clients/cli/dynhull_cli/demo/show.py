@@ -40,9 +40,12 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
     if largest and len(largest.vertices):
         from .picture import draw  # matplotlib takes a while to load, and only the end needs it
 
-        draw(out, scene, largest.frame, largest.vertices, largest.area)
+        draw(out, scene, largest)
         console.print(f"Largest at {largest.frame.clock}: {largest.area:,.0f} {scene.area_unit}. Picture: {out}")
-    console.print(f"Live hull compared with Chan's recomputation and with the watcher's copy: {agreed} {scene.step}")
+    what = ", its keys with those that were sent," if scene.keyed else ""
+    console.print(
+        f"Live hull{what} compared with Chan's recomputation and with the watcher's copy: {agreed} {scene.step}"
+    )
     if difference:
         console.print(f"[red]DIFFERENT[/red] at {difference}")
         return False
@@ -51,7 +54,7 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
 
 
 def _line(scene: Scene, step: Step) -> str:
-    names = step.frame.names_at(step.vertices)
+    names = step.corners()
     corners = ", ".join(names[:MOST_CORNERS]) + (
         f" and {len(names) - MOST_CORNERS} more" if len(names) > MOST_CORNERS else ""
     )

@@ -8,7 +8,7 @@ from typing import TextIO
 
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
 from ..plural import plural
-from .chunks import BadRow, Chunk, Points
+from .chunks import BadRow, Chunk, Rows
 from .source import Source
 
 
@@ -23,11 +23,11 @@ class BadRows:
         if self._writer is not None:
             self._writer.writerow(["place", "reason", "row"])
 
-    def left_out(self, chunks: Iterable[Chunk]) -> Iterator[Points]:
-        """The points of the chunks."""
+    def left_out(self, chunks: Iterable[Chunk]) -> Iterator[Rows]:
+        """The good rows of the chunks."""
         for chunk in chunks:
             self._add(chunk.bad)
-            yield chunk.points
+            yield chunk.rows
 
     def report(self) -> list[str]:
         """Lines for the user: how many there are, and the first ones."""

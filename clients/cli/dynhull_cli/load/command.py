@@ -8,6 +8,7 @@ import typer
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..plural import plural
+from ..times import TimeUnit
 from .options import STANDARD_INPUT, Format, Options
 
 if TYPE_CHECKING:
@@ -59,6 +60,16 @@ def load(
         bool,
         _input("Take the vertices of lines, polygons and Multi-geometries as points.", "--vertices"),
     ] = False,
+    key: Annotated[
+        str | None, _input("Column of keys, which the points get; a row whose key is known moves it. GeoJSON: or id.")
+    ] = None,
+    time: Annotated[
+        str | None,
+        _input("Column of event times: ISO 8601 with a time zone, or numbers since 1970."),
+    ] = None,
+    time_unit: Annotated[
+        TimeUnit | None, _input("Unit of times that are numbers. Default: by the size of the first one; printed.")
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Read everything and report it. Needs no server and changes nothing.")
     ] = False,
@@ -88,14 +99,26 @@ def load(
     loaded before is refused unless --again or --replace is given. Memory does not grow with the file.
 
     While --replace loads, readers see the hull without points, then with a part of them.
+
+        dynhull create vehicles --keyed str --max-age 30m --clock data
+        dynhull load vehicles positions.csv --key id --time seen
+
+    With --key, each row puts its key: a row for a known key moves it, and rows are applied in the order of the file. A
+    missing hull is created with keys that are strings; create it before the load if it shall have other settings.
     """
     from .bad_rows import BadRows, open_bad_rows
     from .loading import load_points, producer_name, report_reading, require_readable
     from .source import open_source
 
     _check(decimal, replace=replace, resume=resume, again=again)
-    options = Options(x, y, delimiter, decimal, header, encoding, vertices)
-    with open_source(file, format, options) as source, open_bad_rows(bad_rows, source) as bad_file:
+    if time_unit is not None and time is None:
+        raise ValueError("--time-unit is given with --time")
+    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit)
+    integers = not dry_run and key is not None and _has_integer_keys(client, name)
+    with (
+        open_source(file, format, options, integer_keys=integers) as source,
+        open_bad_rows(bad_rows, source) as bad_file,
+    ):
         bad = BadRows(bad_file, max_bad)
         if dry_run:
             report_reading(name, source, bad, as_json)
@@ -112,6 +135,16 @@ def load(
         typer.echo(
             f"{name}: {plural(loaded, 'point')} loaded" + ("" if points is None else f", {points:,} in the hull")
         )
+
+
+def _has_integer_keys(client: "HullClient", name: str) -> bool:
+    """Whether the keys of the hull are integers. ValueError if it has none."""
+    from ..keyed_rows import key_type_of
+
+    known, keyed = key_type_of(client, name)
+    if known and keyed is None:
+        raise ValueError(f"the points of {name!r} have no keys: leave out --key, or load into another hull")
+    return keyed == "int"
 
 
 def _check(decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from itertools import chain
 from time import monotonic
+from typing import TYPE_CHECKING
 
 import numpy as np
 import typer
@@ -15,8 +16,13 @@ from dynhull_client import Applied, DynhullError, HullClient, HullExistsError, H
 from ..json_lines import json_line
 from ..plural import plural
 from .bad_rows import BadRows
-from .chunks import Points, blocks
+from .chunks import Points, Rows, blocks
 from .source import Source
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    from dynhull.keys import KeyType
 
 BATCH_POINTS = 8192  # part of the promise of --resume: the number of a batch says which points are in it
 PRODUCER_DIGITS = 32  # of the file's digest
@@ -78,7 +84,7 @@ def load_points(
         if first is None:
             raise ValueError(_no_points(source, bad))
         _print_notes(source.notes)
-        _make(client, name, silent=resume, replace=replace)
+        _make(client, name, source, silent=resume, replace=replace)
         writer = client.writer(
             name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
         )
@@ -96,7 +102,7 @@ def _read_through(source: Source, bad: BadRows) -> tuple[int, Points]:
     count = 0
     corners = np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
     with closing(source.chunks()) as chunks, _progress(source) as read:
-        for points in bad.left_out(chunks):
+        for points in (rows.points for rows in bad.left_out(chunks)):
             count += len(points)
             read(len(points))
             if len(points):
@@ -115,21 +121,24 @@ def _print_notes(notes: Iterable[str]) -> None:
         typer.echo(note, err=True)
 
 
-def _make(client: HullClient, name: str, *, silent: bool, replace: bool) -> None:
+def _make(client: HullClient, name: str, source: Source, *, silent: bool, replace: bool) -> None:
+    keyed: KeyType | None = None
+    if source.options.key is not None:
+        keyed = "int" if source.integer_keys else "str"
     if replace:
         try:
             client.delete_hull(name)
         except HullNotFoundError:
             typer.echo(f"there is no hull {name!r} to replace: creating it", err=True)
     try:
-        client.create_hull(name)
+        client.create_hull(name, keyed=keyed)
     except HullExistsError as known:
         if not silent:
             typer.echo(f"{known}: adding to it", err=True)
 
 
 def _send(
-    writer: Writer, batches: Iterable[Points], resume: bool, read: Callable[[int], None]
+    writer: Writer, batches: Iterable[Rows], resume: bool, read: Callable[[int], None]
 ) -> tuple[int, Applied | None]:
     """Send each batch that was not applied before; returns the number of points sent and the last outcome."""
     loaded, outcome = 0, None
@@ -140,13 +149,19 @@ def _send(
                 "loaded before, at least in part: --resume loads what is missing, --again all points once more, "
                 "--replace deletes the hull first"
             )
-        for number, points in enumerate(batches, start=1):
+        for number, rows in enumerate(batches, start=1):
             if number > known:
-                outcome = writer.put(insert=points)
-                loaded += len(points)
-            read(len(points))
+                outcome = _put(writer, rows)
+                loaded += len(rows)
+            read(len(rows))
         writer.flush()
     return loaded, None if outcome is None else outcome.result()
+
+
+def _put(writer: Writer, rows: Rows) -> "Future[Applied]":
+    if rows.keys is None:
+        return writer.put(insert=rows.points, times=rows.times)
+    return writer.put(keys=rows.keys, points=rows.points, times=rows.times)
 
 
 @contextmanager

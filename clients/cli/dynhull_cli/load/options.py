@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from ..times import TimeUnit
+
 STANDARD_INPUT = "-"
 
 
@@ -29,6 +31,9 @@ class Options:
         header: whether the first row of CSV names the columns.
         encoding: the encoding of CSV.
         vertices: whether to take the vertices of geometries other than single points.
+        key: the column or member of the keys; None for points without keys.
+        time: the column or member of the times; None for points without times.
+        time_unit: the unit of times that are numbers.
     """
 
     x: str | None = None
@@ -38,3 +43,6 @@ class Options:
     header: bool | None = None
     encoding: str | None = None
     vertices: bool = False
+    key: str | None = None
+    time: str | None = None
+    time_unit: TimeUnit | None = None

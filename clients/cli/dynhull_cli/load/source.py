@@ -29,6 +29,9 @@ APPLIES_TO = {
     "header": TABLES,
     "encoding": TABLES,
     "vertices": set(Format) - TABLES,
+    "key": set(Format),
+    "time": set(Format),
+    "time_unit": set(Format),
 }
 
 
@@ -43,6 +46,7 @@ class Source:
         size: how many these are; None for a pipe.
         format: its format.
         options: how to read it.
+        integer_keys: whether keys are integers.
         notes: lines about what was detected while reading and may surprise.
     """
 
@@ -52,6 +56,7 @@ class Source:
     size: int | None
     format: Format
     options: Options
+    integer_keys: bool = False
     notes: list[str] = field(default_factory=list)
 
     def chunks(self) -> Chunks:
@@ -92,7 +97,7 @@ Reader = Callable[[Source], Chunks]
 
 
 @contextmanager
-def open_source(name: str, kind: Format | None, options: Options) -> Iterator[Source]:
+def open_source(name: str, kind: Format | None, options: Options, *, integer_keys: bool = False) -> Iterator[Source]:
     """Open a file, or standard input for "-". Without a `kind`, the suffix of the name decides; standard input is CSV.
 
     ValueError if the format is unknown, an option does not apply to it, or the compressed data is damaged.
@@ -101,20 +106,20 @@ def open_source(name: str, kind: Format | None, options: Options) -> Iterator[So
     for option in _given(options):
         if kind not in APPLIES_TO[option]:
             formats = ", ".join(each for each in Format if each in APPLIES_TO[option])
-            raise ValueError(f"--{option} is for {formats}, not for {kind}")
+            raise ValueError(f"--{option.replace('_', '-')} is for {formats}, not for {kind}")
     try:
         if name == STANDARD_INPUT:
             raw: Any = getattr(sys.stdin.buffer, "raw", sys.stdin.buffer)
             stdin = io.BufferedReader(raw)
             try:
-                yield _source("standard input", stdin, None, kind, options)
+                yield _source("standard input", stdin, None, kind, options, integer_keys)
             finally:
                 stdin.detach()
         else:
             path = Path(name)
             with path.open("rb") as file:
                 size = path.stat().st_size if path.is_file() else None
-                yield _source(name, file, size, kind, options)
+                yield _source(name, file, size, kind, options, integer_keys)
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise ValueError(f"{name}: the compressed data is damaged: {error}") from None
 
@@ -128,7 +133,9 @@ def _format_of(name: str) -> Format:
     return SUFFIXES[suffix]
 
 
-def _source(name: str, stored: IO[bytes], size: int | None, kind: Format, options: Options) -> Source:
+def _source(
+    name: str, stored: IO[bytes], size: int | None, kind: Format, options: Options, integer_keys: bool
+) -> Source:
     file = stored
     if peek(stored, len(GZIP_MARK)) == GZIP_MARK:
         if kind is Format.PARQUET:
@@ -136,7 +143,7 @@ def _source(name: str, stored: IO[bytes], size: int | None, kind: Format, option
         file = cast("IO[bytes]", gzip.GzipFile(fileobj=stored))
     if kind not in TABLES and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
         raise ValueError(f"{name} is UTF-16, and JSON is UTF-8: convert it with iconv -f UTF-16 -t UTF-8")
-    return Source(name, file, stored, size, kind, options)
+    return Source(name, file, stored, size, kind, options, integer_keys)
 
 
 def _given(options: Options) -> dict[str, object]:

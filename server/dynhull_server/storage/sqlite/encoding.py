@@ -1,49 +1,53 @@
-"""Rows as bytes, and their checksums."""
+"""Records as bytes, and the checksums of rows.
+
+A payload is a sequence of records: a header, the name of the producer, the hull's clock, and the columns of the rows.
+What is optional has a flag in the header. Records of the formats 1 and 2 have no flags but LENIENT.
+"""
 
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
 
-import numpy as np
+from dynhull.keys import PackedKeys
 
-from dynhull.arrays import Points
+from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows
+from .columns import Cursor, key_bytes, point_bytes, time_bytes
 
-from ...state.records import HullRow, PointRows, Record
-
-# The numbers of inserts and of deletes, the sequence number, the length of the producer's name, whether lenient.
+# The number of points inserted, keys put or points expired; that of points deleted or keys removed; the sequence
+# number; the length of the producer's name; the flags.
 HEADER = struct.Struct("<IIQHB")
-POINT_BYTES = 16
+TIME = struct.Struct("<q")
+
+LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
+KINDS = 48  # the flags with the kind of the rows
+POINTS, STRINGS, INTEGERS, EXPIRY = 0, 16, 32, 48
+CONDITIONS: dict[Condition | None, int] = {None: 0, "absent": 64, "present": 128}
+CONDITION_OF = {flags: condition for condition, flags in CONDITIONS.items()}
+CONDITION_FLAGS = 192
 
 
 def encode(records: Iterable[Record]) -> bytes:
-    """Records of consecutive revisions as one payload."""
+    """Records of consecutive revisions as one payload. O(size of the payload)."""
     parts = []
     for record in records:
         producer = record.producer.encode()
-        rows = record.rows
-        assert isinstance(rows, PointRows)
-        sizes = len(rows.inserts), len(rows.deletes)
-        parts.append(HEADER.pack(*sizes, record.sequence, len(producer), rows.lenient))
-        parts += [producer, point_bytes(rows.inserts), point_bytes(rows.deletes)]
+        added, removed, flags, columns = _encoded(record.rows)
+        if record.clock is not None:
+            flags |= HAS_CLOCK
+            columns.insert(0, TIME.pack(record.clock))
+        parts += [HEADER.pack(added, removed, record.sequence, len(producer), flags), producer, *columns]
     return b"".join(parts)
 
 
 def decode(payload: bytes, revision: int) -> Iterator[Record]:
     """The records of a payload; `revision` is that of the first. ValueError if the bytes are no records."""
-    position = 0
-    while position < len(payload):
-        if position + HEADER.size > len(payload):
-            raise ValueError(f"a header is cut short at byte {position}")
-        inserts, deletes, sequence, name, lenient = HEADER.unpack_from(payload, position)
-        start = position + HEADER.size + name
-        middle = start + inserts * POINT_BYTES
-        end = middle + deletes * POINT_BYTES
-        if end > len(payload):
-            raise ValueError(f"a record is cut short at byte {position}")
-        producer = payload[position + HEADER.size : start].decode()
-        inserted, deleted = points_from(payload[start:middle]), points_from(payload[middle:end])
-        yield Record(revision, PointRows(inserted, deleted, bool(lenient)), producer, sequence)
-        position, revision = end, revision + 1
+    cursor = Cursor(payload)
+    while not cursor.at_end:
+        added, removed, sequence, name, flags = HEADER.unpack(cursor.take(HEADER.size))
+        producer = str(cursor.take(name), "utf-8")
+        clock = _time(cursor) if flags & HAS_CLOCK else None
+        yield Record(revision, _decoded(cursor, added, removed, flags), producer, sequence, clock)
+        revision += 1
 
 
 def checksum(payload: bytes, *keys: int) -> int:
@@ -56,17 +60,53 @@ def weight(stored: int, *keys: int) -> int:
     return checksum(b"", *keys, stored)
 
 
-def hull_checksum(row: HullRow) -> int:
-    """CRC-32 of the row of a hull."""
-    text = f"{row.name}\n{row.uid}".encode()
-    return checksum(text + struct.pack("<d", row.created), row.number, row.settings.max_points)
+def _encoded(rows: Rows) -> tuple[int, int, int, list[bytes]]:
+    """The two numbers of rows, the flags and the columns."""
+    if isinstance(rows, PointRows):
+        inserts, deletes = rows.inserts, rows.deletes
+        flags = LENIENT if rows.lenient else 0
+        columns = [point_bytes(inserts), point_bytes(deletes)]
+        if rows.times is not None:
+            flags |= HAS_TIMES
+            columns.append(time_bytes(rows.times))
+        return len(inserts), len(deletes), flags, columns
+    if isinstance(rows, KeyRows):
+        return len(rows.keys), len(rows.removes), *_encoded_keys(rows)
+    if rows.until is None:
+        return rows.points, 0, EXPIRY, []
+    return rows.points, 0, EXPIRY | HAS_TIMES, [TIME.pack(rows.until)]
 
 
-def point_bytes(points: Points) -> bytes:
-    """(n, 2) points as 16 n bytes."""
-    return np.ascontiguousarray(points, dtype="<f8").tobytes()
+def _encoded_keys(rows: KeyRows) -> tuple[int, list[bytes]]:
+    strings = isinstance(rows.keys, PackedKeys)
+    if isinstance(rows.removes, PackedKeys) != strings:
+        raise TypeError("the keys to put and to remove are of different kinds")
+    flags = (STRINGS if strings else INTEGERS) | CONDITIONS[rows.condition]
+    columns = [key_bytes(rows.keys), key_bytes(rows.removes), point_bytes(rows.points)]
+    for flag, times in ((HAS_TIMES, rows.times), (HAS_DEADLINES, rows.deadlines)):
+        if times is not None:
+            flags |= flag
+            columns.append(time_bytes(times))
+    return flags, columns
 
 
-def points_from(data: bytes) -> Points:
-    """The inverse of `point_bytes`."""
-    return np.frombuffer(data, dtype="<f8").reshape(-1, 2).astype(np.float64, copy=False)
+def _decoded(cursor: Cursor, added: int, removed: int, flags: int) -> Rows:
+    kind = flags & KINDS
+    if kind == EXPIRY:
+        return Expiry(_time(cursor) if flags & HAS_TIMES else None, added)
+    if kind == POINTS:
+        inserts, deletes = cursor.points(added), cursor.points(removed)
+        times = cursor.times(added) if flags & HAS_TIMES else None
+        return PointRows(inserts, deletes, bool(flags & LENIENT), times)
+    read = cursor.strings if kind == STRINGS else cursor.integers
+    keys, removes, points = read(added), read(removed), cursor.points(added)
+    times = cursor.times(added) if flags & HAS_TIMES else None
+    deadlines = cursor.times(added) if flags & HAS_DEADLINES else None
+    if flags & CONDITION_FLAGS not in CONDITION_OF:
+        raise ValueError(f"a record has the unknown flags {flags:#x}")
+    return KeyRows(keys, points, removes, times, deadlines, CONDITION_OF[flags & CONDITION_FLAGS])
+
+
+def _time(cursor: Cursor) -> int:
+    (time,) = TIME.unpack(cursor.take(TIME.size))
+    return int(time)

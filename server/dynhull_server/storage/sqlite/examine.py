@@ -1,6 +1,5 @@
 """Examination of a database: is all data present and intact, and which rows belong to which hull?"""
 
-import json
 import sqlite3
 import struct
 from array import array
@@ -13,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ...state.records import HullRow, HullSettings
 from ..port import DamagedError, FormatError, Progress
-from .encoding import checksum, hull_checksum, weight
+from .encoding import checksum, weight
+from .hull_rows import found_hulls, values
 from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
 from .schema import APPLICATION_ID, FORMAT, PAGE_BYTES, SCHEMAS, found
 from .totals import Totals, read_totals
@@ -135,7 +134,7 @@ def _check_structure(connection: sqlite3.Connection, version: int, findings: Fin
         if connection.execute(f"PRAGMA {name}").fetchone() != (expected,):
             findings.fatal.append(f"the database's header is damaged ({name})")
     # Format 1 is read through its indexes, which must agree with the tables.
-    check = "quick_check" if version == FORMAT else "integrity_check"
+    check = "integrity_check" if version == 1 else "quick_check"
     messages = [text for (text,) in connection.execute(f"PRAGMA {check}({MOST_MESSAGES})")]
     if messages != ["ok"]:
         findings.fatal.append("; ".join(" ".join(text.split()) for text in messages))
@@ -163,13 +162,12 @@ class _Examination:
         self._done = self._all = 0
         self._newest_snapshot = MISSING
         self._next_number = 1
+        self._renewed = 0  # checksums of the rows of hulls in the present format, less the stored ones
 
     def run(self) -> None:
         """Read everything once."""
         totals = self._totals()
-        for row in self._hull_rows():
-            rows = self._ledger.hulls[row.number] = HullRows(row, hull_checksum(row))
-            self._hulls[row.number] = _Scanned(rows)
+        self._hull_rows()
         self._snapshots()
         self._chunks()
         self._batches()
@@ -182,7 +180,7 @@ class _Examination:
         (chunks,) = self._connection.execute("SELECT count(*) FROM chunks").fetchone()
         self._all = batches + chunks
         self._progress(0, self._all)
-        if self._version < FORMAT:
+        if self._version == 1:
             return None
         totals, self._findings.both_totals = read_totals(self._connection)
         if totals is None:
@@ -195,12 +193,16 @@ class _Examination:
             )
         return totals
 
-    def _hull_rows(self) -> Iterator[HullRow]:
-        for row, whole in hull_rows(self._connection, self._version):
-            if not whole:
+    def _hull_rows(self) -> None:
+        for hull in found_hulls(self._connection, self._version):
+            row = hull.row
+            if not hull.whole:
                 self._findings.damaged.add(row.number)
                 self._findings.fatal.append(f"the row of hull {row.number}, {row.name!r}, is damaged")
-            yield row
+            *_, renewed = values(row)
+            self._renewed += renewed - hull.checksum
+            rows = self._ledger.hulls[row.number] = HullRows(row, renewed)
+            self._hulls[row.number] = _Scanned(rows)
 
     def _snapshots(self) -> None:
         query = "SELECT id, hull, revision, chunks, state, checksum FROM snapshots ORDER BY id"
@@ -270,8 +272,13 @@ class _Examination:
         hulls = self._ledger.hulls.values()
         there = Totals(next_number=max([self._next_number, *(number + 1 for number in self._ledger.hulls)]))
         there = there.plus(len(hulls), sum(len(hull.ids) for hull in hulls), sum(hull.sum for hull in hulls))
-        self._ledger.totals = totals or there
-        if totals is not None and (totals.hulls, totals.batches, totals.sum) != (there.hulls, there.batches, there.sum):
+        self._ledger.totals = (totals or there)._replace(sum=there.sum)
+        stored = there.plus(0, 0, -self._renewed)
+        if totals is not None and (totals.hulls, totals.batches, totals.sum) != (
+            there.hulls,
+            there.batches,
+            stored.sum,
+        ):
             self._findings.fatal.append(
                 f"the totals record {totals.hulls} hulls with {totals.batches} rows of batches, the tables have "
                 f"{there.hulls} with {there.batches}, or different ones: rows are missing, or log and database do not "
@@ -332,26 +339,6 @@ class _Examination:
             self._findings.blame(hull, text, fatal=False)
             self._findings.repairs.append(DropSnapshot(hull.row.number, snapshot))
         return max((snapshot.revision for snapshot in hull.snapshots if snapshot not in lost), default=0)
-
-
-def hull_rows(connection: sqlite3.Connection, version: int) -> Iterator[tuple[HullRow, bool]]:
-    """The hulls, and whether each row is intact."""
-    if version == FORMAT:
-        rows = connection.execute("SELECT id, name, uid, created, max_points, checksum FROM hulls")
-        for number, name, uid, created, most, stored in rows:
-            row = HullRow(number, name, uid, created, HullSettings(max_points=most))
-            try:
-                yield row, hull_checksum(row) == stored
-            except (AttributeError, TypeError, struct.error):
-                yield HullRow(number, str(row.name), "", 0.0), False
-        return
-    for number, name, created, config in connection.execute("SELECT id, name, created, config FROM hulls"):
-        try:
-            found = json.loads(config)
-            settings = HullSettings(max_points=found["config"]["max_points"])
-            yield HullRow(number, name, found["uid"], created, settings), True
-        except (ValueError, TypeError, KeyError):
-            yield HullRow(number, str(name), "", 0.0), False
 
 
 def _matches(stored: object, payload: Any, *keys: Any) -> bool:

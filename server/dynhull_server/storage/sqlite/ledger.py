@@ -9,7 +9,8 @@ from typing import Any, Self
 
 from ...state.records import Append, Change, Create, Delete, HullRow
 from ..port import NotCommittedError
-from .encoding import checksum, encode, hull_checksum, weight
+from .encoding import checksum, encode, weight
+from .hull_rows import values
 from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
 from .totals import Totals
 
@@ -229,14 +230,12 @@ class Group:
     def _create(self, row: HullRow) -> None:
         if self._hull(row.number):
             raise NotCommittedError(f"hull {row.number} already exists")
-        stored = hull_checksum(row)
+        *columns, stored = values(row)
         rows = HullRows(row, stored)
         self._now[row.number] = _Now(rows, 0, stored, 0)
         next_number = max(self._totals.next_number, row.number + 1)
         self._totals = self._totals.plus(1, 0, stored)._replace(next_number=next_number)
-        self.statements.append(
-            (INSERT_HULL, (row.number, row.name, row.uid, row.created, row.settings.max_points, stored))
-        )
+        self.statements.append((INSERT_HULL, (*columns, stored)))
         self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
 
     def _append(self, change: Append) -> None:

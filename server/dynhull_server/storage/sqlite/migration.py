@@ -2,7 +2,7 @@
 
 import sqlite3
 
-from .encoding import hull_checksum
+from .hull_rows import values
 from .ledger import Ledger
 from .schema import INSERT_HULL, TABLES, stamp
 from .totals import Totals, renew_totals
@@ -16,22 +16,20 @@ def make_tables(connection: sqlite3.Connection) -> None:
     stamp(connection)
 
 
-def migrate(connection: sqlite3.Connection, ledger: Ledger) -> None:
-    """Migrate a database of format 1. Batches and snapshots are not rewritten.
+def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger) -> None:
+    """Migrate a database of an older format. O(number of hulls): batches and snapshots are not rewritten.
 
     Args:
         connection: a connection to the database.
+        version: its format.
         ledger: its rows.
     """
-    for index in ("batches_by_revision", "chunks_by_number"):
-        connection.execute(f"DROP INDEX {index}")
+    if version == 1:
+        for index in ("batches_by_revision", "chunks_by_number"):
+            connection.execute(f"DROP INDEX {index}")
+        connection.execute(TABLES["totals"])
     connection.execute("DROP TABLE hulls")
-    for table in ("hulls", "totals"):
-        connection.execute(TABLES[table])
-    rows = (hull.row for hull in ledger.hulls.values())
-    connection.executemany(
-        INSERT_HULL,
-        ((row.number, row.name, row.uid, row.created, row.settings.max_points, hull_checksum(row)) for row in rows),
-    )
+    connection.execute(TABLES["hulls"])
+    connection.executemany(INSERT_HULL, (values(hull.row) for hull in ledger.hulls.values()))
     renew_totals(connection, ledger.totals)
     stamp(connection)

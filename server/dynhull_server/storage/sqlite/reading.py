@@ -8,11 +8,10 @@ from contextlib import contextmanager
 from threading import Condition
 from typing import Any
 
-import numpy as np
-
-from ...state.records import Contents, Kept, Record
+from ...state.records import Kept, Record
 from ..port import DamagedError
-from .encoding import checksum, decode, points_from
+from .chunks import joined, state_from
+from .encoding import checksum, decode
 from .ledger import HullRows, Snapshot
 
 ROWS_A_QUERY = 1000
@@ -134,15 +133,16 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
     row = connection.execute(query, keys).fetchone()
     if row is None or checksum(row[0], *keys) != row[1]:
         return None
-    parts = [np.empty((0, 2))]
+    producers, clock, decode_chunk = state_from(row[0])
+    parts = []
     found = rows_by_id(connection, "number, checksum, points", "chunks", array("q", snapshot.chunks))
     for expected, (number, stored, data) in enumerate(found):
         if number != expected or checksum(data, snapshot.id, number) != stored:
             return None
-        parts.append(points_from(data))
-    if len(parts) != len(snapshot.chunks) + 1:
+        parts.append(decode_chunk(data))
+    if len(parts) != len(snapshot.chunks):
         return None
-    return Kept(snapshot.revision, Contents(np.concatenate(parts)), json.loads(row[0] or "{}"))
+    return Kept(snapshot.revision, joined(parts), producers, clock=clock)
 
 
 def _batches(connection: sqlite3.Connection, hull: HullRows, ids: "array[int]") -> Iterable[Iterable[Record]]:

@@ -3,7 +3,7 @@
 import sqlite3
 
 APPLICATION_ID = 0x64796E68  # "dynh"
-FORMAT = 2
+FORMAT = 3
 PAGE_BYTES = 8192  # a large batch spans several pages, and wastes half of one
 
 TABLES = {
@@ -33,7 +33,7 @@ TABLES = {
     name TEXT NOT NULL,
     uid TEXT NOT NULL,
     created REAL NOT NULL,
-    max_points INTEGER NOT NULL,
+    settings TEXT NOT NULL,
     checksum INTEGER NOT NULL
 )""",
     "totals": """CREATE TABLE totals (
@@ -48,6 +48,17 @@ TABLES = {
 )""",
 }
 
+# Format 2 had one setting of a hull, and in batches and snapshots neither keys nor times.
+FORMAT_2 = TABLES | {
+    "hulls": """CREATE TABLE hulls (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL,
+    uid TEXT NOT NULL,
+    created REAL NOT NULL,
+    max_points INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)"""
+}
 # Format 1 had a blob for the settings of a hull, no totals, and indexes.
 FORMAT_1 = {
     "hulls": """CREATE TABLE hulls (
@@ -63,9 +74,9 @@ FORMAT_1 = {
     "chunks": TABLES["chunks"],
     "chunks_by_number": "CREATE UNIQUE INDEX chunks_by_number ON chunks (snapshot, number)",
 }
-SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {1: FORMAT_1, FORMAT: TABLES}
+SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {1: FORMAT_1, 2: FORMAT_2, FORMAT: TABLES}
 
-INSERT_HULL = "INSERT INTO hulls (id, name, uid, created, max_points, checksum) VALUES (?, ?, ?, ?, ?, ?)"
+INSERT_HULL = "INSERT INTO hulls (id, name, uid, created, settings, checksum) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_BATCH = "INSERT INTO batches (rowid, hull, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_CHUNK = "INSERT INTO chunks (rowid, snapshot, number, checksum, points) VALUES (?, ?, ?, ?, ?)"
 INSERT_SNAPSHOT = "INSERT INTO snapshots (id, hull, revision, chunks, state, checksum) VALUES (?, ?, ?, ?, ?, ?)"

@@ -9,7 +9,6 @@ them. In the second case all of them become invalid, because checksums continue 
 durable, reading shows the outcome.
 """
 
-import json
 import sqlite3
 from array import array
 from collections.abc import Iterator, Sequence
@@ -30,8 +29,9 @@ from ..port import (
     Step,
     StorageError,
 )
+from .chunks import chunk, starts, state
 from .disk import Access, Disk
-from .encoding import point_bytes, weight
+from .encoding import weight
 from .examine import Findings, examine, format_of, load
 from .folder import Folder
 from .ledger import (
@@ -51,7 +51,6 @@ from .reading import Readers, begin, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
 from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
-CHUNK_POINTS = 32_768  # half a megabyte: a commit that delays later ones only briefly
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
 
 CHECKPOINT_BYTES = 16 * 2**20  # the size of the log that starts a checkpoint
@@ -251,15 +250,15 @@ class SQLiteStorage:
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
         """Write a snapshot, then drop the rows it supersedes."""
-        points = kept.contents.points
-        starts = range(0, len(points), CHUNK_POINTS)
-        ids = [next(self._ledger.chunk_ids) for _ in starts]
+        contents = kept.contents
+        firsts = starts(contents)
+        ids = [next(self._ledger.chunk_ids) for _ in firsts]
         snapshot = Snapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
         self._under_way[snapshot.id] = set(ids)
         try:
-            for i, (place, start) in enumerate(zip(ids, starts, strict=True)):
-                yield Chunk(place, snapshot.id, i, point_bytes(points[start : start + CHUNK_POINTS]))
-            yield Finish(number, snapshot, json.dumps(kept.producers).encode())
+            for i, (place, first, end) in enumerate(zip(ids, firsts, [*firsts[1:], len(contents)], strict=True)):
+                yield Chunk(place, snapshot.id, i, chunk(contents, slice(first, end)))
+            yield Finish(number, snapshot, state(kept))
         finally:
             del self._under_way[snapshot.id]
         yield from self._trim(number)
@@ -386,7 +385,7 @@ class SQLiteStorage:
         self._ledger = findings.ledger
         connection.execute("BEGIN IMMEDIATE")
         if version < FORMAT:
-            migrate(connection, findings.ledger)
+            migrate(connection, version, findings.ledger)
         elif not findings.both_totals:
             renew_totals(connection, findings.ledger.totals)
         connection.execute("COMMIT")

@@ -1,0 +1,196 @@
+"""Conversion of batches, their keys and times."""
+
+import numpy as np
+
+from dynhull.keys import PackedKeys
+from dynhull_proto.v1 import batch_pb2, points_pb2
+
+from ..state.admission import GREATEST_TIME, shown
+from ..state.batch import NO_POINTS, Batch, KeyedBatch
+from ..state.records import Condition, Keys, Times
+from .decode import InvalidFieldError, decode_points
+from .decode_settings import MICROSECONDS, NANOSECONDS, decode_duration
+
+MISSING_POINT_POLICIES = frozenset(batch_pb2.MissingPointPolicy.values())
+MISSING_KEY_POLICIES = frozenset(batch_pb2.MissingKeyPolicy.values())
+CONDITIONS: dict[int, Condition | None] = {
+    batch_pb2.PUT_CONDITION_UNSPECIFIED: None,
+    batch_pb2.PUT_CONDITION_ALWAYS: None,
+    batch_pb2.PUT_CONDITION_IF_ABSENT: "absent",
+    batch_pb2.PUT_CONDITION_IF_PRESENT: "present",
+}
+BYTES_PER_NUMBER = 8
+MOST_KEY_BYTES = 255
+NANOSECONDS_PER_SECOND = 1_000_000_000
+NO_STRINGS, NO_INTEGERS = PackedKeys(b"", b""), np.empty(0, np.uint64)
+
+
+def decode_batch(batch: batch_pb2.Batch) -> Batch | KeyedBatch:
+    """A batch of points, or one of keys."""
+    if batch.missing_points not in MISSING_POINT_POLICIES:
+        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy that this server supports")
+    if batch.missing_keys not in MISSING_KEY_POLICIES:
+        raise InvalidFieldError("batch.missing_keys", batch.missing_keys, "not a policy that this server supports")
+    keyed = _decode_keyed(batch) if batch.HasField("puts") or batch.HasField("removes") else None
+    if keyed is None:
+        return _decode_points(batch)
+    if batch.HasField("inserts") or batch.HasField("deletes") or batch.HasField("moves"):
+        raise InvalidFieldError("batch", "points and keys", "a batch has points without keys, or keys")
+    return keyed
+
+
+def _decode_points(batch: batch_pb2.Batch) -> Batch:
+    """A batch whose moves have equally many origins and destinations."""
+    inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
+    deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
+    times = None
+    if batch.HasField("insert_times"):
+        times = _decode_row_times(batch.insert_times, "batch.insert_times", len(inserts), "inserts")
+    moves = 0
+    if batch.HasField("moves"):
+        origins = decode_points(batch.moves.origins, "batch.moves.origins")
+        destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
+        moves = len(origins)
+        if len(destinations) != moves:
+            problem = f"must be as many as the origins, {moves}"
+            raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
+        inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
+    count_missing = batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT
+    return Batch(inserts, deletes, moves, count_missing, times)
+
+
+def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
+    """A batch of keys; None if it names no key."""
+    puts = batch.puts
+    keys = decode_keys(puts.keys, "batch.puts.keys")
+    points = decode_points(puts.points, "batch.puts.points")
+    rows = 0 if keys is None else len(keys)
+    if len(points) != rows:
+        problem = f"must be as many as the keys, {rows}"
+        raise InvalidFieldError("batch.puts.points", f"{len(points)} points", problem)
+    times = _decode_row_times(puts.times, "batch.puts.times", rows, "keys")
+    deadlines = _decode_row_times(puts.expire_times, "batch.puts.expire_times", rows, "keys")
+    ttl = decode_duration(puts.ttl, "batch.puts.ttl", least=1) if puts.HasField("ttl") else None
+    if ttl is not None and deadlines is not None:
+        raise InvalidFieldError("batch.puts.ttl", "ttl and expire_times", "use one or the other")
+    if puts.condition not in CONDITIONS:
+        raise InvalidFieldError("batch.puts.condition", puts.condition, "not a condition that this server supports")
+    removes = decode_keys(batch.removes, "batch.removes") if batch.HasField("removes") else None
+    known = removes if keys is None else keys
+    if known is None:
+        return None
+    strings = isinstance(known, PackedKeys)
+    if removes is not None and isinstance(removes, PackedKeys) != strings:
+        raise InvalidFieldError("batch.removes", "strings and integers", "all keys of a batch are of one kind")
+    none: Keys = NO_STRINGS if strings else NO_INTEGERS
+    return KeyedBatch(
+        "str" if strings else "int",
+        none if keys is None else keys,
+        points,
+        none if removes is None else removes,
+        times,
+        CONDITIONS[puts.condition],
+        ttl,
+        deadlines,
+        batch.missing_keys == batch_pb2.MISSING_KEY_POLICY_REFUSE,
+    )
+
+
+# Keys
+
+
+def decode_keys(keys: points_pb2.Keys, field: str) -> Keys | None:
+    """The keys of a request; None if there are none."""
+    strings, integers = keys.strings, keys.integers
+    packed_strings, packed_integers = bool(keys.lengths or keys.text), keys.packed_integers
+    if packed_strings + bool(strings) + bool(packed_integers) + bool(integers) > 1:
+        raise InvalidFieldError(field, "several encodings", "use one kind of keys and one encoding")
+    if packed_strings:
+        return _decode_packed(keys.lengths, keys.text, field)
+    if strings:
+        return _decode_strings(list(strings), field)
+    if packed_integers:
+        return np.frombuffer(_whole_numbers(packed_integers, f"{field}.packed_integers"), "<u8").astype(
+            np.uint64, copy=False
+        )
+    return np.array(integers, np.uint64) if integers else None
+
+
+def _decode_packed(lengths: bytes, text: bytes, field: str) -> PackedKeys:
+    try:
+        return PackedKeys(lengths, text)
+    except ValueError:
+        pass
+    if sum(lengths) != len(text):
+        problem = f"must add up to the bytes of text, {len(text)}"
+        raise InvalidFieldError(f"{field}.lengths", f"{sum(lengths)} bytes", problem)
+    start = 0
+    for row, length in enumerate(lengths):
+        key = text[start : start + length]
+        start += length
+        try:
+            bad = not key.decode()
+        except UnicodeDecodeError:
+            bad = True
+        if bad:
+            raise InvalidFieldError(field, repr(key), f"a key has 1 to {MOST_KEY_BYTES} bytes in UTF-8", row)
+    raise AssertionError(f"{field} have no bad row")
+
+
+def _decode_strings(strings: list[str], field: str) -> PackedKeys:
+    for row, key in enumerate(strings):
+        if not 0 < len(key.encode()) <= MOST_KEY_BYTES:
+            raise InvalidFieldError(field, repr(key), f"a key has 1 to {MOST_KEY_BYTES} bytes in UTF-8", row)
+    return PackedKeys.pack(strings)
+
+
+def _whole_numbers(packed: bytes, field: str) -> bytes:
+    if len(packed) % BYTES_PER_NUMBER:
+        problem = f"a number has {BYTES_PER_NUMBER} bytes, so the number of bytes must be a multiple of that"
+        raise InvalidFieldError(field, f"{len(packed)} bytes", problem)
+    return packed
+
+
+# Times
+
+
+def _decode_row_times(times: points_pb2.Times, field: str, rows: int, what: str) -> Times | None:
+    """As many times as rows; None if there are none."""
+    decoded = decode_times(times, field)
+    if decoded is not None and len(decoded) != rows:
+        raise InvalidFieldError(field, f"{len(decoded)} times", f"must be as many as the {what}, {rows}, or none")
+    return decoded
+
+
+def decode_times(times: points_pb2.Times, field: str) -> Times | None:
+    """Microseconds since 1970; None if there are none."""
+    if times.packed and times.timestamps:
+        raise InvalidFieldError(field, "packed and timestamps", "use one encoding or the other")
+    if times.packed:
+        decoded = np.frombuffer(_whole_numbers(times.packed, f"{field}.packed"), "<i8").astype(np.int64, copy=False)
+    elif times.timestamps:
+        return _decode_timestamps(times, field)
+    else:
+        return None
+    far = (decoded > GREATEST_TIME) | (decoded < -GREATEST_TIME)
+    if far.any():
+        row = int(np.argmax(far))
+        raise _far_time(field, f"{decoded[row]} microseconds", row)
+    return decoded
+
+
+def _decode_timestamps(times: points_pb2.Times, field: str) -> Times:
+    microseconds = []
+    for row, each in enumerate(times.timestamps):
+        if not 0 <= each.nanos < NANOSECONDS_PER_SECOND:
+            raise InvalidFieldError(field, f"{each.nanos} ns", "nanoseconds are from 0 to 999999999", row)
+        time = each.seconds * MICROSECONDS + each.nanos // NANOSECONDS
+        if abs(time) > GREATEST_TIME:
+            raise _far_time(field, f"{each.seconds} seconds", row)
+        microseconds.append(time)
+    return np.array(microseconds, np.int64)
+
+
+def _far_time(field: str, value: str, row: int) -> InvalidFieldError:
+    problem = f"a time is from {shown(-GREATEST_TIME)} to {shown(GREATEST_TIME)}"
+    return InvalidFieldError(field, value, problem, row)

@@ -1,0 +1,71 @@
+"""Conversion of the settings of a hull."""
+
+from google.protobuf.duration_pb2 import Duration
+
+from dynhull_proto.v1 import hull_pb2
+
+from ..state.admission import GREATEST_TIME
+from ..state.records import Clock, HullSettings, Identity, Window
+from .decode import LARGEST_INTEGER, InvalidFieldError
+
+IDENTITIES: dict[int, Identity] = {
+    hull_pb2.IDENTITY_UNSPECIFIED: "multiset",
+    hull_pb2.IDENTITY_MULTISET: "multiset",
+    hull_pb2.IDENTITY_STRING_KEYS: "str",
+    hull_pb2.IDENTITY_INTEGER_KEYS: "int",
+}
+CLOCKS: dict[int, Clock] = {
+    hull_pb2.CLOCK_UNSPECIFIED: "server",
+    hull_pb2.CLOCK_SERVER: "server",
+    hull_pb2.CLOCK_DATA: "data",
+}
+MICROSECONDS = 1_000_000
+NANOSECONDS = 1_000  # in a microsecond
+
+
+def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
+    """The settings of a new hull."""
+    identity = IDENTITIES.get(config.identity)
+    if identity is None:
+        raise InvalidFieldError("config.identity", config.identity, "not an identity that this server supports")
+    if config.max_points > LARGEST_INTEGER:
+        raise InvalidFieldError("config.max_points", config.max_points, f"must be at most {LARGEST_INTEGER}")
+    if config.ordering not in hull_pb2.Ordering.values():
+        raise InvalidFieldError("config.ordering", config.ordering, "not an ordering that this server supports")
+    by_event_time = config.ordering == hull_pb2.ORDERING_EVENT_TIME
+    if by_event_time and identity == "multiset":
+        raise InvalidFieldError("config.ordering", "ORDERING_EVENT_TIME", "points without keys have no order")
+    window = _decode_window(config.window) if config.HasField("window") else None
+    return HullSettings(identity, config.max_points, window, by_event_time)
+
+
+def _decode_window(window: hull_pb2.Window) -> Window:
+    clock = CLOCKS.get(window.clock)
+    if clock is None:
+        raise InvalidFieldError("config.window.clock", window.clock, "not a clock that this server supports")
+    if window.ahead not in hull_pb2.AheadPolicy.values():
+        raise InvalidFieldError("config.window.ahead", window.ahead, "not a policy that this server supports")
+    if window.max_points > LARGEST_INTEGER:
+        raise InvalidFieldError("config.window.max_points", window.max_points, f"must be at most {LARGEST_INTEGER}")
+    max_age, max_skew = 0, None
+    if window.HasField("max_age"):
+        max_age = decode_duration(window.max_age, "config.window.max_age", least=1)
+    elif not window.max_points:
+        raise InvalidFieldError("config.window", "empty", "a window needs max_age or max_points")
+    if window.HasField("max_skew"):
+        max_skew = decode_duration(window.max_skew, "config.window.max_skew", least=0)
+    clamps = window.ahead == hull_pb2.AHEAD_POLICY_CLAMP
+    return Window(max_age, window.max_points, clock, max_skew, clamps)
+
+
+def decode_duration(duration: Duration, field: str, least: int) -> int:
+    """A duration of `least` microseconds or more, in microseconds."""
+    microseconds, rest = divmod(duration.nanos, NANOSECONDS)
+    total = duration.seconds * MICROSECONDS + microseconds
+    value = f"{duration.seconds} s and {duration.nanos} ns"
+    if rest:
+        raise InvalidFieldError(field, value, "must be in whole microseconds")
+    if not least <= total <= GREATEST_TIME:
+        sign = "positive" if least else "not negative"
+        raise InvalidFieldError(field, value, f"must be {sign} and at most {GREATEST_TIME} microseconds")
+    return total

@@ -1,0 +1,378 @@
+"""Points with keys."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull import DuplicateKeyError, KeyedHull
+from dynhull.arrays import Points
+from dynhull.keys import PackedKeys
+
+from ..admission import GREATEST_TIME, Admission, admit, server_clock, too_old
+from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
+from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError
+from ..records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
+from .deadlines import Deadlines, Key
+
+KINDS = {"str": "strings", "int": "integers"}
+
+
+@dataclass(slots=True)
+class Admitted:
+    """A batch without the rows that are too old.
+
+    Attributes:
+        rows: the rows.
+        clock: the clock of the hull after the batch, None for a hull without a clock.
+        late: the number of rows that are too old.
+        clamped: the number of rows whose time was reduced.
+        refuse_missing: whether a missing key among the removes refuses the batch.
+    """
+
+    rows: KeyRows
+    clock: int | None
+    late: int
+    clamped: int
+    refuse_missing: bool
+
+
+@dataclass(slots=True)
+class Found:
+    """The positions of keys.
+
+    Attributes:
+        points: (n, 2) the position of each key; NaN for a missing key.
+        present: (n,) which keys are there.
+        times: (n,) their times, NO_TIME for a key without one; None for a hull without times.
+    """
+
+    points: Points
+    present: npt.NDArray[np.bool_]
+    times: Times | None
+
+
+class Keyed:
+    """The contents of a keyed hull, with or without a window.
+
+    Args:
+        settings: the settings of the hull.
+        stored: its points.
+        clock: its clock.
+        most_points: the limit on the number of points.
+
+    Attributes:
+        timed: whether its points have times.
+    """
+
+    def __init__(self, settings: HullSettings, stored: Contents, clock: int | None, most_points: int) -> None:
+        assert settings.identity != "multiset"
+        self._settings = settings
+        self._kind = settings.identity
+        self._most_points = most_points
+        self.clock = clock
+        self.hull = KeyedHull(self._kind, ordered=settings.by_event_time)
+        self.follows_server = settings.window is None or settings.window.clock == "server"
+        self._deadlines = Deadlines()
+        self._earliest: int | None = None  # no point has an earlier time
+        self.timed = settings.window is not None or settings.by_event_time
+        if stored.keys is not None:
+            self._load(stored.keys, stored)
+
+    @property
+    def due(self) -> int | None:
+        """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
+        if not self.follows_server:
+            return None
+        window = self._settings.window
+        first = self._deadlines.first
+        if window is None or not window.max_age or self._earliest is None:
+            return first
+        oldest = self._earliest + window.max_age
+        return oldest if first is None else min(first, oldest)
+
+    def misfit(self, batch: Batch | KeyedBatch) -> str:
+        """Why a hull of this kind takes no such batch; empty if it does."""
+        if isinstance(batch, Batch):
+            if len(batch.inserts) or len(batch.deletes):
+                return f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them"
+        elif batch.kind != self._kind:
+            return f"has keys that are {KINDS[self._kind]}, not {KINDS[batch.kind]}"
+        return ""
+
+    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
+        """The batch with the times of its rows, without those that are too old."""
+        if isinstance(batch, Batch):  # empty
+            batch = KeyedBatch(self._kind, self._no_keys(), NO_POINTS, self._no_keys())
+        rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
+        admission = admit(self._settings, batch.times, len(batch.keys), "puts.times", arrived, self.clock)
+        rows.times = admission.times
+        self._admit_deadlines(batch, rows, admission, arrived)
+        late = 0
+        if admission.young is not None:
+            _refuse_repeated(rows)
+            late = len(rows.keys) - int(np.count_nonzero(admission.young))
+            rows = _selected(rows, admission.young)
+        admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing)
+        if len(self.hull) + len(rows.keys) > self._most_points:
+            self._refuse_growth(admitted)
+        return admitted
+
+    def check(self, admitted: Admitted) -> None:
+        """Raise KeyRepeatedError or KeyMissingError if `apply` would."""
+        _refuse_repeated(admitted.rows)
+        if admitted.refuse_missing:
+            there = self._there(admitted.rows.removes, admitted.clock)
+            if not there.all():
+                row = int(np.argmin(there))
+                raise KeyMissingError(row, _key(admitted.rows.removes, row))
+
+    def expires_before(self, admitted: Admitted) -> int | None:
+        """The clock that the batch leads to, if points leave at that time; None if none do."""
+        clock = admitted.clock
+        if clock is None:
+            return None
+        first, until = self._deadlines.first, too_old(self._settings, clock)
+        ends = first is not None and first <= clock
+        old = until is not None and self._earliest is not None and self._earliest <= until
+        return clock if ends or old else None
+
+    def apply(self, admitted: Admitted, revision: int) -> tuple[Applied, KeyRows]:
+        """Apply the batch, or raise KeyRepeatedError or KeyMissingError."""
+        rows, hull = admitted.rows, self.hull
+        if len(rows.removes) and (len(rows.keys) or admitted.refuse_missing):
+            self.check(admitted)
+        changes = hull.changes
+        try:
+            put, removed, evicted = self._carry_out(rows)
+        except DuplicateKeyError as error:
+            part = "puts.keys" if len(rows.keys) else "removes"
+            raise KeyRepeatedError(error.key, (part, error.rows[0]), (part, error.rows[1])) from None
+        self.clock = admitted.clock
+        applied = Applied(
+            revision,
+            put.new,
+            removed,
+            len(rows.removes) - removed,
+            hull.changes != changes,
+            len(hull),
+            moved=put.moved + put.unmoved,
+            stale=put.stale,
+            late=admitted.late,
+            skipped=put.skipped,
+            clamped=admitted.clamped,
+            evicted=evicted,
+            clock=self.clock,
+        )
+        return applied, rows
+
+    def expire(self, clock: int) -> Expiry | None:
+        """Advance the clock, and remove the points that leave. If none do, the clock stays."""
+        clock = clock if self.clock is None else max(clock, self.clock)
+        until = too_old(self._settings, clock)
+        leaving = self._expire(until, clock)
+        if not leaving:
+            return None
+        self.clock = clock
+        return Expiry(until, leaving)
+
+    def replay(self, records: Iterable[Record]) -> None:
+        """Apply recorded changes."""
+        for record in records:
+            rows = record.rows
+            if isinstance(rows, Expiry):
+                assert record.clock is not None  # nothing expires without a clock
+                self._expire(rows.until, record.clock)
+            else:
+                assert isinstance(rows, KeyRows)
+                self._carry_out(rows)
+            self.clock = record.clock
+
+    def stored(self) -> Contents:
+        """The points in the order of their keys. O(n log n)."""
+        keys, points, times = self.hull.entities()
+        deadlines = self._deadlines.of(_listed(keys)) if len(self._deadlines) else None
+        return Contents(points, keys, stored_times(times) if self.timed else None, deadlines)
+
+    def find(self, keys: Keys) -> Found:
+        """The positions of keys of the hull's kind."""
+        points = self.hull.positions(keys)
+        times = stored_times(self.hull.times(keys)) if self.timed else None
+        return Found(points, ~np.isnan(points[:, 0]), times)
+
+    # Changes
+
+    def _load(self, keys: Keys, stored: Contents) -> None:
+        times = None if stored.times is None else library_times(stored.times)
+        self.hull = KeyedHull.from_entities(
+            keys, stored.points, times, self._kind, ordered=self._settings.by_event_time
+        )
+        if stored.times is not None:
+            self._note_times(stored.times)
+        if stored.deadlines is not None:
+            for key, deadline in zip(_listed(keys), stored.deadlines.tolist(), strict=True):
+                self._deadlines.set(key, deadline)
+
+    def _carry_out(self, rows: KeyRows) -> tuple[Any, int, int]:
+        """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""
+        hull, times = self.hull, rows.times
+        removed = hull.remove_many(rows.removes, missing="ignore") if len(rows.removes) else 0
+        written = None
+        if rows.deadlines is not None or len(self._deadlines):
+            written = self._written(rows)
+        put = hull.update(rows.keys, rows.points, None if times is None else library_times(times), only=rows.condition)
+        if times is not None:
+            self._note_times(times)
+        if written is not None:
+            self._set_deadlines(rows, written)
+        window = self._settings.window
+        surplus = 0 if window is None or not window.max_points else len(hull) - window.max_points
+        return put, removed, hull.evict(surplus) if surplus > 0 else 0
+
+    def _note_times(self, times: Times) -> None:
+        self.timed = True
+        known = times[times != NO_TIME]
+        if known.size:
+            earliest = int(known.min())
+            self._earliest = earliest if self._earliest is None else min(earliest, self._earliest)
+
+    def _written(self, rows: KeyRows) -> npt.NDArray[np.bool_]:
+        """The rows of the puts that will be written: neither skipped nor stale."""
+        written = np.ones(len(rows.keys), np.bool_)
+        if rows.condition is not None:
+            written &= self._has(rows.keys) == (rows.condition == "present")
+        if self._settings.by_event_time and rows.times is not None:
+            written &= ~(rows.times < self.hull.times(rows.keys))
+        return written
+
+    def _set_deadlines(self, rows: KeyRows, written: npt.NDArray[np.bool_]) -> None:
+        deadlines = [FOREVER] * len(rows.keys) if rows.deadlines is None else rows.deadlines.tolist()
+        for key, deadline, was_written in zip(_listed(rows.keys), deadlines, written.tolist(), strict=True):
+            if was_written:
+                self._deadlines.set(key, deadline)
+        for key in _listed(rows.removes):
+            self._deadlines.drop(key)
+
+    def _expire(self, until: int | None, clock: int) -> int:
+        """Remove the points that leave. Returns their number."""
+        hull = self.hull
+        leaving = 0
+        if until is not None and until >= -GREATEST_TIME:
+            leaving = hull.expire(until)
+            oldest = hull.oldest()
+            self._earliest = None if oldest is None else int(oldest)
+        ended = self._deadlines.pop_until(clock)
+        return leaving + (hull.remove_many(ended, missing="ignore") if ended else 0)
+
+    # Rules
+
+    def _admit_deadlines(self, batch: KeyedBatch, rows: KeyRows, admission: Admission, arrived: int) -> None:
+        """Set the deadlines of the rows, and the clock of a hull that has one because of them."""
+        limited = batch.ttl is not None or batch.deadlines is not None
+        if self._settings.window is None and (limited or self.clock is not None):
+            admission.clock = server_clock(self.clock, arrived)
+        if not limited:
+            return
+        if batch.ttl is not None:
+            start = arrived if self.follows_server else admission.clock
+            rows.deadlines = np.full(len(batch.keys), (start or 0) + batch.ttl, np.int64)
+        if admission.clock is not None and rows.deadlines is not None:
+            there = rows.deadlines > admission.clock
+            if not there.all():
+                admission.young = there if admission.young is None else there & admission.young
+
+    def _refuse_growth(self, admitted: Admitted) -> None:
+        """Raise LimitExceededError if the hull would have too many points."""
+        rows, window = admitted.rows, self._settings.window
+        if rows.condition == "present":
+            return
+        new = len(rows.keys) - int(np.count_nonzero(self._there(rows.keys, admitted.clock)))
+        after = self._number(admitted.clock) + new - int(np.count_nonzero(self._there(rows.removes, admitted.clock)))
+        if window is not None and window.max_points:
+            after = min(after, window.max_points)
+        if new and after > self._most_points:
+            raise LimitExceededError("max_points", self._most_points)
+
+    def _has(self, keys: Keys) -> npt.NDArray[np.bool_]:
+        """Which keys are there."""
+        return ~np.isnan(self.hull.positions(keys)[:, 0])
+
+    def _there(self, keys: Keys, clock: int | None) -> npt.NDArray[np.bool_]:
+        """Which keys are there once those have left that leave at `clock`."""
+        there = self._has(keys)
+        if clock is None:
+            return there
+        until = too_old(self._settings, clock)
+        if until is not None:
+            there &= ~(self.hull.times(keys) <= until)
+        first = self._deadlines.first
+        if first is not None and first <= clock:
+            there &= self._deadlines.of(_listed(keys)) > clock
+        return there
+
+    def _number(self, clock: int | None) -> int:
+        """The number of keys once those have left that leave at `clock`. O(n log n) if any do."""
+        if clock is None:
+            return len(self.hull)
+        return int(np.count_nonzero(self._there(self.hull.entities()[0], clock)))
+
+    def _no_keys(self) -> Keys:
+        return PackedKeys(b"", b"") if self._kind == "str" else np.empty(0, np.uint64)
+
+
+def stored_times(times: npt.NDArray[np.float64]) -> Times:
+    """The library's times as they are stored: NO_TIME instead of NaN."""
+    none = np.isnan(times)
+    stored = np.where(none, 0.0, times).astype(np.int64)
+    stored[none] = NO_TIME
+    return stored
+
+
+def library_times(times: Times) -> npt.NDArray[np.float64]:
+    """The inverse of `stored_times`."""
+    return np.where(times == NO_TIME, np.nan, times.astype(np.float64))
+
+
+def _selected(rows: KeyRows, which: npt.NDArray[np.bool_]) -> KeyRows:
+    """The puts of some rows, and all removes."""
+    times = None if rows.times is None else rows.times[which]
+    deadlines = None if rows.deadlines is None else rows.deadlines[which]
+    return KeyRows(select_keys(rows.keys, which), rows.points[which], rows.removes, times, deadlines, rows.condition)
+
+
+def select_keys(keys: Keys, which: npt.NDArray[np.bool_]) -> Keys:
+    """The keys of some rows."""
+    if not isinstance(keys, PackedKeys):
+        return keys[which]
+    lengths = np.frombuffer(keys.lengths, np.uint8)
+    return PackedKeys(lengths[which], np.frombuffer(keys.data, np.uint8)[np.repeat(which, lengths)])
+
+
+def take_keys(keys: Keys, rows: npt.NDArray[np.intp]) -> Keys:
+    """The keys of some rows, in their order."""
+    return PackedKeys.pack([keys[row] for row in rows.tolist()]) if isinstance(keys, PackedKeys) else keys[rows]
+
+
+def _refuse_repeated(rows: KeyRows) -> None:
+    """Raise KeyRepeatedError if a key comes twice among the puts and removes. O(k)."""
+    keys = [*_listed(rows.keys), *_listed(rows.removes)]
+    if len(set(keys)) == len(keys):
+        return
+    puts = len(rows.keys)
+    seen: dict[Key, int] = {}
+    for number, key in enumerate(chain(keys)):
+        first = seen.setdefault(key, number)
+        if first != number:
+            places = [("puts.keys", each) if each < puts else ("removes", each - puts) for each in (first, number)]
+            raise KeyRepeatedError(key, places[0], places[1])
+
+
+def _listed(keys: Keys) -> list[Any]:
+    return list(keys) if isinstance(keys, PackedKeys) else keys.tolist()
+
+
+def _key(keys: Keys, row: int) -> Key:
+    return keys[row] if isinstance(keys, PackedKeys) else int(keys[row])

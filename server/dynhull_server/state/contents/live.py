@@ -1,0 +1,67 @@
+"""The points of a hull, whatever identifies them and however they leave."""
+
+from collections.abc import Iterable
+from typing import Any, Protocol
+
+from dynhull import DynamicHull, KeyedHull, WindowHull
+
+from ..batch import Applied, Batch, KeyedBatch
+from ..records import Contents, Expiry, Record, Rows
+
+AnyHull = DynamicHull | KeyedHull | WindowHull
+
+
+class LiveContents(Protocol):
+    """The points of a hull. A batch is admitted, then applied; `Admitted` batches belong to the class that made them.
+
+    Attributes:
+        clock: the clock of the hull in microseconds since 1970, None for a hull without a clock so far.
+        follows_server: whether the clock, if any, follows the server's, rather than event times.
+    """
+
+    clock: int | None
+    follows_server: bool
+
+    @property
+    def hull(self) -> AnyHull:
+        """The points."""
+
+    @property
+    def due(self) -> int | None:
+        """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
+
+    def misfit(self, batch: Batch | KeyedBatch) -> str:
+        """Why a hull of this kind takes no such batch; empty if it does."""
+
+    def admit(self, batch: Any, arrived: int) -> Any:
+        """The batch with the times of its rows, without those that are too old. Changes nothing.
+
+        Args:
+            batch: a batch that is no misfit.
+            arrived: the time of its arrival by the server's clock, in microseconds since 1970.
+
+        Raises:
+            RefusedError: the times are invalid, or the hull would have too many points.
+        """
+
+    def check(self, admitted: Any) -> None:
+        """Raise the error with which `apply` would refuse the batch."""
+
+    def expires_before(self, admitted: Any) -> int | None:
+        """The clock that the batch leads to, if points leave at that time; None if none do."""
+
+    def apply(self, admitted: Any, revision: int) -> tuple[Applied, Rows]:
+        """Apply the batch as `revision`. Returns its effect, and the rows that `replay` needs.
+
+        Raises:
+            RefusedError: the batch is refused; nothing has changed.
+        """
+
+    def expire(self, clock: int) -> Expiry | None:
+        """Advance the clock, and remove the points that leave. If none do, the clock stays, and None is returned."""
+
+    def replay(self, records: Iterable[Record]) -> None:
+        """Apply recorded changes, many at a time."""
+
+    def stored(self) -> Contents:
+        """The points, for a snapshot. O(n log n)."""

@@ -1,0 +1,134 @@
+"""Points that are counted as often as they were inserted."""
+
+from collections.abc import Iterable
+from typing import Literal, cast
+
+import numpy as np
+
+from dynhull import DynamicHull, MissingPointError
+
+from ..batch import Applied, Batch, KeyedBatch
+from ..errors import LimitExceededError, PointMissingError
+from ..records import Contents, Expiry, PointRows, Record
+
+# Batches are replayed as one set of up to this many points, which is many times faster.
+REPLAYED_TOGETHER = 65_536
+
+
+class Multiset:
+    """The contents of a hull whose points have no keys and do not leave by themselves.
+
+    Args:
+        stored: the points.
+        most_points: the limit on their number.
+    """
+
+    clock: int | None = None
+    due: int | None = None
+    follows_server = True
+
+    def __init__(self, stored: Contents, most_points: int) -> None:
+        self.hull = DynamicHull(stored.points)
+        self._most_points = most_points
+
+    def misfit(self, batch: Batch | KeyedBatch) -> str:
+        """Why a hull of this kind takes no such batch; empty if it does."""
+        return points_misfit(batch) or ("" if batch.times is None else NO_TIMES)
+
+    def admit(self, batch: Batch, _: int) -> Batch:
+        """The batch, or raise LimitExceededError."""
+        if len(self.hull) + batch.growth > self._most_points:
+            raise LimitExceededError("max_points", self._most_points)
+        return batch
+
+    def check(self, batch: Batch) -> None:
+        """Raise PointMissingError if `apply` would. O(k log n)."""
+        if batch.count_missing or not len(batch.deletes):
+            return
+        named = np.unique(batch.deletes, axis=0)
+        copies = np.minimum(self.hull.count_many(named), len(batch.deletes))
+        apply_points(DynamicHull(np.repeat(named, copies, axis=0)), batch)
+
+    def expires_before(self, _: Batch) -> int | None:
+        """None: no points leave."""
+        return None
+
+    def apply(self, batch: Batch, revision: int) -> tuple[Applied, PointRows]:
+        """Apply the batch, or raise PointMissingError."""
+        hull = self.hull
+        to_delete, changes = len(batch.deletes), hull.changes
+        deleted = apply_points(hull, batch)
+        missing = to_delete - deleted
+        applied = Applied(revision, len(batch.inserts), deleted, missing, hull.changes != changes, len(hull))
+        return applied, PointRows(batch.inserts, batch.deletes, missing > 0)
+
+    def expire(self, _: int) -> Expiry | None:
+        """None: no points leave."""
+        return None
+
+    def replay(self, records: Iterable[Record]) -> None:
+        """Apply recorded batches, many at a time."""
+        for group in _together(records):
+            inserts = np.concatenate([rows.inserts for rows in group])
+            deletes = np.concatenate([rows.deletes for rows in group])
+            ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
+            missing: Literal["raise", "ignore"] = "ignore" if group[0].lenient else "raise"
+            self.hull.apply(ops, np.concatenate([inserts, deletes]), missing)
+
+    def stored(self) -> Contents:
+        """The points. O(n)."""
+        return Contents(self.hull.points())
+
+
+NO_TIMES = "has no window, so its points have no times"
+
+
+def points_misfit(batch: Batch | KeyedBatch) -> str:
+    """Why a hull without keys takes no such batch; empty if it does."""
+    return "has points without keys, which a batch inserts and deletes" if type(batch) is KeyedBatch else ""
+
+
+def apply_points(hull: DynamicHull, batch: Batch) -> int:
+    """Apply a batch to `hull`. Returns the number of points deleted.
+
+    Raises:
+        PointMissingError: a point to delete is missing, and `count_missing` is False; nothing has changed.
+    """
+    inserts, deletes = batch.inserts, batch.deletes
+    missing: Literal["raise", "ignore"] = "ignore" if batch.count_missing else "raise"
+    try:
+        if not len(deletes):
+            hull.insert_many(inserts)
+            return 0
+        if not len(inserts):
+            return hull.delete_many(deletes, missing)
+        ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
+        applied = hull.apply(ops, np.concatenate((inserts, deletes)), missing)
+    except MissingPointError as error:
+        row = cast("int", error.row) - len(inserts)  # always given for a batch
+        raise missing_point(batch, row, error.point) from None
+    return applied - len(inserts)
+
+
+def missing_point(batch: Batch, row: int, point: tuple[float, float]) -> PointMissingError:
+    """The refusal of a batch because of a row of its deletes."""
+    first_origin = len(batch.deletes) - batch.moves
+    if row < first_origin:
+        return PointMissingError("deletes", row, point)
+    return PointMissingError("origins", row - first_origin, point)
+
+
+def _together(records: Iterable[Record]) -> Iterable[list[PointRows]]:
+    """Groups of batches to apply as one set. A lenient one stays alone: its deletes depend on the points before it."""
+    group: list[PointRows] = []
+    size = 0
+    for record in records:
+        rows = record.rows
+        assert isinstance(rows, PointRows)
+        if group and (rows.lenient or group[-1].lenient or size >= REPLAYED_TOGETHER):
+            yield group
+            group, size = [], 0
+        group.append(rows)
+        size += len(rows)
+    if group:
+        yield group

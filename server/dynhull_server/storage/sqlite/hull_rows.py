@@ -1,0 +1,95 @@
+"""The rows of hulls, in each format."""
+
+import json
+import sqlite3
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ...state.records import HullRow, HullSettings, Window
+from .encoding import checksum
+
+Values = tuple[int, str, str, float, str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class FoundHull:
+    """The row of a hull as found in a database.
+
+    Attributes:
+        row: the hull; without its settings if the row is damaged.
+        checksum: the checksum stored with it.
+        whole: whether the row is intact.
+    """
+
+    row: HullRow
+    checksum: int
+    whole: bool
+
+
+def values(row: HullRow) -> Values:
+    """The values of the columns, with their checksum."""
+    settings = settings_text(row.settings)
+    stored = _checksum(row.number, row.name, row.uid, row.created, settings)
+    return row.number, row.name, row.uid, row.created, settings, stored
+
+
+def settings_text(settings: HullSettings) -> str:
+    """Settings as JSON, without those that have their default value."""
+    given = _given(settings)
+    if settings.window is not None:
+        given["window"] = _given(settings.window)
+    return json.dumps(given, sort_keys=True)
+
+
+def settings_from(text: str) -> HullSettings:
+    """The inverse of `settings_text`; ValueError or TypeError for other texts."""
+    given = json.loads(text)
+    window = given.pop("window", None)
+    return HullSettings(**given, window=None if window is None else Window(**window))
+
+
+def found_hulls(connection: sqlite3.Connection, version: int) -> Iterator[FoundHull]:
+    """The hulls of a database of that format."""
+    query, read = FORMATS[version]
+    for number, name, *more in connection.execute(query):
+        try:
+            yield read(number, name, *more)
+        except (ValueError, TypeError, KeyError, AttributeError, struct.error):
+            yield FoundHull(HullRow(number, str(name), "", 0.0), 0, whole=False)
+
+
+def _of_format_1(number: int, name: str, created: float, config: bytes) -> FoundHull:
+    found = json.loads(config)
+    row = HullRow(number, name, found["uid"], created, HullSettings(max_points=found["config"]["max_points"]))
+    return FoundHull(row, 0, whole=True)
+
+
+def _of_format_2(number: int, name: str, uid: str, created: float, most: int, stored: int) -> FoundHull:
+    expected = checksum(f"{name}\n{uid}".encode() + struct.pack("<d", created), number, most)
+    return FoundHull(HullRow(number, name, uid, created, HullSettings(max_points=most)), stored, stored == expected)
+
+
+def _of_format_3(number: int, name: str, uid: str, created: float, settings: str, stored: int) -> FoundHull:
+    whole = _checksum(number, name, uid, created, settings) == stored
+    return FoundHull(HullRow(number, name, uid, created, settings_from(settings)), stored, whole)
+
+
+FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
+    1: ("SELECT id, name, created, config FROM hulls", _of_format_1),
+    2: ("SELECT id, name, uid, created, max_points, checksum FROM hulls", _of_format_2),
+    3: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
+}
+
+
+def _checksum(number: int, name: str, uid: str, created: float, settings: str) -> int:
+    return checksum(f"{name}\n{uid}\n{settings}".encode() + struct.pack("<d", created), number)
+
+
+def _given(settings: HullSettings | Window) -> dict[str, Any]:
+    return {
+        each.name: getattr(settings, each.name)
+        for each in fields(settings)
+        if getattr(settings, each.name) != each.default
+    }

@@ -1,0 +1,109 @@
+"""Write a data folder with the installed version: a fixture for the versions after it, which must open it.
+
+    python tests/data/make_folder.py tests/data/format2
+
+By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
+the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
+of each hull, as that version exports them.
+"""
+
+import shutil
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import grpc
+import numpy as np
+
+from dynhull_client import HullClient
+from dynhull_proto.v1 import hull_pb2, hull_service_pb2, hull_service_pb2_grpc
+
+COMMAND = str(Path(sys.executable).with_name("dynhull"))
+FILES = "dynhull.db", "dynhull.db-wal"
+ZONES_CONFIG = hull_pb2.HullConfig(max_points=500)
+SNAPSHOT_POINTS = 40
+
+
+@contextmanager
+def served(data):
+    """A server with snapshots after few points, and its client."""
+    options = ["--data", str(data), "--port", "0", "--snapshot-points", str(SNAPSHOT_POINTS)]
+    with subprocess.Popen([COMMAND, "serve", *options], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            address = process.stdout.readline().split()[-1]
+            with HullClient(address) as client:
+                yield process, address, client
+        finally:
+            process.terminate()
+
+
+def ran(*command):
+    return subprocess.run([COMMAND, *map(str, command)], capture_output=True, text=True, check=True).stdout
+
+
+def insert_and_delete(client, producer, first, last):
+    """Numbered batches; each deletes two points of the one before."""
+    before = np.empty((0, 2))
+    for sequence in range(first, last + 1):
+        points = np.random.default_rng([sequence, *producer.encode()]).normal(size=(5, 2))
+        client.apply("fleet", insert=points, delete=before[:2], producer=producer, sequence=sequence)
+        before = points
+
+
+def snapshots(data):
+    """The line of the hull in the report of `dynhull check`."""
+    return next(line for line in ran("check", data).splitlines() if line.startswith("fleet:")).count(",") - 1
+
+
+def fill(data, address, client):
+    client.create_hull("fleet")
+    client.create_hull("empty")
+    client.create_hull("gone")
+    with grpc.insecure_channel(address) as channel:
+        request = hull_service_pb2.CreateHullRequest(name="zones/a", config=ZONES_CONFIG)
+        hull_service_pb2_grpc.HullServiceStub(channel).CreateHull(request)
+    client.apply("zones/a", insert=[(0, 0), (4, 0), (4, 3), (0, 0)], producer="truck", sequence=1)
+    client.apply("zones/a", delete=[(0, 0), (9, 9)], insert=[(-0.0, 5e-324)], missing="count")
+    client.apply("zones/a", move=([(4, 0)], [(1e308, -1e308)]))
+    client.apply("gone", insert=[(1, 1)])
+    client.delete_hull("gone")
+    for producer, written in (("plane", 1), ("ship", 2)):
+        insert_and_delete(client, producer, 1, 12)
+        while snapshots(data) < written:
+            continue
+    insert_and_delete(client, "train", 1, 12)
+    insert_and_delete(client, "bus", 1, 4)
+
+
+def take(data, target):
+    target.mkdir(parents=True)
+    for name in FILES:
+        if (data / name).exists():
+            shutil.copyfile(data / name, target / name)
+
+
+def export(data, target):
+    for name in ("fleet", "zones/a"):
+        ran("export", name, target.with_name(f"{target.name}-{name[:5]}.csv"), "--data", data)
+
+
+def main():
+    target = Path(sys.argv[1])
+    data = target / "work"
+    with served(data) as (_, address, client):
+        fill(data, address, client)
+    take(data, target / "stopped")
+    export(data, target / "stopped")
+    with served(data) as (process, _, client):
+        insert_and_delete(client, "bus", 5, 7)
+        client.apply("zones/a", insert=[(7, 7)], producer="truck", sequence=2)
+        export(data, target / "killed")
+        process.kill()
+        process.wait()
+        take(data, target / "killed")
+    shutil.rmtree(data)
+
+
+if __name__ == "__main__":
+    main()

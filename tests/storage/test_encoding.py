@@ -1,0 +1,176 @@
+"""Everything that is stored, as bytes and back: each combination of what is optional."""
+
+import numpy as np
+import pytest
+from folders import same
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from dynhull.keys import PackedKeys
+from dynhull_server.state.records import (
+    FOREVER,
+    NO_TIME,
+    Contents,
+    Expiry,
+    HullRow,
+    HullSettings,
+    Kept,
+    KeyRows,
+    PointRows,
+    Record,
+    Window,
+)
+from dynhull_server.storage.sqlite import chunks, hull_rows
+from dynhull_server.storage.sqlite.encoding import decode, encode
+
+times = st.integers(-(2**53), 2**53) | st.sampled_from([NO_TIME, FOREVER])
+counts = st.integers(0, 5)
+words = st.text(st.characters(codec="utf-8"), min_size=1).map(lambda text: text.encode()[:255].decode(errors="ignore"))
+long_words = st.sampled_from(["a" * 255, "\U0001f600" * 63, "é" * 127])
+strings = words.filter(bool) | long_words
+integers = st.integers(0, 2**64 - 1) | st.sampled_from([0, 2**63, 2**64 - 1])
+
+
+@st.composite
+def of_rows(draw, values, rows, kind):
+    return np.array(draw(st.lists(values, min_size=rows, max_size=rows)), kind)
+
+
+def points(rows):
+    finite = st.floats(allow_nan=False, allow_infinity=False)
+    return arrays.arrays(np.float64, (rows, 2), elements=finite)
+
+
+def keys(kind, rows):
+    if kind == "int":
+        return of_rows(integers, rows, np.uint64)
+    return st.lists(strings, min_size=rows, max_size=rows).map(PackedKeys.pack)
+
+
+def optional_times(rows):
+    return st.none() | of_rows(times, rows, np.int64)
+
+
+@st.composite
+def point_rows(draw):
+    inserts, deletes = draw(counts), draw(counts)
+    return PointRows(draw(points(inserts)), draw(points(deletes)), draw(st.booleans()), draw(optional_times(inserts)))
+
+
+@st.composite
+def key_rows(draw):
+    kind, puts, removes = draw(st.sampled_from(["str", "int"])), draw(counts), draw(counts)
+    condition = draw(st.sampled_from([None, "absent", "present"]))
+    columns = keys(kind, puts), points(puts), keys(kind, removes), optional_times(puts), optional_times(puts)
+    return KeyRows(*map(draw, columns), condition)
+
+
+expiries = st.builds(Expiry, st.none() | times, st.integers(0, 2**32 - 1))
+
+
+@st.composite
+def records(draw):
+    first = draw(st.integers(1, 2**40))
+    rows = draw(st.lists(point_rows() | key_rows() | expiries, min_size=1, max_size=4))
+    return [
+        Record(first + i, each, draw(st.text(max_size=9)), draw(st.integers(0, 2**64 - 1)), draw(st.none() | times))
+        for i, each in enumerate(rows)
+    ]
+
+
+@st.composite
+def contents(draw):
+    rows, kind = draw(st.integers(0, 30)), draw(st.sampled_from([None, "str", "int"]))
+    return Contents(
+        draw(points(rows)),
+        None if kind is None else draw(keys(kind, rows)),
+        draw(optional_times(rows)),
+        draw(optional_times(rows)),
+    )
+
+
+@given(records())
+def test_records_come_back(given):
+    same(list(decode(encode(given), given[0].revision)), given)
+
+
+@given(records(), st.data())
+def test_a_payload_that_is_cut_short_is_refused(given, data):
+    payload = encode(given[:1])
+    cut = data.draw(st.integers(1, len(payload) - 1))
+    with pytest.raises(ValueError, match="is cut short at byte"):
+        list(decode(payload[:cut], 1))
+
+
+def test_batches_of_earlier_formats():
+    """A header of 19 bytes, whose last one says whether the batch is lenient, a name and the points."""
+    payload = bytes.fromhex("01000000 01000000 0700000000000000 0200 01") + b"p1" + np.arange(4.0).tobytes()
+    rows = PointRows(np.array([[0.0, 1.0]]), np.array([[2.0, 3.0]]), lenient=True)
+    same(list(decode(payload, 9)), [Record(9, rows, "p1", 7)])
+    assert encode([Record(9, rows, "p1", 7)]) == payload
+
+
+def test_keys_of_two_kinds_are_refused():
+    rows = KeyRows(PackedKeys.pack(["a"]), np.zeros((1, 2)), np.array([1], np.uint64))
+    with pytest.raises(TypeError, match="the keys to put and to remove are of different kinds"):
+        encode([Record(1, rows)])
+
+
+@given(contents(), st.sampled_from([300, 1000, 2**19]))
+def test_contents_come_back_from_chunks(given, size):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(chunks, "CHUNK_BYTES", size)
+        starts = chunks.starts(given)
+    parts = [chunks.chunk(given, slice(*ends)) for ends in zip(starts, [*starts[1:], len(given)], strict=True)]
+    longest_row = 16 + 8 + 8 + 256
+    assert max(map(len, parts)) <= chunks.HEADER.size + size + longest_row
+    *_, decoded = chunks.state_from(chunks.state(Kept()))
+    same(chunks.joined([decoded(part) for part in parts]), given)
+
+
+@given(st.dictionaries(st.text(), st.integers(1, 2**64 - 1)) | st.just({"producers": 3, "clock": 4}), st.none() | times)
+def test_the_state_of_a_snapshot_comes_back(producers, clock):
+    assert chunks.state_from(chunks.state(Kept(producers=producers, clock=clock)))[:2] == (producers, clock)
+
+
+@pytest.mark.parametrize("state", [b"", b"{}", b'{"producers": 3, "clock": 4}'])
+def test_snapshots_of_earlier_formats(state):
+    """Their chunks are points alone, and their state the last number of each producer."""
+    producers, clock, decoded = chunks.state_from(state)
+    assert (producers, clock) == ({"producers": 3, "clock": 4} if len(state) > 2 else {}, None)
+    points = np.arange(6.0).reshape(-1, 2)
+    same(chunks.joined([decoded(points.tobytes()), decoded(b"")]), Contents(points))
+    same(chunks.joined([]), Contents())
+
+
+windows = st.builds(
+    Window,
+    st.integers(0, 2**53),
+    st.integers(0, 2**32),
+    st.sampled_from(["server", "data"]),
+    st.none() | st.integers(0, 2**53),
+    st.booleans(),
+)
+settings = st.builds(
+    HullSettings,
+    st.sampled_from(["multiset", "str", "int"]),
+    st.integers(0, 2**64 - 1),
+    st.none() | windows,
+    st.booleans(),
+)
+
+
+@given(settings)
+def test_settings_come_back(given):
+    assert hull_rows.settings_from(hull_rows.settings_text(given)) == given
+
+
+def test_settings_are_stored_without_defaults():
+    """So that a later version can add some, and the checksums of earlier rows stay."""
+    *_, text, _ = hull_rows.values(HullRow(1, "a", "b", 2.0))
+    assert text == "{}"
+    assert (
+        hull_rows.settings_text(HullSettings("str", window=Window(5)))
+        == '{"identity": "str", "window": {"max_age": 5}}'
+    )

@@ -1,0 +1,172 @@
+"""Data folders that earlier versions wrote: they open, are migrated once, and go on."""
+
+import shutil
+import sqlite3
+
+import numpy as np
+import pytest
+from folders import DATABASE, OLD_FOLDERS, append, opened, same, snapshot
+from test_faults import FaultyDisk, failure
+
+from dynhull.keys import PackedKeys
+from dynhull_server.state.contents import replayed
+from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
+from dynhull_server.storage.port import StorageError
+from dynhull_server.storage.sqlite.schema import FORMAT
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "data"
+
+
+@pytest.mark.parametrize(("name", "fleet", "zones"), [("stopped", (30, 83), (3, 5)), ("killed", (33, 92), (4, 6))])
+def test_a_folder_of_format_1_opens(folder, name, fleet, zones):
+    shutil.copytree(OLD_FOLDERS / "format1" / name, folder)
+    for _ in range(2):
+        storage, contents = opened(folder)
+        assert contents.hulls == [
+            HullRow(1, "fleet", "00aa00aa00aa00aa", 1700000000.5),
+            HullRow(2, "zones/é", "00bb00bb00bb00bb", 1700000001.0, HullSettings(max_points=500)),
+        ]
+        assert (contents.next_number, contents.notes) == (3, [])
+        for number, (revision, count) in ((1, fleet), (2, zones)):
+            kept = storage.read(number)
+            assert (kept.last_revision, len(replayed(kept).hull)) == (revision, count)
+        assert (storage.oldest(1), storage.oldest(2)) == (20, 0)
+        assert storage.read(1).producers == {"p0": 24, "p1": 25, "p2": 23}
+        assert storage.read(2).records[0].producer == "truck"
+        storage.close()
+
+
+def test_a_folder_of_format_1_goes_on(folder):
+    shutil.copytree(OLD_FOLDERS / "format1" / "killed", folder)
+    storage, _ = opened(folder)
+    append(storage, 34, 40)
+    snapshot(storage, 40)
+    storage.commit([Delete(2)])
+    for step in storage.sweep():
+        storage.commit([step])
+    storage.close()
+    storage, contents = opened(folder)
+    assert ([hull.name for hull in contents.hulls], contents.notes) == (["fleet"], [])
+    assert (storage.read(1).revision, storage.oldest(1)) == (40, 25)
+    storage.close()
+    with sqlite3.connect(folder / DATABASE) as database:
+        assert database.execute("SELECT min(first) FROM batches").fetchone() == (26,)
+        assert database.execute("SELECT count(*) FROM chunks").fetchone() == (2,)
+
+
+# Format 2, written by tests/data/make_folder.py
+
+FORMAT_2 = OLD_FOLDERS / "format2"
+FLEET = {"stopped": 40, "killed": 43}
+PRODUCERS = {"plane": 12, "ship": 12, "train": 12, "bus": 4}
+
+
+def query(folder, sql):
+    with sqlite3.connect(folder / DATABASE) as database:
+        return database.execute(sql).fetchall()
+
+
+def rows_not_migrated(folder):
+    return [query(folder, f"SELECT rowid, * FROM {table}") for table in ("batches", "snapshots", "chunks")]
+
+
+def last_sequences(kept):
+    return kept.producers | {record.producer: record.sequence for record in kept.records if record.producer}
+
+
+def exported(name, hull):
+    """The points as the earlier version exported them."""
+    return np.loadtxt(FORMAT_2 / f"{name}-{hull}.csv", delimiter=",", skiprows=1)
+
+
+def in_order(points):
+    return points[np.lexsort(points.T)]
+
+
+@pytest.mark.parametrize("name", FLEET)
+def test_a_folder_of_format_2_has_everything(folder, name):
+    shutil.copytree(FORMAT_2 / name, folder)
+    last = FLEET[name]
+    for _ in range(2):
+        storage, contents = opened(folder)
+        assert [(row.number, row.name) for row in contents.hulls] == [(2, "empty"), (1, "fleet"), (4, "zones/a")]
+        assert [row.settings.max_points for row in contents.hulls] == [0, 0, 500]
+        assert (contents.next_number, contents.notes) == (5, [])
+        for number, hull in ((1, "fleet"), (4, "zones")):
+            points = replayed(storage.read(number)).hull.points()
+            np.testing.assert_array_equal(in_order(points), in_order(exported(name, hull)))
+        fleet, zones = storage.read(1), storage.read(4)
+        assert (fleet.revision, fleet.last_revision, storage.oldest(1)) == (24, last, 12)
+        assert last_sequences(fleet) == PRODUCERS | {"bus": last - 36}
+        assert storage.read(1, 13).producers == {"plane": 12}
+        assert [record.rows.lenient for record in zones.records[:3]] == [False, True, False]
+        assert last_sequences(zones) == {"truck": 1 if name == "stopped" else 2}
+        assert storage.read(2).last_revision == 0
+        storage.close()
+
+
+def test_a_folder_of_format_2_is_migrated_once_and_quickly(folder):
+    """Batches and snapshots are not rewritten; the table of hulls is, once."""
+    shutil.copytree(FORMAT_2 / "stopped", folder)
+    before = rows_not_migrated(folder)
+    steps = []
+    storage = SQLiteStorage(folder)
+    storage.open(lambda done, total: steps.append((done, total)))
+    storage.close()
+    assert steps[0] == (0, 34)
+    assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
+    assert rows_not_migrated(folder) == before
+    tables_changed = query(folder, "PRAGMA schema_version")
+    opened(folder)[0].close()
+    assert query(folder, "PRAGMA schema_version") == tables_changed
+
+
+@pytest.mark.parametrize("statement", ["DROP TABLE hulls", "PRAGMA user_version =", "COMMIT"])
+def test_a_migration_that_fails_changes_nothing(folder, statement):
+    shutil.copytree(FORMAT_2 / "killed", folder)
+    disk = FaultyDisk()
+    disk.fail(statement, failure(sqlite3.SQLITE_FULL))
+    with pytest.raises(StorageError, match="injected"):
+        SQLiteStorage(folder, disk=disk).open(lambda *_: None)
+    assert query(folder, "PRAGMA user_version") == [(2,)]
+    storage, contents = opened(folder)
+    assert (len(contents.hulls), storage.read(1).last_revision, contents.notes) == (3, 43, [])
+    storage.close()
+
+
+def test_damage_to_a_folder_of_format_2_is_noticed(folder):
+    """Also in what the migration rewrites."""
+    for damage, words in (
+        ("UPDATE hulls SET max_points = 501 WHERE id = 4", "the row of hull 4, 'zones/a', is damaged"),
+        ("DELETE FROM hulls WHERE id = 2", "the totals record 3 hulls"),
+        ("UPDATE batches SET last = 14 WHERE first = 13", "the tables have 3 with 31, or different ones"),
+        ("UPDATE batches SET payload = x'00' WHERE first = 30", "revisions 30 to 30 are damaged, and later ones exist"),
+    ):
+        shutil.copytree(FORMAT_2 / "stopped", folder)
+        query(folder, damage)
+        with pytest.raises(StorageError, match=words):
+            opened(folder)
+        shutil.rmtree(folder)
+
+
+def test_a_folder_of_format_2_goes_on_with_keys_and_times(folder):
+    shutil.copytree(FORMAT_2 / "killed", folder)
+    storage, _ = opened(folder)
+    tracks = HullRow(5, "tracks", "", 0.0, HullSettings("str", window=Window(max_age=9)))
+    put = KeyRows(PackedKeys.pack(["é"]), np.ones((1, 2)), PackedKeys.pack([]), np.array([7]))
+    new = [Record(1, put, clock=7), Record(2, Expiry(7, 1), clock=16)]
+    storage.commit([Create(tracks), Append(5, new)])
+    append(storage, 44, 50)
+    snapshot(storage, 50)
+    for _ in range(2):
+        assert storage.row(5) == tracks
+        same(storage.read(5).records, new)
+        assert (storage.read(1).revision, storage.oldest(1)) == (50, 24)
+        storage.close()
+        storage, contents = opened(folder)
+        assert contents.notes == []
+    storage.close()
