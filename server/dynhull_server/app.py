@@ -216,11 +216,12 @@ class Server:
         return context
 
     def _compared(self, hull: LiveHull, outcome: Verification) -> None:
-        equal = outcome.difference is None
+        equal = outcome.equal
         self._metrics.verified("scrub", equal, outcome.seconds)
         if not equal:
             log.error(
-                "a hull differs from Chan's algorithm", extra={"hull": hull.name, "difference": outcome.difference}
+                "a hull differs from Chan's algorithm, or its keys from its points",
+                extra={"hull": hull.name, "difference": outcome.difference, "keys_equal": outcome.keys_equal},
             )
             self._health.set(NOT_SERVING, SCRUB)
 

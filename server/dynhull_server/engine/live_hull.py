@@ -12,7 +12,9 @@ import numpy.typing as npt
 
 from dynhull import DynamicHull
 from dynhull.arrays import Checked, Points
+from dynhull.keys import PackedKeys
 
+from ..state.contents.keyed import KINDS
 from ..state.contents.live import AnyHull
 from ..state.errors import (
     HullEmptyError,
@@ -24,7 +26,7 @@ from ..state.errors import (
 from ..state.events import ReadHull
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import HullSettings
+from ..state.records import HullSettings, Keys
 from ..state.sample import sample
 from .difference import Differences
 from .recalls import Recalls
@@ -104,6 +106,14 @@ class LiveHull:
         if self.settings.identity == "multiset":
             raise HullUnsuitableError(self.name, "has points without keys")
 
+    def keys(self, keys: Keys | None) -> Keys:
+        """The keys of a question, which may be none; raise HullUnsuitableError if the hull has none of their kind."""
+        self.require_keys()
+        none: Keys = PackedKeys(b"", b"") if self.settings.identity == "str" else np.empty(0, np.uint64)
+        if keys is not None and type(keys) is not type(none):
+            raise HullUnsuitableError(self.name, f"has keys that are {KINDS[self.settings.identity]}")
+        return none if keys is None else keys
+
     # Reads
 
     async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
@@ -135,7 +145,7 @@ class LiveHull:
         if rows <= BLOCK:  # delays later writes by some milliseconds only
             return await self.read(lambda state: question(state.hull, slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision)
-        outline = await self._hull_of(vertices)
+        outline = await self.outline(vertices)
         return counts, await in_blocks(self._engine.aside, partial(question, outline), rows)
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
@@ -158,10 +168,10 @@ class LiveHull:
 
     async def verify(self, min_revision: int = 0) -> tuple[Counts, Verification]:
         """Compare the live hull with Chan's algorithm on the stored points. Writes continue meanwhile."""
-        counts, (points, vertices) = await self.read(
-            lambda state: (state.hull.points(), state.vertices()), self.counts.points, min_revision
+        counts, (points, vertices, stored) = await self.read(
+            lambda state: (state.hull.points(), state.vertices(), state.entities()), self.counts.points, min_revision
         )
-        return counts, await verify(points, vertices, self._engine.aside)
+        return counts, await verify(points, vertices, stored, self._engine.aside)
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
         """A sample of at most `size` of the points. Writes continue meanwhile."""
@@ -218,7 +228,7 @@ class LiveHull:
             self._moved.set()
             self._moved = None
 
-    async def _hull_of(self, vertices: Points) -> DynamicHull:
+    async def outline(self, vertices: Points) -> DynamicHull:
         """A separate hull with these vertices, shared by large reads of one revision."""
         if self._outline is None or self._outline[0] is not vertices:
             made: DynamicHull = await self._engine.aside(partial(DynamicHull, vertices))

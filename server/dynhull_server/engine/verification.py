@@ -11,9 +11,11 @@ import numpy as np
 
 from dynhull import KERNEL
 from dynhull.arrays import Points
+from dynhull.keys import PackedKeys
 from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
+from ..state.records import Contents
 from . import chan_process
 from .steps import Run
 
@@ -34,7 +36,8 @@ class Difference:
 class Verification:
     """The result of Chan's algorithm; `difference` is None where the live hull has the same vertices.
 
-    `seconds` is processor time.
+    `seconds` is processor time. `keys_equal` is whether the positions of the keys are the points of the hull, each key
+    once; True for a hull without keys.
     """
 
     points: int
@@ -42,15 +45,25 @@ class Verification:
     rounds: list[Round]
     difference: Difference | None
     seconds: float
+    keys_equal: bool = True
+
+    @property
+    def equal(self) -> bool:
+        """Whether there is no fault."""
+        return self.difference is None and self.keys_equal
 
 
-async def verify(points: Points, vertices: Points, run: Run) -> Verification:
-    """Compare the vertices of a live hull with the hull of `points`, computed in a thread by `run`."""
+async def verify(points: Points, vertices: Points, entities: Contents | None, run: Run) -> Verification:
+    """Compare the vertices of a live hull with the hull of `points`, computed in a thread by `run`.
+
+    With `entities`, the keys of a keyed hull, also compare their positions with `points`.
+    """
+    keys_equal = entities is None or await run(partial(keys_match, entities, points))
     if KERNEL == "cpp" or len(points) < LARGE:  # the kernel releases the interpreter
         recomputed, rounds, seconds = await run(partial(_recompute, points))
     else:
         recomputed, rounds, seconds = await _recompute_apart(points)
-    return Verification(len(points), len(vertices), rounds, first_difference(vertices, recomputed), seconds)
+    return Verification(len(points), len(vertices), rounds, first_difference(vertices, recomputed), seconds, keys_equal)
 
 
 def first_difference(live: Points, recomputed: Points) -> Difference | None:
@@ -61,6 +74,17 @@ def first_difference(live: Points, recomputed: Points) -> Difference | None:
     rows = np.flatnonzero((live[:shorter] != recomputed[:shorter]).any(axis=1))
     i = int(rows[0]) if rows.size else shorter
     return Difference(i, live[i : i + 1], recomputed[i : i + 1])
+
+
+def keys_match(contents: Contents, points: Points) -> bool:
+    """Whether the positions of the keys are these points in lexicographic order, and each key comes once."""
+    keys = contents.keys
+    assert keys is not None  # those of a keyed hull
+    different = len(set(keys)) if isinstance(keys, PackedKeys) else len(np.unique(keys))
+    if not different == len(keys) == len(contents.points):
+        return False
+    x, y = contents.points.T
+    return np.array_equal(contents.points[np.lexsort((y, x))], points)
 
 
 def _recompute(points: Points) -> tuple[Points, list[Round], float]:

@@ -117,6 +117,18 @@ def decode_lines(request: hull_service_pb2.IntersectLinesRequest) -> tuple[Point
     return origins, targets
 
 
+def decode_subjects(request: hull_service_pb2.LocateRequest | hull_service_pb2.DistanceRequest) -> bool:
+    """Whether the request is about keys, rather than points."""
+    if not request.HasField("keys"):
+        for field in ("keys_of", "keys_min_revision"):
+            if getattr(request, field):
+                raise InvalidFieldError(field, getattr(request, field), "only for a request with keys")
+        return False
+    if request.HasField("points"):
+        raise InvalidFieldError("keys", "points and keys", "use one or the other")
+    return True
+
+
 def decode_read(points: points_pb2.Points, field: str, reading: Reading) -> Points:
     """An (n, 2) array of points that suit the reading."""
     xy = decode_points(points, field)

@@ -14,8 +14,9 @@ from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
+from ..state.contents.keyed import Found
 from ..state.hull_state import Cause, Counts, VertexKeys
-from ..state.records import NO_TIME, HullSettings, Identity, Keys, Times
+from ..state.records import NO_TIME, Contents, HullSettings, Identity, Keys, Times
 
 IDENTITIES: dict[Identity, hull_pb2.Identity] = {
     "multiset": hull_pb2.IDENTITY_MULTISET,
@@ -96,6 +97,32 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     if counts.clock is not None:
         message.clock_time.FromMicroseconds(counts.clock)
     return message
+
+
+def encode_positions(
+    counts: Counts, found: Found, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.GetPositionsResponse:
+    """The positions of keys."""
+    return hull_service_pb2.GetPositionsResponse(
+        revision=counts.revision,
+        positions=encode_points(found.points, encoding),
+        present=found.present.tobytes(),
+        times=None if found.times is None else encode_times(found.times, encoding),
+    )
+
+
+def encode_entities(
+    counts: Counts, entities: Contents, rows: slice, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.ReadEntitiesResponse:
+    """Some rows of the keys of a hull with their positions."""
+    assert entities.keys is not None  # those of a keyed hull
+    times = None if entities.times is None else encode_times(entities.times[rows], encoding)
+    return hull_service_pb2.ReadEntitiesResponse(
+        revision=counts.revision,
+        keys=encode_keys(entities.keys[rows], encoding),
+        positions=encode_points(entities.points[rows], encoding),
+        times=times,
+    )
 
 
 async def encode_measures(vertices: Points, run: Run) -> hull_pb2.Measures:
@@ -206,6 +233,7 @@ def encode_verification(
         equal=verification.difference is None,
         point_count=verification.points,
         vertex_count=verification.vertices,
+        keys_equal=verification.keys_equal,
         rounds=[
             hull_service_pb2.ChanRound(
                 guess=each.guess, groups=each.groups, steps=each.steps, cost=each.cost, closed=each.closed

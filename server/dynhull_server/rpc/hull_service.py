@@ -2,13 +2,16 @@
 
 import time
 from contextlib import aclosing
+from functools import partial
 
 import numpy as np
 
 from dynhull.arrays import Checked
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
+from ..engine import entities
 from ..engine.engine import Engine
+from ..engine.entities import KeyAnswers, Question
 from ..engine.live_hull import LiveHull
 from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import ResumedView, SketchView, VerticesView, View
@@ -16,11 +19,17 @@ from ..engine.watch import watch
 from ..state.errors import HullEmptyError
 from . import answers, decode, encode
 from .calls import Call
+from .decode_batch import decode_keys
 from .decode_settings import decode_settings
 from .metrics import Metrics
 from .readings import ENTRIES, RISKS
-from .status import ANSWERED, MethodUnknownError, PartRefusedError
+from .status import ANSWERED, PartRefusedError
 from .writing import StreamedBatches, decode_together, decode_write
+
+# The side of a missing key.
+MISSING_SIDE = -128
+# The number of keys in a part of ReadEntities.
+ENTITIES_A_PART = 65_536
 
 
 class HullService:
@@ -143,6 +152,12 @@ class HullService:
 
     async def Locate(self, request: pb.LocateRequest, call: Call) -> pb.LocateResponse:
         hull = self._read(call, request.name)
+        if decode.decode_subjects(request):
+            found = await self._ask_of_keys(request, call, hull, lambda live, xy: live.locate(xy))
+            found.rows[found.missing] = MISSING_SIDE
+            return pb.LocateResponse(
+                revision=found.counts.revision, sides=found.rows.tobytes(), keys_revision=_keys_revision(found)
+            )
         xy = Checked(decode.decode_points(request.points, "points"))
         counts, sides = await hull.ask_rows(lambda live, rows: live.locate(xy[rows]), len(xy), request.min_revision)
         return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
@@ -153,18 +168,41 @@ class HullService:
         counts, times = await hull.count(xy, request.min_revision)
         return pb.CountResponse(revision=counts.revision, counts=times)
 
-    async def GetPositions(self, _: pb.GetPositionsRequest, __: Call) -> pb.GetPositionsResponse:
-        raise MethodUnknownError
+    async def GetPositions(self, request: pb.GetPositionsRequest, call: Call) -> pb.GetPositionsResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        keys = hull.keys(decode_keys(request.keys, "keys"))
+        counts, found = await entities.positions(hull, keys, request.min_revision)
+        run = self._run(len(keys))
+        response: pb.GetPositionsResponse = await run(partial(encode.encode_positions, counts, found, encoding))
+        return response
 
-    async def ReadEntities(self, _: pb.ReadEntitiesRequest, __: Call) -> None:
-        raise MethodUnknownError
+    async def ReadEntities(self, request: pb.ReadEntitiesRequest, call: Call) -> None:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        hull.require_keys()
+        with call.cutoff():
+            counts, contents = await entities.entities(hull, request.min_revision)
+        for first in range(0, max(len(contents), 1), ENTITIES_A_PART):
+            rows = slice(first, first + ENTITIES_A_PART)
+            with call.cutoff():
+                part = await self._engine.aside(partial(encode.encode_entities, counts, contents, rows, encoding))
+            await call.write_within(self._max_watch_lag, part)
 
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        directions = decode.decode_directions(request.directions)
-        counts, extremes = await hull.support(Checked(directions), request.min_revision)
-        return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
+        directions = Checked(decode.decode_directions(request.directions))
+        if not request.include_keys:
+            counts, extremes = await hull.support(directions, request.min_revision)
+            return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
+        hull.require_keys()
+        counts, extremes, keys = await entities.support(hull, directions, request.min_revision, self._engine.aside)
+        return pb.SupportResponse(
+            revision=counts.revision,
+            vertices=encode.encode_points(extremes, encoding),
+            keys=encode.encode_key_array(keys, encoding),
+        )
 
     async def Tangents(self, request: pb.TangentsRequest, call: Call) -> pb.TangentsResponse:
         hull = self._read(call, request.name)
@@ -181,6 +219,12 @@ class HullService:
 
     async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
         hull = self._read(call, request.name)
+        if decode.decode_subjects(request):
+            found = await self._ask_of_keys(request, call, hull, lambda live, xy: live.distance(xy))
+            found.rows[found.missing] = np.nan
+            return pb.DistanceResponse(
+                revision=found.counts.revision, distances=found.rows, keys_revision=_keys_revision(found)
+            )
         xy = Checked(decode.decode_points(request.points, "points"))
         counts, distances = await hull.ask_rows(
             lambda live, rows: live.distance(xy[rows]), len(xy), request.min_revision
@@ -206,12 +250,20 @@ class HullService:
         if not decode.decode_view(request.view):
             await hull.reached(request.min_revision)
             return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
-        counts, vertices = await hull.vertices(request.min_revision)
+        keys = None
+        if request.include_keys:
+            hull.require_keys()
+            counts, (vertices, keys) = await hull.read(
+                lambda state: (state.vertices(), state.vertex_keys()), hull.vertex_count, request.min_revision
+            )
+        else:
+            counts, vertices = await hull.vertices(request.min_revision)
         measures = await encode.encode_measures(vertices, self._run(len(vertices)))
         return pb.GetHullResponse(
             hull=encode.encode_hull(hull, counts),
             vertices=encode.encode_points(vertices, encoding),
             measures=measures,
+            vertex_keys=None if keys is None else encode.encode_key_array(keys, encoding),
         )
 
     async def GetMeasures(self, request: pb.GetMeasuresRequest, call: Call) -> pb.GetMeasuresResponse:
@@ -262,13 +314,21 @@ class HullService:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         counts, verification = await hull.verify(request.min_revision)
-        self._metrics.verified("call", verification.difference is None)
+        self._metrics.verified("call", verification.equal)
         return encode.encode_verification(counts, verification, encoding)
 
     async def SamplePoints(self, request: pb.SamplePointsRequest, call: Call) -> pb.SamplePointsResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         size = decode.decode_sample_size(request.sample_size)
+        if request.include_keys:
+            hull.require_keys()
+            counts, points, keys = await entities.sample(hull, size, request.min_revision, self._engine.aside)
+            return pb.SamplePointsResponse(
+                revision=counts.revision,
+                points=encode.encode_points(points, encoding),
+                keys=encode.encode_keys(keys, encoding),
+            )
         counts, points = await hull.sample(size, request.min_revision)
         return pb.SamplePointsResponse(revision=counts.revision, points=encode.encode_points(points, encoding))
 
@@ -310,6 +370,14 @@ class HullService:
         """The way to run the steps of an answer that reads this many rows."""
         return at_once if rows <= FEW_ROWS else self._engine.aside
 
+    async def _ask_of_keys(
+        self, request: pb.LocateRequest | pb.DistanceRequest, call: Call, hull: LiveHull, question: Question
+    ) -> KeyAnswers:
+        """The answers about the positions of the keys of a request."""
+        owner = self._read(call, request.keys_of, "keys_of") if request.keys_of else hull
+        keys = owner.keys(decode_keys(request.keys, "keys"))
+        return await entities.ask_of_keys(hull, request.min_revision, owner, request.keys_min_revision, keys, question)
+
     # Names
 
     def _read(self, call: Call, name: str, field: str = "name") -> LiveHull:
@@ -332,3 +400,8 @@ class HullService:
             )
         name = self._written(call, first.name)
         return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)
+
+
+def _keys_revision(found: KeyAnswers) -> int:
+    """The revision of the hull that has the keys, 0 if it is the hull that answered."""
+    return 0 if found.keys_counts is None else found.keys_counts.revision

@@ -16,7 +16,7 @@ from .errors import HullUnsuitableError, RefusedError
 from .history import History
 from .limits import Limits
 from .producers import Producers
-from .records import Expiry, HullSettings, Kept, Record
+from .records import Contents, Expiry, HullSettings, Kept, Record
 
 if TYPE_CHECKING:
     from .contents.live import AnyHull
@@ -188,6 +188,10 @@ class HullState:
             self._keys_as_of = revision
         assert self._vertex_keys is not None  # set above
         return self._vertex_keys
+
+    def entities(self) -> Contents | None:
+        """The keys of a keyed hull with their positions, None for a hull without keys. O(n log n)."""
+        return self.contents.stored() if isinstance(self.hull, KeyedHull) else None
 
     def keys_at(self, places: Points) -> VertexKeys:
         """The key at each of some places of a keyed hull, all of which have one."""

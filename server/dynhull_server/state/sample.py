@@ -1,6 +1,7 @@
 """A sample of many points."""
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull.arrays import Points
 
@@ -11,7 +12,12 @@ HALF = np.uint64(32)
 
 
 def sample(points: Points, size: int) -> Points:
-    """The `size` points of smallest hash, in their given order; `points` must have more rows. O(n).
+    """The `size` points of smallest hash, in their given order; `points` must have more rows. O(n)."""
+    return points[sample_rows(points, size)]
+
+
+def sample_rows(points: Points, size: int) -> npt.NDArray[np.intp]:
+    """The rows of the `size` points of smallest hash, ascending; `points` must have more rows. O(n).
 
     An insert or delete changes at most one point of the sample, so a picture of it does not flicker: bottom-k sampling
     (Cohen and Kaplan, "Summarizing data using bottom-k sketches", 2007).
@@ -21,4 +27,4 @@ def sample(points: Points, size: int) -> Points:
     hashes = (mixed[:, 0] + mixed[:, 1]) * FACTORS[1]
     hashes ^= hashes >> HALF
     hashes *= FACTORS[0]
-    return points[np.sort(np.argpartition(hashes, size)[:size])]
+    return np.sort(np.argpartition(hashes, size)[:size])

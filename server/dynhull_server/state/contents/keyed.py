@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull import DuplicateKeyError, KeyedHull
+from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 
 from ..admission import GREATEST_TIME, Admission, admit, server_clock, too_old
@@ -37,6 +38,21 @@ class Admitted:
     late: int
     clamped: int
     refuse_missing: bool
+
+
+@dataclass(slots=True)
+class Found:
+    """The positions of keys.
+
+    Attributes:
+        points: (n, 2) the position of each key; NaN for a missing key.
+        present: (n,) which keys are there.
+        times: (n,) their times, NO_TIME for a key without one; None for a hull without times.
+    """
+
+    points: Points
+    present: npt.NDArray[np.bool_]
+    times: Times | None
 
 
 class Keyed:
@@ -180,6 +196,12 @@ class Keyed:
         keys, points, times = self.hull.entities()
         deadlines = self._deadlines.of(_listed(keys)) if len(self._deadlines) else None
         return Contents(points, keys, stored_times(times) if self.timed else None, deadlines)
+
+    def find(self, keys: Keys) -> Found:
+        """The positions of keys of the hull's kind."""
+        points = self.hull.positions(keys)
+        times = stored_times(self.hull.times(keys)) if self.timed else None
+        return Found(points, ~np.isnan(points[:, 0]), times)
 
     # Changes
 
@@ -327,6 +349,11 @@ def select_keys(keys: Keys, which: npt.NDArray[np.bool_]) -> Keys:
         return keys[which]
     lengths = np.frombuffer(keys.lengths, np.uint8)
     return PackedKeys(lengths[which], np.frombuffer(keys.data, np.uint8)[np.repeat(which, lengths)])
+
+
+def take_keys(keys: Keys, rows: npt.NDArray[np.intp]) -> Keys:
+    """The keys of some rows, in their order."""
+    return PackedKeys.pack([keys[row] for row in rows.tolist()]) if isinstance(keys, PackedKeys) else keys[rows]
 
 
 def _refuse_repeated(rows: KeyRows) -> None:

@@ -1,0 +1,126 @@
+"""Reads about the keys of hulls, each at one revision."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull.arrays import Checked, Points
+
+from ..state.contents.keyed import Found, Keyed, take_keys
+from ..state.contents.live import AnyHull
+from ..state.errors import HullEmptyError
+from ..state.hull_state import Counts, HullState, VertexKeys
+from ..state.records import Contents, Keys
+from ..state.sample import sample_rows
+from .live_hull import LiveHull
+from .steps import BLOCK, Run, in_blocks
+
+# Called with a hull and (n, 2) points; the answer has a row for each.
+Question = Callable[[AnyHull, Checked], npt.NDArray[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class KeyAnswers:
+    """The answers of one hull about the positions of keys.
+
+    Attributes:
+        counts: the counts of the hull that answered.
+        rows: the answer for each key; meaningless for a missing key.
+        missing: which keys are missing.
+        keys_counts: the counts of the hull that has the keys, None if it is the hull that answered.
+    """
+
+    counts: Counts
+    rows: npt.NDArray[Any]
+    missing: npt.NDArray[np.bool_]
+    keys_counts: Counts | None
+
+
+def _keyed(state: HullState) -> Keyed:
+    assert isinstance(state.contents, Keyed)  # `LiveHull.keys` has refused the others
+    return state.contents
+
+
+async def positions(hull: LiveHull, keys: Keys, min_revision: int) -> tuple[Counts, Found]:
+    """The positions of keys of a keyed hull."""
+    return await hull.read(lambda state: _keyed(state).find(keys), len(keys), min_revision)
+
+
+async def entities(hull: LiveHull, min_revision: int) -> tuple[Counts, Contents]:
+    """All keys of a keyed hull in order, with their positions."""
+    return await hull.read(lambda state: _keyed(state).stored(), hull.counts.points, min_revision)
+
+
+async def ask_of_keys(
+    hull: LiveHull, min_revision: int, owner: LiveHull, owner_min_revision: int, keys: Keys, question: Question
+) -> KeyAnswers:
+    """Ask a hull about the positions of keys that it has itself, or another one."""
+    if owner is hull:
+
+        def ask(state: HullState) -> tuple[Found, npt.NDArray[Any]]:
+            found = _keyed(state).find(keys)
+            return found, question(state.hull, _known(found))
+
+        counts, (found, rows) = await hull.read(ask, len(keys), max(min_revision, owner_min_revision))
+        return KeyAnswers(counts, rows, ~found.present, None)
+    await hull.reached(min_revision)  # beforehand, so that the positions are not older than need be
+    owner_counts, found = await positions(owner, keys, owner_min_revision)
+    xy = _known(found)
+    counts, rows = await hull.ask_rows(lambda live, block: question(live, xy[block]), len(xy), min_revision)
+    return KeyAnswers(counts, rows, ~found.present, owner_counts)
+
+
+def _known(found: Found) -> Checked:
+    """The positions; the origin for a missing key, whose answer nobody reads."""
+    return Checked(np.where(found.present[:, np.newaxis], found.points, 0.0))
+
+
+async def support(
+    hull: LiveHull, directions: Checked, min_revision: int, run: Run
+) -> tuple[Counts, Points, VertexKeys]:
+    """The extreme vertices of a keyed hull and their keys, or raise HullEmptyError."""
+
+    def extreme(state: HullState) -> tuple[Points, VertexKeys]:
+        if not len(state.hull):
+            raise HullEmptyError(hull.name)
+        vertices = state.hull.support(directions)
+        return vertices, state.keys_at(vertices)
+
+    if len(directions) <= BLOCK:
+        counts, (extremes, keys) = await hull.read(extreme, len(directions), min_revision)
+        return counts, extremes, keys
+    counts, (vertices, vertex_keys) = await hull.read(
+        lambda state: (state.vertices(), state.vertex_keys()), hull.vertex_count, min_revision
+    )
+    if not len(vertices):
+        raise HullEmptyError(hull.name)
+    outline = await hull.outline(vertices)
+    extremes = await in_blocks(run, lambda rows: outline.support(directions[rows]), len(directions))
+    return counts, extremes, vertex_keys[await run(partial(_rows_of, extremes, vertices))]
+
+
+def _rows_of(points: Points, among: Points) -> npt.NDArray[np.intp]:
+    """The row of each point among different ones."""
+    numbers = np.ascontiguousarray(among).view(np.complex128).ravel()
+    order = np.argsort(numbers)
+    return order[np.searchsorted(numbers, np.ascontiguousarray(points).view(np.complex128).ravel(), sorter=order)]
+
+
+async def sample(hull: LiveHull, size: int, min_revision: int, run: Run) -> tuple[Counts, Points, Keys]:
+    """A sample of at most `size` of the points of a keyed hull, with their keys. Writes continue meanwhile."""
+    counts, contents = await entities(hull, min_revision)
+
+    def chosen() -> tuple[Points, Keys]:
+        assert contents.keys is not None  # those of a keyed hull
+        x, y = contents.points.T
+        order = np.lexsort((np.arange(len(x)), y, x))
+        if len(order) > size:
+            order = order[sample_rows(contents.points[order], size)]
+        return contents.points[order], take_keys(contents.keys, order)
+
+    points, keys = await run(chosen)
+    return counts, points, keys
