@@ -57,7 +57,15 @@ def export(
     file: Annotated[Path, typer.Argument(help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)],
     data: Annotated[Path, typer.Option(help="The data folder or a backup; a server may be using it.")] = DATA,
 ) -> None:
-    """Write the points of one hull, as of the last commit, to a file with columns x and y."""
+    """Write the points of one hull, as of the last commit, to a file.
+
+    CSV and Parquet have columns x and y, and those of key, time and expires that the hull has; expires is the time at
+    which a point leaves the hull. In GeoJSON the key is the id of a feature, and its times are properties. Times are in
+    UTC. Another hull can read back the points, keys and times, not the column expires:
+
+        dynhull export fleet fleet.csv
+        dynhull import copy fleet.csv --key key --time time
+    """
     from .data_folders import export_hull
 
     export_hull(data, name, file)

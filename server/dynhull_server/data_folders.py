@@ -1,22 +1,17 @@
 """What the commands for data folders do: copy, check and export, with a progress bar and errors as messages."""
 
-import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import typer
 
-from dynhull.arrays import Points
-
+from .exports import WRITERS
 from .progress import progress_bar
 from .state.contents import replayed
-from .storage.port import Progress, StorageError
+from .storage.port import StorageError
 from .storage.sqlite import copies
-
-ROWS_A_STEP = 100_000
 
 
 def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> None:
@@ -47,52 +42,16 @@ def check_folder(data: Path) -> bool:
 
 def export_hull(data: Path, name: str, file: Path) -> None:
     """Write the points of a hull to a file, in the format of its suffix."""
-    writers = {".csv": _write_csv, ".parquet": _write_parquet, ".geojson": _write_geojson}
     with _errors_reported():
-        if file.suffix not in writers:
-            raise StorageError(f"{file}: the name must end in {', '.join(writers)}")
-        kept, notes = copies.read(data, name)
+        if file.suffix not in WRITERS:
+            raise StorageError(f"{file}: the name must end in {', '.join(WRITERS)}")
+        row, kept, notes = copies.read(data, name)
         for note in notes:
             typer.echo(note, err=True)
-        points = replayed(kept).hull.points()
+        contents = replayed(kept, row.settings).stored()
         with progress_bar("points") as progress:
-            writers[file.suffix](file, points, progress)
-    typer.echo(f"{file}: {len(points):,} points of {name} at revision {kept.last_revision}")
-
-
-def _write_csv(file: Path, points: Points, progress: Progress) -> None:
-    with file.open("w", encoding="utf-8") as out:
-        out.write("x,y\n")
-        for rows in _steps(points, progress):
-            out.writelines(f"{x!r},{y!r}\n" for x, y in rows.tolist())
-
-
-def _write_geojson(file: Path, points: Points, progress: Progress) -> None:
-    with file.open("w", encoding="utf-8") as out:
-        out.write('{"type": "FeatureCollection", "features": [\n')
-        between = ""
-        for rows in _steps(points, progress):
-            for x, y in rows.tolist():
-                geometry = {"type": "Point", "coordinates": [x, y]}
-                out.write(between + json.dumps({"type": "Feature", "properties": {}, "geometry": geometry}))
-                between = ",\n"
-        out.write("\n]}\n")
-
-
-def _write_parquet(file: Path, points: Points, progress: Progress) -> None:
-    import pyarrow as pa  # slow to load, and only this format needs it
-    import pyarrow.parquet as pq
-
-    schema = pa.schema([("x", pa.float64()), ("y", pa.float64())])
-    with pq.ParquetWriter(file, schema) as out:
-        for rows in _steps(points, progress):
-            out.write_table(pa.table({"x": np.ascontiguousarray(rows[:, 0]), "y": np.ascontiguousarray(rows[:, 1])}))
-
-
-def _steps(points: Points, progress: Progress) -> Iterator[Points]:
-    for first in range(0, len(points), ROWS_A_STEP):
-        progress(first, len(points))
-        yield points[first : first + ROWS_A_STEP]
+            WRITERS[file.suffix](file, contents, progress)
+    typer.echo(f"{file}: {len(contents):,} points of {name} at revision {kept.last_revision}")
 
 
 @contextmanager

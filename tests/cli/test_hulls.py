@@ -9,7 +9,6 @@ import pytest
 from command_line import dynhull
 from server_process import COMMAND, PATIENCE
 
-from dynhull_cli.address import target
 from dynhull_client import HullClient
 
 
@@ -119,24 +118,6 @@ def test_addresses_as_people_write_them(served, name):
         assert done.exit_code == 2, address
         assert f"address {address!r}" in done.stderr
         assert "Write HOST or HOST:PORT" in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("address", "found"),
-    [
-        ("example.org", ("example.org:50051", False)),
-        ("http://example.org", ("example.org:50051", False)),
-        ("https://example.org/", ("example.org:50051", True)),
-        ("grpcs://example.org:443", ("example.org:443", True)),
-        ("::1", ("[::1]:50051", False)),
-        ("[::1]", ("[::1]:50051", False)),
-        ("http://[fe80::1%eth0]:7", ("[fe80::1%eth0]:7", False)),
-        ("unix:/run/dynhull.sock", ("unix:/run/dynhull.sock", False)),
-        ("dns:///example.org:7", ("dns:///example.org:7", False)),
-    ],
-)
-def test_the_target_of_an_address(address, found):
-    assert target(address) == found
 
 
 @pytest.mark.parametrize(

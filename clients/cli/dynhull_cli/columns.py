@@ -30,6 +30,8 @@ def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, 
 
 def column_index(path: Path | str, columns: Sequence[str], option: str, column: str) -> int:
     """The index of a column, given by its name or, where none has that name, by its number from 1."""
+    if columns.count(column) > 1:
+        raise ValueError(f"{path} has {columns.count(column)} columns {column!r}: give the number of one with {option}")
     if column in columns:
         return columns.index(column)
     if column.isdecimal() and 1 <= int(column) <= len(columns):
@@ -78,4 +80,5 @@ def plain(text: str, decimal: str) -> str:
 
 def _pair(columns: Sequence[str]) -> tuple[int, int] | None:
     lowered = [column.strip().lower() for column in columns]
-    return next(((lowered.index(x), lowered.index(y)) for x, y in COLUMN_NAMES if x in lowered and y in lowered), None)
+    pairs = (pair for pair in COLUMN_NAMES if all(lowered.count(each) == 1 for each in pair))
+    return next(((lowered.index(x), lowered.index(y)) for x, y in pairs), None)

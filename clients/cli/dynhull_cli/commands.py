@@ -23,6 +23,7 @@ PANELS = {
     "Getting to know dynhull": ("demo", "explain"),
 }
 OTHERS = "More"
+PACKAGES: dict[str | None, str | None] = {"google": "protobuf", "grpc": "grpcio"}  # of modules with other names
 
 
 class InstalledCommands(TyperGroup):
@@ -101,7 +102,7 @@ def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[]
 
     def explain() -> None:
         typer.echo(
-            f"error: dynhull {entry.name} needs {error.name}, which is not installed. "
+            f"error: dynhull {entry.name} needs {PACKAGES.get(error.name, error.name)}, which is not installed. "
             f"Install it with: pip install 'dynhull[{extras}]'",
             err=True,
         )

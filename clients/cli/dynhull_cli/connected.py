@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
 
 import typer
 
-from .address import target
-
 if TYPE_CHECKING:
     import grpc
 
@@ -91,12 +89,11 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         import dynhull_client as sdk
 
         try:
-            address, encrypted = target(address)
-            tls = tls or encrypted
             credentials = _credentials(tls, tls_ca, client_cert, client_key)
             command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
-            encryption = "does it serve TLS" if tls or tls_ca or client_cert else "does it require TLS (--tls)"
+            encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
+            encryption = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
             advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
         except sdk.UnauthenticatedError as error:

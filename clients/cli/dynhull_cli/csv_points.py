@@ -55,12 +55,13 @@ def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
 
 def _read(table: CsvTable, time: int | None, identity: int | None) -> tuple[list[Row], list[str]]:
     """Good rows, and a reason for each bad one."""
-    records = [(line, dict(enumerate(row))) for line, row in numbered(table.rows, table.first_line)]
+    records = [(line, row, dict(enumerate(row))) for line, row in numbered(table.rows, table.first_line)]
     places = table.x, table.y
-    mark = decimal_mark((fields.get(place, "") for _, fields in records for place in places), table.delimiter)
+    mark = decimal_mark((fields.get(place, "") for *_, fields in records for place in places), table.delimiter)
     rows, bad = [], []
-    for line, fields in records:
+    for line, row, fields in records:
         try:
+            table.require_no_more_fields(row)
             x, y = (coordinate(fields.get(place), table.names[place], mark) for place in places)
             when, name = (_label(fields, table.names, place) for place in (time, identity))
         except ValueError as reason:

@@ -68,6 +68,12 @@ class CsvTable:
     next_line: Callable[[], int]
     notes: list[str]
 
+    def require_no_more_fields(self, row: list[str]) -> None:
+        """Raise ValueError if the row has more fields than there are columns, other than empty ones at its end."""
+        columns = len(self.names)
+        if len(row) > columns and any(field.strip() for field in row[columns:]):
+            raise ValueError(f"{len(row)} fields in a table of {columns} columns")
+
 
 @contextmanager
 def csv_table(name: str, file: IO[bytes], given: CsvFormat) -> Iterator[CsvTable]:

@@ -7,6 +7,14 @@
 ...     print(client.get_hull("fleet").vertices)
 """
 
+try:
+    import google.protobuf  # noqa: F401
+    import grpc  # noqa: F401
+except ModuleNotFoundError as _missing:
+    raise ModuleNotFoundError(
+        "dynhull_client needs grpcio and protobuf. Install them with: pip install 'dynhull[client]'", name=_missing.name
+    ) from None
+
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_watch import AsyncWatch

@@ -112,7 +112,7 @@ def create_hull(
     time of a point is its event time or, if the batch has none, the time at which the server received it.
 
     Args:
-        name: 1 to 200 letters, digits and "._-/".
+        name: 1 to 200 letters a to z and A to Z, digits and "._-/".
         keyed: the kind of the keys, "str" or "int"; None for a hull of points without keys.
         max_age: the age at which points leave, in seconds or as a timedelta.
         max_points: the number of points beyond which the oldest leave. For a limit that refuses, see `point_limit`.

@@ -36,7 +36,7 @@ class HullClient(Client[BlockingConnection]):
     that are not finite points raise ValueError or TypeError, as in `dynhull`, and nothing is sent.
 
     Args:
-        address: host:port.
+        address: HOST or HOST:PORT; the port is 50051 unless given. https://HOST asks for TLS.
         timeout: seconds a call may take unless the call has its own timeout; None for no limit. Ingests, writers and
             watches have no limit by default.
         wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.

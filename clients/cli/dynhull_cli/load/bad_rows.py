@@ -9,6 +9,7 @@ from typing import TextIO
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
 from ..plural import plural
 from .chunks import BadRow, Chunk, Rows
+from .source import Source
 
 
 class BadRows:
@@ -41,6 +42,10 @@ class BadRows:
             raise ValueError("\n".join([f"more than {plural(self._most, 'bad row')} (--max-bad)", *self.report()]))
 
 
-def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:
-    """Open the file for the bad rows; without a path, None."""
-    return nullcontext() if path is None else path.open("w", encoding="utf-8", newline="")
+def open_bad_rows(path: Path | None, source: Source) -> AbstractContextManager[TextIO | None]:
+    """Open the file for the bad rows; without a path, None. ValueError where it is the file that is being read."""
+    if path is None:
+        return nullcontext()
+    if path.exists() and source.is_file(path):
+        raise ValueError(f"--bad-rows {path} is the file that is loaded, and would replace it: name another file")
+    return path.open("w", encoding="utf-8", newline="")

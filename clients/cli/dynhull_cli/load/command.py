@@ -117,7 +117,7 @@ def load(
     integers = not dry_run and key is not None and _has_integer_keys(client, name)
     with (
         open_source(file, format, options, integer_keys=integers) as source,
-        open_bad_rows(bad_rows) as bad_file,
+        open_bad_rows(bad_rows, source) as bad_file,
     ):
         bad = BadRows(bad_file, max_bad)
         if dry_run:

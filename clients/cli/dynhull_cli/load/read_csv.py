@@ -63,19 +63,22 @@ def _chunk(
 ) -> Chunk:
     """The points of rows that begin on that line."""
     places = table.x, table.y
-    points = None if labels is not None else _all_points(rows, places, decimal)
+    points = None if labels is not None else _all_points(rows, places, decimal, len(table.names))
     if points is not None:
         return Chunk(Rows(points))
 
     def positions(row: list[str]) -> list[Position]:
+        table.require_no_more_fields(row)
         x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
         return [(x, y)]
 
     return picked(((f"line {at}", row) for at, row in numbered(rows, line)), positions, ",".join, labels)
 
 
-def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str) -> Points | None:
-    """The points of the rows, which is the usual case; None if a row is not two finite numbers."""
+def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str, columns: int) -> Points | None:
+    """The points of the rows, which is the usual case; None if a row is not two finite numbers, or is too long."""
+    if max(map(len, rows)) > columns:
+        return None
     try:
         texts = [[row[place] for row in rows] for place in places]
         # One check for all: a number with _ or with the other decimal mark is looked at below, row by row.

@@ -3,6 +3,7 @@
 import gzip
 import hashlib
 import io
+import os
 import sys
 import zlib
 from collections.abc import Callable, Iterator
@@ -66,6 +67,13 @@ class Source:
         """Return to the beginning; not possible with a pipe."""
         self.file.seek(0)
         self.notes.clear()
+
+    def is_file(self, path: Path) -> bool:
+        """Whether that is the file that is read, perhaps by another name."""
+        try:
+            return os.path.samestat(os.fstat(self.compressed.fileno()), path.stat())
+        except io.UnsupportedOperation:
+            return False
 
     def done(self) -> int:
         """Bytes read so far, of `size`."""
