@@ -14,7 +14,7 @@ from dynhull.keys import PackedKeys
 
 from ..admission import GREATEST_TIME, Admission, admit, server_clock, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
-from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError
+from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
 from ..records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
 from .deadlines import Deadlines, Key
 
@@ -94,18 +94,14 @@ class Keyed:
         oldest = self._earliest + window.max_age
         return oldest if first is None else min(first, oldest)
 
-    def misfit(self, batch: Batch | KeyedBatch) -> str:
-        """Why a hull of this kind takes no such batch; empty if it does."""
-        if isinstance(batch, Batch):
-            if len(batch.inserts) or len(batch.deletes):
-                return f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them"
-        elif batch.kind != self._kind:
-            return f"has keys that are {KINDS[self._kind]}, not {KINDS[batch.kind]}"
-        return ""
-
     def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
         """The batch with the times of its rows, without those that are too old."""
-        if isinstance(batch, Batch):  # empty
+        if isinstance(batch, KeyedBatch):
+            if batch.kind != self._kind:
+                raise MisfitError(f"has keys that are {KINDS[self._kind]}, not {KINDS[batch.kind]}")
+        elif len(batch.inserts) or len(batch.deletes):
+            raise MisfitError(f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them")
+        else:  # empty
             batch = KeyedBatch(self._kind, self._no_keys(), NO_POINTS, self._no_keys())
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
         admission = admit(self._settings, batch.times, len(batch.keys), "puts.times", arrived, self.clock)

@@ -13,9 +13,9 @@ from dynhull.arrays import Points
 
 from ..admission import GREATEST_TIME, admit, too_old
 from ..batch import Applied, Batch, KeyedBatch
-from ..errors import InvalidBatchError, LimitExceededError
+from ..errors import InvalidBatchError, LimitExceededError, MisfitError
 from ..records import Contents, Expiry, HullSettings, PointRows, Record, Times
-from .multiset import apply_points, missing_point, points_misfit
+from .multiset import NO_KEYS, apply_points, missing_point
 
 UNLIMITED = 2**63 - 1
 
@@ -69,12 +69,10 @@ class Windowed:
         oldest = self.hull.oldest if self.follows_server and self._window.max_age else None
         return None if oldest is None else int(oldest) + self._window.max_age
 
-    def misfit(self, batch: Batch | KeyedBatch) -> str:
-        """Why a hull of this kind takes no such batch; empty if it does."""
-        return points_misfit(batch)
-
-    def admit(self, batch: Batch, arrived: int) -> Admitted:
+    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
         """The batch with the times of its inserts, without those that are too old."""
+        if isinstance(batch, KeyedBatch):
+            raise MisfitError(NO_KEYS)
         rows, moves = len(batch.inserts), batch.moves
         if moves and not self.follows_server:
             problem = "event times drive the clock of this hull, and moves have none: delete and insert instead"
