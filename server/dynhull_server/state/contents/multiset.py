@@ -36,7 +36,7 @@ class Multiset:
 
     def admit(self, batch: Batch | KeyedBatch, _: int) -> Batch:
         """The batch, or raise MisfitError or LimitExceededError."""
-        if type(batch) is KeyedBatch:
+        if isinstance(batch, KeyedBatch):
             raise MisfitError(NO_KEYS)
         if batch.times is not None:
             raise MisfitError("has no window, so its points have no times")
