@@ -18,6 +18,9 @@ from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError, Misf
 from ..records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
 from .deadlines import Deadlines, Key
 
+# Changes are replayed as one of up to this many rows, which is many times faster.
+REPLAYED_TOGETHER = 65_536
+REMOVED = -1
 KINDS = {"str": "strings", "int": "integers"}
 
 
@@ -176,16 +179,34 @@ class Keyed:
         return Expiry(until, leaving)
 
     def replay(self, records: Iterable[Record]) -> None:
-        """Apply recorded changes."""
+        """Apply recorded changes, many at a time."""
+        group: list[KeyRows] = []
+        size = 0
         for record in records:
             rows = record.rows
+            assert isinstance(rows, KeyRows | Expiry)
+            if group and (size >= REPLAYED_TOGETHER or not self._may_follow(group[-1], rows)):
+                self._carry_out(_merged(group))
+                group, size = [], 0
             if isinstance(rows, Expiry):
                 assert record.clock is not None  # nothing expires without a clock
                 self._expire(rows.until, record.clock)
             else:
-                assert isinstance(rows, KeyRows)
-                self._carry_out(rows)
+                group.append(rows)
+                size += len(rows)
             self.clock = record.clock
+        if group:
+            self._carry_out(_merged(group))
+
+    def _may_follow(self, before: KeyRows, rows: KeyRows | Expiry) -> bool:
+        """Whether two changes have the effect of one that has the last position of each key."""
+        window = self._settings.window
+        if isinstance(rows, Expiry) or self._settings.by_event_time or len(self._deadlines):
+            return False
+        if window is not None and window.max_points:
+            return False
+        alike = (before.times is None) == (rows.times is None)
+        return alike and all(each.condition is None and each.deadlines is None for each in (before, rows))
 
     def stored(self) -> Contents:
         """The points in the order of their keys. O(n log n)."""
@@ -364,6 +385,32 @@ def _refuse_repeated(rows: KeyRows) -> None:
         if first != number:
             places = [("puts.keys", each) if each < puts else ("removes", each - puts) for each in (first, number)]
             raise KeyRepeatedError(key, places[0], places[1])
+
+
+def _merged(group: list[KeyRows]) -> KeyRows:
+    """One change with the effect of several: the last position of each key."""
+    if len(group) == 1:
+        return group[0]
+    last: dict[Key, int] = {}  # the row of the last put, REMOVED after a removal
+    number = 0
+    for rows in group:
+        for key in _listed(rows.removes):
+            last[key] = REMOVED
+        for key in _listed(rows.keys):
+            last[key] = number
+            number += 1
+    put = [key for key, row in last.items() if row != REMOVED]
+    chosen = np.array([last[key] for key in put], np.intp)
+    dated = [rows.times for rows in group if rows.times is not None]
+    times = np.concatenate(dated)[chosen] if dated else None
+    kind = group[0].keys
+    points = np.concatenate([rows.points for rows in group])[chosen]
+    removed = [key for key, row in last.items() if row == REMOVED]
+    return KeyRows(_of_kind(put, kind), points, _of_kind(removed, kind), times)
+
+
+def _of_kind(keys: list[Any], kind: Keys) -> Keys:
+    return PackedKeys.pack(keys) if isinstance(kind, PackedKeys) else np.array(keys, np.uint64)
 
 
 def _listed(keys: Keys) -> list[Any]:
