@@ -3,14 +3,24 @@
 import json
 import re
 import subprocess
+import time
 from pathlib import Path
 
+import grpc
 import pytest
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
 from metrics import fetch, measured, scrape
+from patience import wait_until
 from peers import program
 from server_process import PATIENCE, run
 
 from dynhull_client import HullClient, PointMissingError
+from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+ONE = points_pb2.Points(coordinates=[1, 2])
 
 CONFIG = """
 global: {{scrape_interval: 100ms, scrape_timeout: 100ms}}
@@ -55,6 +65,47 @@ def test_what_happened_is_counted() -> None:
         assert (samples["dynhull_hulls"], samples["dynhull_points"]) == (1, 5)
         assert samples['dynhull_hull_points{hull="a"}'] == 5
         assert samples['dynhull_hull_vertices{hull="a"}'] == 4
+
+
+def test_what_becomes_of_keys_is_counted() -> None:
+    """By a hull whose clock follows event times; another one, whose clock is the server's, loses a key by itself."""
+    by_data = hull_pb2.Window(max_age=Duration(seconds=10), max_points=3, clock=hull_pb2.CLOCK_DATA)
+    by_data.max_skew.FromSeconds(3600)
+    by_data.ahead = hull_pb2.AHEAD_POLICY_CLAMP
+    strings = hull_pb2.IDENTITY_STRING_KEYS
+    configs = {
+        "data": hull_pb2.HullConfig(identity=strings, window=by_data, ordering=hull_pb2.ORDERING_EVENT_TIME),
+        "server": hull_pb2.HullConfig(identity=strings, window=hull_pb2.Window(max_age=Duration(nanos=1_000_000))),
+    }
+    now = int(time.time())
+
+    def put(name: str, *rows: tuple[str, int], **puts: object) -> None:
+        keys = points_pb2.Keys(strings=[key for key, _ in rows])
+        xy = points_pb2.Points(coordinates=[float(each) for i in range(len(rows)) for each in (i, i)])
+        times = points_pb2.Times(timestamps=[Timestamp(seconds=now + at) for _, at in rows])
+        batch = batch_pb2.Batch(puts=batch_pb2.Puts(keys=keys, points=xy, times=times, **puts))
+        stub.Apply(pb.ApplyRequest(name=name, batch=batch))
+
+    with measured("--scrub-cpu", "0") as (server, address), grpc.insecure_channel(server.address) as channel:
+        stub = HullServiceStub(channel)
+        for name, config in configs.items():
+            stub.CreateHull(pb.CreateHullRequest(name=name, config=config))
+        put("data", ("a", -500), ("b", -501), ("late", -520))
+        put("data", ("a", -502), ("b", -500))  # the first is stale
+        put("data", ("a", -499), ("c", -499), condition=batch_pb2.PUT_CONDITION_IF_PRESENT)  # the second is skipped
+        put("data", ("d", -498), ("e", -498))  # b is evicted, as the oldest
+        assert scrape(address)["dynhull_entities"] == 3
+        assert 498 <= scrape(address)["dynhull_clock_lag_seconds"] < 498 + PATIENCE
+        put("data", ("f", 100_000))  # clamped; the others expire
+        assert scrape(address)["dynhull_clock_lag_seconds"] == 0
+        stub.Apply(pb.ApplyRequest(name="server", batch={"puts": {"keys": {"strings": ["g"]}, "points": ONE}}))
+        wait_until(lambda: scrape(address)['dynhull_updates_total{operation="expire"}'] == 4)
+        samples = scrape(address)
+        assert samples["dynhull_entities"] == 1
+        updates = {"insert": 6, "move": 2, "evict": 1, "delete": 0, "missing": 0}
+        assert {each: samples[f'dynhull_updates_total{{operation="{each}"}}'] for each in updates} == updates
+        rows = {"late": 1, "stale": 1, "skipped": 1, "clamped": 1}
+        assert {each: samples[f'dynhull_rows_total{{outcome="{each}"}}'] for each in rows} == rows
 
 
 def test_promtool_has_nothing_to_complain_about() -> None:

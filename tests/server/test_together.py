@@ -8,12 +8,14 @@ from pathlib import Path
 
 import grpc
 import pytest
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
 from patience import PATIENCE
 from refusal import refusal
 from server_process import server_process
 
 from dynhull_client import HullClient
-from dynhull_proto.v1 import batch_pb2, points_pb2
+from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -130,6 +132,72 @@ def test_a_refused_batch_leaves_all_hulls_as_they_were(stub: HullServiceStub, fl
     assert (refused, info.reason) == (code, reason)
     assert dict(info.metadata).items() >= {key: value.format(**names) for key, value in metadata.items()}.items()
     assert counts(stub, fleet) == before
+
+
+@pytest.fixture
+def fleets(stub: HullServiceStub, name: str) -> list[str]:
+    """The names of two hulls of vehicles, the first with one; the second forgets them by their event times."""
+    names = [f"{name}/{each}" for each in ("here", "there")]
+    window = hull_pb2.Window(max_age=Duration(seconds=60), clock=hull_pb2.CLOCK_DATA)
+    for each, settings in zip(names, ({}, {"window": window}), strict=True):
+        config = hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_STRING_KEYS, **settings)
+        stub.CreateHull(pb.CreateHullRequest(name=each, config=config))
+    stub.Apply(pb.ApplyRequest(name=names[0], batch=put("van")))
+    return names
+
+
+def put(*keys: str, at: int = 1_000) -> batch_pb2.Batch:
+    places = [float(i) for i in range(2 * len(keys))]
+    times = points_pb2.Times(timestamps=[Timestamp(seconds=at)] * len(keys))
+    return batch_pb2.Batch(puts=batch_pb2.Puts(keys=named(*keys), points=points(*places), times=times))
+
+
+def remove(*keys: str) -> batch_pb2.Batch:
+    return batch_pb2.Batch(removes=named(*keys), missing_keys=batch_pb2.MISSING_KEY_POLICY_REFUSE)
+
+
+def named(*keys: str) -> points_pb2.Keys:
+    return points_pb2.Keys(strings=keys)
+
+
+def present(stub: HullServiceStub, name: str, *keys: str) -> list[bool]:
+    answer = stub.GetPositions(pb.GetPositionsRequest(name=name, keys=named(*keys)))
+    return [bool(byte) for byte in answer.present]
+
+
+def test_a_key_that_leaves_one_hull_for_another_is_in_exactly_one(stub: HullServiceStub, fleets: list[str]) -> None:
+    here, there = fleets
+    answer = stub.ApplyTogether(together((here, remove("van")), (there, put("van"))))
+    assert [(each.inserted, each.deleted) for each in answer.results] == [(0, 1), (1, 0)]
+    assert [present(stub, name, "van") for name in fleets] == [[False], [True]]
+    before = counts(stub, fleets)
+    batches = {
+        "the key is missing": ((there, put("car")), (here, remove("van"))),
+        "a later time expires what stays, if nothing is refused": (
+            (there, put("car", at=2_000)),
+            (here, remove("van")),
+        ),
+        "a key twice": ((here, put("car")), (there, put("car", "bus", "car"))),
+        "a batch of points": ((there, put("car")), (here, insert(1, 1))),
+    }
+    said = {case: refusal(lambda parts=parts: stub.ApplyTogether(together(*parts))) for case, parts in batches.items()}
+    assert [info.reason for _, info, _ in said.values()] == ["KEY_MISSING"] * 2 + ["KEY_REPEATED", "HULL_UNSUITABLE"]
+    assert [info.metadata["batch"] for _, info, _ in said.values()] == ["1"] * 4
+    assert said["the key is missing"][1].metadata["field"] == "batches[1].batch.removes"
+    twice = said["a key twice"][1].metadata
+    assert (twice["field"], twice["row"], twice["first_row"]) == ("batches[1].batch.puts.keys", "2", "0")
+    assert twice["first_field"] == "batches[1].batch.puts.keys"
+    assert counts(stub, fleets) == before
+    assert [present(stub, name, "van", "car") for name in fleets] == [[False, False], [True, False]]
+
+
+def test_points_that_leave_at_the_time_of_a_batch_do_so_before_it(stub: HullServiceStub, fleets: list[str]) -> None:
+    here, there = fleets
+    stub.ApplyTogether(together((here, put("bus")), (there, put("old"))))
+    answer = stub.ApplyTogether(together((here, remove("bus")), (there, put("bus", at=1_060))))
+    assert [(each.revision, each.point_count) for each in answer.results] == [(3, 1), (3, 1)]
+    assert answer.results[1].clock_time.seconds == 1_060
+    assert present(stub, there, "old", "bus") == [False, True]
 
 
 def test_points_that_a_batch_inserts_and_deletes_leave_no_trace(stub: HullServiceStub, fleet: list[str]) -> None:

@@ -188,7 +188,7 @@ class Client:
         else:
             self._applied(asked, attempt, applied, producer, sequence)
             if name in KEYED:
-                self.model.put(attempt, applied, len(op["keys"]))
+                self._put(op, attempt, applied)
 
     async def together(self, op: Operation) -> None:
         """A batch to each of several hulls; a fault of it is in the last one."""
@@ -217,7 +217,7 @@ class Client:
         for each, attempt, applied in zip(asked, attempts, results, strict=True):
             self.model.applied(each, attempt, applied, producer, sequence)
             if each.name in KEYED:
-                self.model.put(attempt, applied, len(op["keys"]))
+                self._put(op, attempt, applied)
         if len({applied.duplicate for applied in results}) > 1:
             raise self.model.finds(f"batches {attempts} are a duplicate in one hull alone: {results}")
         if producer:
@@ -270,6 +270,9 @@ class Client:
             raise self.model.finds("a stream was refused after all its batches had been applied")
         self._batch_refused(op, opened, stream.refusal, [attempt for _, attempt, _ in under_way])
         return False
+
+    def _put(self, op: Operation, attempt: int, applied: Applied) -> None:
+        self.model.put(attempt, applied, len(op["keys"]), timed="time" in op or "deadline" in op)
 
     def _producer(self, op: Operation) -> str:
         if not op["numbered"]:

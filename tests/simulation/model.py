@@ -304,10 +304,15 @@ class Model:
             raise self.finds(f"batch {attempt} was seen before it was sent")
         self._answered(asked, (truth.row.number, revision))
 
-    def put(self, attempt: int, applied: Applied, puts: int) -> None:
-        """A batch of keys has been acknowledged: what it is said to have done must be what it did."""
+    def put(self, attempt: int, applied: Applied, puts: int, *, timed: bool) -> None:
+        """A batch of keys has been acknowledged: what it is said to have done must be what it did.
+
+        With `timed` its rows had times or deadlines, which may have been too early.
+        """
         if applied.duplicate:
             return
+        if applied.late and not timed:
+            raise self.finds(f"of batch {attempt} {applied.late} rows were late when they came")
         effect, rows = self._effects[attempt]
         said = applied.inserted, applied.moved, applied.stale, applied.skipped, applied.deleted, applied.evicted
         if (said, applied.late) != (effect, puts - rows):

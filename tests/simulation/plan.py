@@ -76,6 +76,10 @@ def random_plan(seed: int, layer: str) -> Plan:
         weights["put"] = 0
         weights["together"] *= len(names) > 1
     immediate = layer != "sqlite" and draw.random() < 0.1
+    lives = [_life(draw, names, keyed, weights) for _ in range(draw.choice((1, 1, 2, 3)))]
+    for name in keyed:
+        if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window
+            lives[0]["clients"][0].insert(0, {"do": "create", "name": name, "max_points": 0} | _settings(draw))
     return {
         "seed": seed,
         "layer": layer,
@@ -87,7 +91,7 @@ def random_plan(seed: int, layer: str) -> Plan:
             "max_producers_per_caller": draw.choice((1, 10, 10)),
             "history_bytes": draw.choice((0, 0, 700, 1_000_000)),
         },
-        "lives": [_life(draw, names, keyed, weights) for _ in range(draw.choice((1, 1, 2, 3)))],
+        "lives": lives,
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
     }
 

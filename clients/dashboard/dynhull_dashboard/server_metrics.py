@@ -15,7 +15,7 @@ from .history import History
 POLL_SECONDS = 1.0
 TIMEOUT_SECONDS = 2.0
 PERCENTILE = 0.99
-COUNTED = ("insert", "delete")
+COUNTED = ("insert", "delete", "move")
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ class Scrape:
 
     Attributes:
         at: the moment, by `time.monotonic`.
-        updates: the number of points inserted and deleted.
+        updates: the number of points inserted, deleted and moved.
         batches: the number of batches acknowledged.
         seconds: the sum of their acknowledgement delays.
         buckets: the number of batches with at most that delay, by the upper bound of the bucket in seconds.

@@ -61,14 +61,20 @@ STUCK = 10.0
 
 
 class Expiries:
-    """Receives the answers to the core's own requests, and reports their failures."""
+    """Receives the answers to the core's own requests, and reports their failures.
+
+    Attributes:
+        points: the number of points that have left.
+    """
 
     def __init__(self, supervisor: Supervisor) -> None:
+        self.points = 0
         self._supervisor = supervisor
 
     def answer(self, request: Request) -> None:
         """Report the outcome of a request; at a shutdown there is none."""
         if request.error is None:
+            self.points += request.result
             self._supervisor.succeeded("expiry")
         elif not isinstance(request.error, StoppingError):
             self._supervisor.failed("expiry", request.error)
@@ -246,6 +252,11 @@ class Engine:
     def time(self) -> int:
         """The server's clock, in microseconds since 1970."""
         return self._time.now()
+
+    @property
+    def expired(self) -> int:
+        """The number of points that have left by the server's clock, without those that left before a batch."""
+        return self._expiries.points
 
     # The core
 

@@ -11,7 +11,7 @@ from ..state.batch import Applied
 
 
 class BatchCounts:
-    """Counts of batches and their points, and a histogram of their delays.
+    """Counts of batches and their rows, and a histogram of their delays.
 
     Args:
         buckets: the upper bounds in seconds; one more bucket has no bound.
@@ -22,7 +22,8 @@ class BatchCounts:
         self._took = [0] * (len(buckets) + 1)
         self._seconds = 0.0
         self._applied = self._duplicate = self._refused = 0
-        self._inserted = self._deleted = self._missing = 0
+        self._updates = dict.fromkeys(("insert", "delete", "move", "evict", "expire", "missing"), 0)
+        self._rows = dict.fromkeys(("stale", "late", "skipped", "clamped"), 0)
 
     def applied(self, applied: Applied, seconds: float) -> None:
         """Count a batch that was applied `seconds` after its arrival."""
@@ -32,16 +33,23 @@ class BatchCounts:
             self._duplicate += 1
             return
         self._applied += 1
-        self._inserted += applied.inserted
-        self._deleted += applied.deleted
-        self._missing += applied.missing
+        self._updates["insert"] += applied.inserted
+        self._updates["delete"] += applied.deleted
+        self._updates["move"] += applied.moved
+        self._updates["evict"] += applied.evicted
+        self._updates["expire"] += applied.expired
+        self._updates["missing"] += applied.missing
+        self._rows["stale"] += applied.stale
+        self._rows["late"] += applied.late
+        self._rows["skipped"] += applied.skipped
+        self._rows["clamped"] += applied.clamped
 
     def refused(self) -> None:
         """Count a refused batch."""
         self._refused += 1
 
-    def families(self) -> list[Metric]:
-        """The metrics for Prometheus."""
+    def families(self, expired: int) -> list[Metric]:
+        """The metrics for Prometheus; `expired` is the number of points that left by the server's clock."""
         batches = CounterMetricFamily("dynhull_batches", "Batches, by outcome.", labels=["outcome"])
         for outcome, count in (
             ("applied", self._applied),
@@ -49,12 +57,23 @@ class BatchCounts:
             ("refused", self._refused),
         ):
             batches.add_metric([outcome], count)
-        updates = CounterMetricFamily("dynhull_updates", "Points inserted and deleted.", labels=["operation"])
-        for operation, count in (("insert", self._inserted), ("delete", self._deleted), ("missing", self._missing)):
-            updates.add_metric([operation], count)
+        updates = CounterMetricFamily(
+            "dynhull_updates",
+            "Points inserted, deleted, moved by their keys, evicted and expired; deletes of missing points.",
+            labels=["operation"],
+        )
+        for operation, count in self._updates.items():
+            updates.add_metric([operation], count + (expired if operation == "expire" else 0))
+        rows = CounterMetricFamily(
+            "dynhull_rows",
+            "Rows of batches that changed nothing, as stale, late or skipped, or whose event time was clamped.",
+            labels=["outcome"],
+        )
+        for outcome, count in self._rows.items():
+            rows.add_metric([outcome], count)
         durations = HistogramMetricFamily(
             "dynhull_batch_duration_seconds", "Seconds from the arrival of a batch until its acknowledgement is ready."
         )
         bounds = map(floatToGoString, (*self._bounds, INF))
         durations.add_metric([], list(zip(bounds, accumulate(self._took), strict=True)), self._seconds)
-        return [batches, updates, durations]
+        return [batches, updates, rows, durations]

@@ -14,6 +14,8 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from ..engine.engine import Engine
+from ..engine.live_hull import LiveHull
+from ..engine.server_time import MICROSECONDS
 from ..engine.supervisor import Supervisor
 from .background import background_families
 from .batch_counts import BatchCounts
@@ -136,7 +138,11 @@ class StateCollector(Collector):
         yield from _on(self._loop, self._all)
 
     def _all(self) -> list[Metric]:
-        return [*self._gauges(), *self._metrics.batches.families(), *background_families(self._supervisor)]
+        return [
+            *self._gauges(),
+            *self._metrics.batches.families(self._engine.expired),
+            *background_families(self._supervisor),
+        ]
 
     def _gauges(self) -> list[GaugeMetricFamily]:
         hulls = list(self._engine)
@@ -148,15 +154,25 @@ class StateCollector(Collector):
             points.add_metric([hull.name], hull.counts.points)
             vertices.add_metric([hull.name], hull.vertex_count)
         total = sum(hull.counts.points for hull in hulls)
+        entities = sum(hull.counts.points for hull in hulls if hull.settings.identity != "multiset")
         lag = "Seconds since the slowest watcher was sent an event it has not received yet."
+        behind = "Seconds by which the slowest clock that event times drive is behind the server's; 0 without any."
         return [
             GaugeMetricFamily("dynhull_hulls", "Hulls.", value=len(hulls)),
             GaugeMetricFamily("dynhull_points", "Points of all hulls.", value=total),
+            GaugeMetricFamily("dynhull_entities", "Points of all keyed hulls.", value=entities),
+            GaugeMetricFamily("dynhull_clock_lag_seconds", behind, value=self._clock_lag(hulls)),
             GaugeMetricFamily("dynhull_watchers", "Watchers.", value=self._metrics.watchers),
             GaugeMetricFamily("dynhull_watch_lag_seconds", lag, value=self._metrics.lag),
             points,
             vertices,
         ]
+
+    def _clock_lag(self, hulls: list[LiveHull]) -> float:
+        """The lag of the slowest clock that follows event times."""
+        clocks = [hull.counts.clock for hull in hulls if hull.settings.window and hull.settings.window.clock == "data"]
+        slowest = min((clock for clock in clocks if clock is not None), default=None)
+        return 0.0 if slowest is None else max(self._engine.time() - slowest, 0) / MICROSECONDS
 
 
 def _on(loop: asyncio.AbstractEventLoop, function: Any) -> Any:

@@ -76,6 +76,7 @@ class Applied:
         clamped: rows whose event time was reduced.
         evicted: the oldest points, removed because the window has room for no more.
         clock: the clock of the hull, None for a hull without a clock.
+        expired: points that left before the batch because of its time, as a revision of their own.
     """
 
     revision: int
@@ -92,6 +93,7 @@ class Applied:
     clamped: int = 0
     evicted: int = 0
     clock: int | None = None
+    expired: int = 0
 
 
 NO_POINTS: Points = np.empty((0, 2))

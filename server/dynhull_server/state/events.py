@@ -116,7 +116,10 @@ class ReadHull(Request):
 
 @dataclass(slots=True, eq=False)
 class Expire(Request):
-    """Remove the points of a hull that leave at `time`, by the server's clock. The core makes it at a Tick."""
+    """Remove the points of a hull that leave at `time`, by the server's clock. The result is their number.
+
+    The core makes it at a Tick.
+    """
 
     hull: "Hull"
     time: int

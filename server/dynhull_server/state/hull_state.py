@@ -125,11 +125,12 @@ class HullState:
             Exception: the batch is refused; nothing has changed.
         """
         contents = self.contents
+        expired = 0
         if contents.clock is not None:
             clock = contents.expires_before(batch)
             if clock is not None:
                 contents.check(batch)  # a refused batch makes no points leave
-                self.expire(clock, records)
+                expired = self.expire(clock, records)
         self.torn = True
         try:
             applied, rows = contents.apply(batch, self.counts.revision + 1)
@@ -138,16 +139,17 @@ class HullState:
             raise
         if write.producer:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
+        applied.expired = expired
         self._applied(applied.points, "batch", hull_changed=applied.hull_changed)
         if records is not None:
             records.append(Record(applied.revision, rows, write.producer, write.sequence, contents.clock))
         self.torn = False
         return applied
 
-    def expire(self, clock: int, records: list[Record] | None) -> bool:
+    def expire(self, clock: int, records: list[Record] | None) -> int:
         """Advance the hull's clock, and remove the points that leave then as a revision of its own.
 
-        Returns whether any did; otherwise nothing has changed.
+        Returns their number; if it is 0, nothing has changed.
         """
         changes = self.hull.changes
         self.torn = True
@@ -157,7 +159,7 @@ class HullState:
             if records is not None:
                 records.append(Record(self.counts.revision, rows, clock=self.contents.clock))
         self.torn = False
-        return rows is not None
+        return 0 if rows is None else rows.points
 
     def _applied(self, points: int, cause: Cause, *, hull_changed: bool) -> None:
         """Update the counts and the history after a change."""

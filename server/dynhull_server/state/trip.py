@@ -141,8 +141,7 @@ class Trip:
                 leg.after = self._new_hull(request, leg)
                 return leg.after
             case Expire():
-                self._expire(request, leg)
-                return None
+                return self._expire(request, leg)
             case DeleteHull():
                 if leg.after is None:
                     raise HullNotFoundError(leg.name)
@@ -189,16 +188,19 @@ class Trip:
     def _count(self, leg: Leg, applied: Applied) -> None:
         if not applied.duplicate:
             self.applied = True
-            leg.unsaved += applied.inserted + applied.moved + applied.deleted
+            leg.unsaved += applied.inserted + applied.moved + applied.deleted + applied.expired
 
-    def _expire(self, request: Expire, leg: Leg) -> None:
+    def _expire(self, request: Expire, leg: Leg) -> int:
         hull = leg.after
         if hull is None or hull is not request.hull:
-            return
+            return 0
         try:
-            self.applied |= hull.state.expire(request.time, leg.records)
+            expired = hull.state.expire(request.time, leg.records)
         finally:
             self.torn = hull.state.torn
+        self.applied |= expired > 0
+        leg.unsaved += expired
+        return expired
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
         place, birth = self.place, request.birth

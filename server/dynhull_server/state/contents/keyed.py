@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DuplicateKeyError, KeyedHull
+from dynhull import DuplicateKeyError, KeyedHull, Put
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 
@@ -233,14 +233,18 @@ class Keyed:
             for key, deadline in zip(_listed(keys), stored.deadlines.tolist(), strict=True):
                 self._deadlines.set(key, deadline)
 
-    def _carry_out(self, rows: KeyRows) -> tuple[Any, int, int]:
+    def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
         """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""
         hull, times = self.hull, rows.times
         removed = hull.remove_many(rows.removes, missing="ignore") if len(rows.removes) else 0
         written = None
         if rows.deadlines is not None or len(self._deadlines):
             written = self._written(rows)
-        put = hull.update(rows.keys, rows.points, None if times is None else library_times(times), only=rows.condition)
+        put = Put(0, 0, 0, 0, 0)
+        if len(rows.keys):  # otherwise a hull by event time would ask for times
+            put = hull.update(
+                rows.keys, rows.points, None if times is None else library_times(times), only=rows.condition
+            )
         if times is not None:
             self._note_times(times)
         if written is not None:
