@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynhull import DynamicHull, convex_hull, static
+from dynhull import DynamicHull, WindowHull, convex_hull, static
 from dynhull._nodes import UPPER, Leaf, bridge
 from dynhull._predicates import ORIENT_BOUND, UNDERFLOW, orient2d
 from dynhull.convex import ball, convex_combination, minkowski_sum, polygon
@@ -246,6 +246,20 @@ def sorting(axes) -> None:
         axes.plot([x, x], [-8, y], ":", color=GREY, lw=0.8)
     axes.plot(values, np.full(len(values), -8.0), "|", color="k")
     axes.set_title("Numbers on a parabola: the hull visits them in order", fontsize=10)
+
+
+def windows(axes) -> None:
+    """A walk that drifts, at three moments."""
+    steps = np.random.default_rng(7).normal((0.12, 0.05), 0.4, size=(300, 2))
+    walk, times = np.cumsum(steps, axis=0), np.arange(300.0)
+    window = WindowHull(max_age=90.0)
+    for panel, now in zip(panels(axes, 1, 3, (10, 2.2), sharex=True, sharey=True).flat, (99, 199, 299), strict=True):
+        window.add(walk[now - 99 : now + 1], times[now - 99 : now + 1])
+        panel.plot(*walk[: now + 1].T, ".", color=LIGHT, ms=4)
+        panel.scatter(*window.points().T, c=window.times(), cmap="Oranges", vmin=now - 120, s=12, zorder=3)
+        panel.plot(*closed(window.vertices()), color=BLUE)
+        panel.set_title(f"now = {now}", fontsize=10)
+        panel.set_aspect("equal")
 
 
 def definitions(axes) -> None:
@@ -528,7 +542,7 @@ def how_sign(axes) -> None:
 PICTURES: dict[str, Callable] = {
     f.__name__.replace("_", "-"): f
     for f in (
-        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting),
+        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting, windows),
         *(definitions, degenerate, duality, culling),
         *(how_bridge, how_tree, how_climb, how_batch, how_sign),
     )

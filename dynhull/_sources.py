@@ -116,7 +116,7 @@ def _of_frame(frame: Any, name: str) -> npt.NDArray[Any]:
     pairs = [pair for pair in COLUMN_NAMES if all(lower.count(each) == 1 for each in pair)]
     if len(pairs) == 1:
         chosen = [columns[lower.index(each)] for each in pairs[0]]
-    elif len(columns) == 2:
+    elif len(columns) == 2 and not _other_way_round(lower):
         chosen = columns
     else:
         listed = ", ".join(map(str, columns))
@@ -126,6 +126,13 @@ def _of_frame(frame: Any, name: str) -> npt.NDArray[Any]:
     if x.dtype != y.dtype:  # numpy would round large integers to join them with floats
         x, y = x.astype(np.object_), y.astype(np.object_)
     return np.column_stack((x, y))
+
+
+def _other_way_round(names: Sequence[str]) -> bool:
+    """Whether two columns have one name, or one has a name for the other coordinate."""
+    first, second = names
+    xs, ys = zip(*COLUMN_NAMES, strict=True)
+    return first == second or first in ys or second in xs
 
 
 def _exact(column: npt.NDArray[Any]) -> npt.NDArray[Any]:

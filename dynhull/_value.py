@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from .keys import PackedKeys
+
 MOST_ROWS_PRINTED = 8
 
 
@@ -57,6 +59,8 @@ def _key(value: Any) -> Any:
         return value.shape, numbers.tobytes()
     if isinstance(value, (tuple, list)):
         return tuple(map(_key, value))
+    if isinstance(value, PackedKeys):
+        return value.lengths, value.data
     return "NaN" if value != value else value
 
 

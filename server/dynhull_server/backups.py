@@ -1,24 +1,11 @@
 """`dynhull backup`, `dynhull restore`, `dynhull check` and `dynhull export`: commands for data folders."""
 
-import json
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from dynhull.arrays import Points
-
-from .progress import progress_bar
-from .state.contents import replayed
-from .storage.port import Progress, StorageError
-from .storage.sqlite import copies
-
 DATA = Path("dynhull-data")
-ROWS_A_STEP = 100_000
 
 
 def backup(
@@ -30,7 +17,9 @@ def backup(
     The copy is examined in full. It is a data folder itself, so `dynhull serve --data COPY` serves it. A copy that was
     interrupted is refused by all commands.
     """
-    _copy(data, target)
+    from .data_folders import copy_folder
+
+    copy_folder(data, target)
 
 
 def restore(
@@ -41,7 +30,9 @@ def restore(
     ] = False,
 ) -> None:
     """Create a data folder from a backup, after checking that every hull in it is intact."""
-    _copy(backup, data, accept_loss=accept_loss)
+    from .data_folders import copy_folder
+
+    copy_folder(backup, data, accept_loss=accept_loss)
 
 
 def check(
@@ -56,19 +47,9 @@ def check(
 
         dynhull check backups/monday && echo "can be restored"
     """
-    with _errors_reported(), progress_bar("rows") as progress:
-        report = copies.check(data, progress)
-    for hull in report.hulls:
-        typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
-    for problem in [*report.notes, *report.fatal]:
-        typer.echo(problem, err=True)
-    if report.fatal:
-        typer.echo(f"{data}: damaged; it cannot be served: restore a backup")
-    elif report.notes:
-        typer.echo(f"{data}: damaged; it can be served without the parts named above")
-    else:
-        typer.echo(f"{data}: {len(report.hulls)} hulls, all whole")
-    raise typer.Exit(1 if report.fatal or report.notes else 0)
+    from .data_folders import check_folder
+
+    raise typer.Exit(0 if check_folder(data) else 1)
 
 
 def export(
@@ -76,67 +57,15 @@ def export(
     file: Annotated[Path, typer.Argument(help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)],
     data: Annotated[Path, typer.Option(help="The data folder or a backup; a server may be using it.")] = DATA,
 ) -> None:
-    """Write the points of one hull, as of the last commit, to a file with columns x and y."""
-    writers = {".csv": _write_csv, ".parquet": _write_parquet, ".geojson": _write_geojson}
-    with _errors_reported():
-        if file.suffix not in writers:
-            raise StorageError(f"{file}: the name must end in {', '.join(writers)}")
-        kept, notes = copies.read(data, name)
-        for note in notes:
-            typer.echo(note, err=True)
-        points = replayed(kept).hull.points()
-        with progress_bar("points") as progress:
-            writers[file.suffix](file, points, progress)
-    typer.echo(f"{file}: {len(points):,} points of {name} at revision {kept.last_revision}")
+    """Write the points of one hull, as of the last commit, to a file.
 
+    CSV and Parquet have columns x and y, and those of key, time and expires that the hull has; expires is the time at
+    which a point leaves the hull. In GeoJSON the key is the id of a feature, and its times are properties. Times are in
+    UTC. Another hull can read back the points, keys and times, not the column expires:
 
-def _copy(source: Path, target: Path, *, accept_loss: bool = False) -> None:
-    with _errors_reported(), progress_bar("pages") as progress:
-        report = copies.copy(source, target, progress, accept_loss=accept_loss)
-    for note in report.notes:
-        typer.echo(note, err=True)
-    typer.echo(f"{target}: {len(report.hulls)} hulls")
+        dynhull export fleet fleet.csv
+        dynhull import copy fleet.csv --key key --time time
+    """
+    from .data_folders import export_hull
 
-
-def _write_csv(file: Path, points: Points, progress: Progress) -> None:
-    with file.open("w", encoding="utf-8") as out:
-        out.write("x,y\n")
-        for rows in _steps(points, progress):
-            out.writelines(f"{x!r},{y!r}\n" for x, y in rows.tolist())
-
-
-def _write_geojson(file: Path, points: Points, progress: Progress) -> None:
-    with file.open("w", encoding="utf-8") as out:
-        out.write('{"type": "FeatureCollection", "features": [\n')
-        between = ""
-        for rows in _steps(points, progress):
-            for x, y in rows.tolist():
-                geometry = {"type": "Point", "coordinates": [x, y]}
-                out.write(between + json.dumps({"type": "Feature", "properties": {}, "geometry": geometry}))
-                between = ",\n"
-        out.write("\n]}\n")
-
-
-def _write_parquet(file: Path, points: Points, progress: Progress) -> None:
-    import pyarrow as pa  # slow to load, and only this format needs it
-    import pyarrow.parquet as pq
-
-    schema = pa.schema([("x", pa.float64()), ("y", pa.float64())])
-    with pq.ParquetWriter(file, schema) as out:
-        for rows in _steps(points, progress):
-            out.write_table(pa.table({"x": np.ascontiguousarray(rows[:, 0]), "y": np.ascontiguousarray(rows[:, 1])}))
-
-
-def _steps(points: Points, progress: Progress) -> Iterator[Points]:
-    for first in range(0, len(points), ROWS_A_STEP):
-        progress(first, len(points))
-        yield points[first : first + ROWS_A_STEP]
-
-
-@contextmanager
-def _errors_reported() -> Iterator[None]:
-    """Exit with a message after an error of the storage or the operating system."""
-    try:
-        yield
-    except (StorageError, OSError) as error:
-        sys.exit(f"error: {error}")
+    export_hull(data, name, file)

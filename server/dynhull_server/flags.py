@@ -8,13 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
-from .settings import PREFIX, Settings, SettingsError, load, origins
+from .settings import PREFIX, Settings
 
 
 def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callable[..., None]:
     """A typer command with one flag per setting; `command` gets the settings and the origin of each."""
 
     def run(config: Path | None, **given: Any) -> None:
+        from .setting_sources import SettingsError, load, origins
+
         flags = {name: value for name, value in given.items() if value is not None}
         try:
             settings, where = load(flags, config), origins(flags, config)

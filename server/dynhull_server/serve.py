@@ -1,22 +1,7 @@
-"""`dynhull serve`: run the server until SIGTERM or SIGINT."""
+"""The command `dynhull serve`."""
 
-import asyncio
-import gc
-import signal
-import socket
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-from . import logs
-from .app import Server
 from .flags import with_settings
-from .malloc import return_large_blocks
-from .progress import progress_bar
 from .settings import Settings
-from .storage.port import StorageError
-
-SIGNALS = signal.SIGTERM, signal.SIGINT
 
 
 @with_settings
@@ -28,59 +13,6 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
 
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
-    logs.configure(settings.log_level, settings.log_format)
-    return_large_blocks()
-    try:
-        asyncio.run(_serve(settings))
-    except RuntimeError as error:
-        sys.exit(f"cannot listen on {settings.host}:{settings.port}: {error}")
-    except (OSError, ValueError, StorageError) as error:
-        sys.exit(f"cannot serve: {error}")
+    from .process import run
 
-
-async def _serve(settings: Settings) -> None:
-    with _stop_signal() as stop:
-        server = Server(settings)
-        try:
-            with progress_bar("hulls read") as progress:
-                await server.start(progress)
-            gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
-            print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
-            if server.metrics_url:
-                print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
-            await stop.wait()
-        finally:
-            await server.drain()
-    gc.unfreeze()
-
-
-@contextmanager
-def _stop_signal() -> Iterator[asyncio.Event]:
-    """An event set by SIGTERM and SIGINT, which are ignored from the end of the block to the end of the process.
-
-    The signal arrives as a byte through a socket. A handler alone could run too late, if the event loop has just gone
-    to sleep or another thread was interrupted. The handlers of the event loop do the same, but only until it is closed;
-    after that a second signal would kill the process.
-    """
-    loop = asyncio.get_running_loop()
-    stop = asyncio.Event()
-    wake, signalled = socket.socketpair()
-    with wake, signalled:
-
-        def received() -> None:
-            wake.recv(64)
-            stop.set()
-
-        for end in (wake, signalled):
-            end.setblocking(False)
-        loop.add_reader(wake, received)
-        signal.set_wakeup_fd(signalled.fileno())
-        for number in SIGNALS:
-            signal.signal(number, lambda *_: None)
-        try:
-            yield stop
-        finally:
-            for number in SIGNALS:
-                signal.signal(number, signal.SIG_IGN)
-            signal.set_wakeup_fd(-1)
-            loop.remove_reader(wake)
+    run(settings)

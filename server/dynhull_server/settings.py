@@ -1,24 +1,20 @@
 """The settings of the server, defined once for flags, environment, file and help."""
 
 import ipaddress
-import os
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, TomlConfigSettingsSource
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from .storage.durability import Durability
 
-PREFIX = "DYNHULL_"
+PREFIX = "DYNHULL_"  # of environment variables
 
 
-class Settings(BaseSettings):
-    """The settings of a server."""
+class Settings(BaseModel):
+    """The settings of a server. `load` in setting_sources.py reads them."""
 
-    model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(50051, ge=0, le=65535, description="Port to listen on; 0 for a free one.")
@@ -100,61 +96,6 @@ class Settings(BaseSettings):
                     "--insecure to serve without them"
                 )
         return self
-
-    @classmethod
-    def settings_customise_sources(
-        cls, settings_cls: type[BaseSettings], *sources: PydanticBaseSettingsSource, **more: PydanticBaseSettingsSource
-    ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Flags take precedence over the environment, and the environment over the file."""
-        named = dict(zip(("init_settings", "env_settings"), sources, strict=False)) | more
-        return named["init_settings"], named["env_settings"], TomlConfigSettingsSource(settings_cls)
-
-
-class SettingsError(Exception):
-    """Invalid settings; the message has one line for each."""
-
-
-def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
-    """The settings from flags, environment and file, or raise SettingsError."""
-    read_file(file)
-
-    class FromFile(Settings):
-        model_config = SettingsConfigDict(toml_file=file)
-
-    try:
-        return FromFile(**flags)
-    except ValidationError as error:
-        lines = []
-        for each in error.errors():
-            where = ".".join(map(str, each["loc"]))
-            lines.append(f"{where}: {each['msg']}" if where else str(each["ctx"]["error"]))
-        raise SettingsError("\n".join(lines)) from None
-
-
-def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
-    """The origin of each setting."""
-    in_file = read_file(file)
-    variables = {name.upper() for name in os.environ}
-    origins = {}
-    for name in Settings.model_fields:
-        variable = f"{PREFIX}{name.upper()}"
-        if name in flags:
-            origins[name] = "flag"
-        elif variable in variables:
-            origins[name] = variable
-        else:
-            origins[name] = str(file) if name in in_file else "default"
-    return origins
-
-
-def read_file(file: Path | None) -> dict[str, Any]:
-    """The content of a settings file, or raise SettingsError."""
-    if file is None:
-        return {}
-    try:
-        return tomllib.loads(file.read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise SettingsError(f"{file}: {error}") from None
 
 
 def is_loopback(host: str) -> bool:

@@ -75,11 +75,13 @@ class Scene:
     """Frames that claim to have points which were never sent."""
 
     hull_name = "wrong"
+    keyed = False
+    max_age = None
 
     def frames(self) -> Iterator[Frame]:
         sent = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        yield Frame("0", np.empty((0, 2)), sent, sent, ["a", "b", "c"], True)
-        yield Frame("1", np.empty((0, 2)), np.empty((0, 2)), sent[:2], ["a", "b"], True)
+        yield Frame("0", sent, sent, ["a", "b", "c"], milestone=True)
+        yield Frame("1", np.empty((0, 2)), sent[:2], ["a", "b"], milestone=True)
 
 
 def test_the_first_difference_is_told():

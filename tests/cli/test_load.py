@@ -266,3 +266,41 @@ def test_an_interruption(served, name):
         assert loading.wait() == 130
     assert "--resume loads the rest" in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+@pytest.mark.parametrize("other_name", [False, True])
+def test_the_file_of_bad_rows_is_not_the_one_that_is_loaded(tmp_path, served, name, dry, other_name):
+    file = tmp_path / "points.csv"
+    file.write_text("x,y\n1,2\nbad,3\n")
+    kept = file
+    if other_name:
+        kept = tmp_path / "link.csv"
+        kept.symlink_to(file)
+    done = dynhull("load", name, file, "--bad-rows", kept, *dry, "--address", served)
+    assert done.exit_code == 2
+    assert f"--bad-rows {kept} is the file that is loaded" in done.stderr
+    assert file.read_text() == "x,y\n1,2\nbad,3\n"
+
+
+def test_rows_with_more_fields_than_columns_are_bad(tmp_path, name):
+    file = tmp_path / "euro.csv"
+    file.write_text("x,y\n1,2\n1,5,2,5\n3,4,\n")
+    done = dynhull("load", name, file, "--dry-run")
+    assert f"{name}: 2 points would be loaded, x from 1.0 to 3.0, y from 2.0 to 4.0" in done.stdout
+    assert "line 3: 4 fields in a table of 2 columns" in done.stderr
+    table = tmp_path / "fleet.csv"
+    table.write_text("x,y\n1,2\n1,5,2,5\n")
+    done = dynhull("demo", "--points", table, "--out", tmp_path / "picture.png")
+    assert "line 3: 4 fields in a table of 2 columns" in done.stdout + done.stderr
+
+
+def test_a_name_of_two_columns_is_not_clear(tmp_path, name):
+    file = tmp_path / "twice.csv"
+    file.write_text("x,x,y\n1,2,3\n")
+    done = dynhull("load", name, file, "--dry-run")
+    assert (done.exit_code, "name its x column with --x; it has x, x, y" in done.stderr) == (2, True)
+    done = dynhull("load", name, file, "--x", "x", "--y", "y", "--dry-run")
+    assert (done.exit_code, "has 2 columns 'x': give the number of one with --x" in done.stderr) == (2, True)
+    done = dynhull("load", name, file, "--x", "2", "--y", "y", "--dry-run")
+    assert "x from 2.0 to 2.0, y from 3.0 to 3.0" in done.stdout

@@ -42,6 +42,42 @@ def hull(client: HullClient, name: str) -> str:
     return name
 
 
+@pytest.mark.parametrize(
+    ("given", "address"),
+    [
+        ("example.org", "example.org:50051"),
+        ("https://example.org/", "example.org:50051"),
+        ("grpcs://example.org:443", "example.org:443"),
+        ("::1", "[::1]:50051"),
+        ("[::1]", "[::1]:50051"),
+        ("http://[fe80::1%eth0]:7", "[fe80::1%eth0]:7"),
+        ("unix:/run/dynhull.sock", "unix:/run/dynhull.sock"),
+        ("dns:///example.org:7", "dns:///example.org:7"),
+    ],
+)
+def test_addresses_as_people_write_them(connect: type[HullClient], given: str, address: str) -> None:
+    with connect(given) as client:
+        assert client.address == address
+
+
+def test_an_address_may_ask_for_encryption(address: str, connect: type[HullClient]) -> None:
+    with connect(f"http://{address}") as client:
+        list(client.list_hulls())
+    with connect(f"https://{address}", timeout=5) as client, pytest.raises(UnavailableError):
+        list(client.list_hulls())
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:abc", "ftp://a", "", "a b"])
+def test_bad_addresses_are_refused(connect: type[HullClient], address: str) -> None:
+    with pytest.raises(ValueError, match=f"address {address!r}.* Write HOST or HOST:PORT"):
+        connect(address)
+
+
+def test_an_address_is_a_string(connect: type[HullClient]) -> None:
+    with pytest.raises(TypeError, match="address is None: must be a string"):
+        connect(None)  # type: ignore[arg-type]
+
+
 def test_a_hull_from_creation_to_deletion(client: HullClient, name: str) -> None:
     info = client.create_hull(name)
     assert (info.name, info.revision, info.points, info.distinct) == (name, 0, 0, 0)

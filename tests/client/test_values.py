@@ -23,6 +23,7 @@ EXPORTED = [
     "AsyncIngest",
     "AsyncWatch",
     "AsyncWriter",
+    "Batch",
     "ChanRound",
     "Change",
     "Counted",
@@ -31,8 +32,10 @@ EXPORTED = [
     "Deleted",
     "Difference",
     "Distances",
+    "DuplicateKeyError",
     "DynhullError",
     "Efficient",
+    "Entities",
     "Event",
     "Hull",
     "HullClient",
@@ -46,6 +49,7 @@ EXPORTED = [
     "Ingest",
     "Ingested",
     "InvalidRequestError",
+    "KeyMissingError",
     "LimitExceededError",
     "Located",
     "Measured",
@@ -55,6 +59,7 @@ EXPORTED = [
     "Phases",
     "PointMissingError",
     "Points",
+    "Positions",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -69,6 +74,7 @@ EXPORTED = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Window",
     "Writer",
 ]
 METHODS = [name for name in dir(HullClient) if not name.startswith("_") and callable(getattr(HullClient, name))]
@@ -134,7 +140,10 @@ def test_answers_are_values(client: HullClient, name: str) -> None:
 
 
 def test_answers_print_on_a_line(client: HullClient, name: str, address: str) -> None:
-    shown = "Snapshot(revision=1, points=2, vertices=[[0.0, 1.0]], measures=None, uid='u')"
+    shown = (
+        "Snapshot(revision=1, points=2, vertices=[[0.0, 1.0]], measures=None, uid='u', "
+        "vertex_keys=None, cause='batch', clock=None)"
+    )
     assert repr(Snapshot(1, 2, np.array([[0.0, 1.0]]), None, "u")) == shown
     client.apply(name, insert=[[i, i * i] for i in range(100)])
     assert "vertices=<array of shape (" in repr(client.get_hull(name))

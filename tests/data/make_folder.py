@@ -43,7 +43,7 @@ def ran(*command):
 
 
 def insert_and_delete(client, producer, first, last):
-    """Numbered batches, of which each deletes two points of the one before."""
+    """Numbered batches; each deletes two points of the one before."""
     before = np.empty((0, 2))
     for sequence in range(first, last + 1):
         points = np.random.default_rng([sequence, *producer.encode()]).normal(size=(5, 2))

@@ -231,9 +231,8 @@ class WindowLife {
     require(expiry_.now() == now_, "the clock is off");
     require(expiry_.expired == expired_ && expiry_.evicted == evicted_ && expiry_.late == late_, "a total is off");
     if (random_.below(4) > 0) return;
-    const Dated* const front = expiry_.front();
-    require((front == nullptr) == expected.empty() && (front == nullptr || front->time == expected.front().time),
-            "the oldest is wrong");
+    const std::optional<double> oldest = expiry_.oldest();
+    require(oldest == (expected.empty() ? std::nullopt : std::optional(expected.front().time)), "the oldest is wrong");
   }
 
   Random random_;

@@ -132,6 +132,8 @@ def test_packed_keys_are_a_sequence():
     for same in (again, pickle.loads(pickle.dumps(keys)), keys[:], PackedKeys.pack(keys)):
         assert same == keys
     assert (len(keys), keys[0], keys[-1], keys[1:3] == PackedKeys.pack(STRINGS[1:3])) == (4, "a", STRINGS[-1], True)
+    for part in (slice(1, 3), slice(-2, None), slice(3, 1), slice(9, 12), slice(None, None, -2)):
+        assert list(keys[part]) == STRINGS[part]
     assert STRINGS[2] in keys
     assert keys != PackedKeys.pack(["ab", "é", *STRINGS[2:]])  # the same bytes, cut elsewhere
     with pytest.raises(IndexError):

@@ -174,6 +174,15 @@ def test_invalid_arguments_are_named(stub: HullServiceStub, hull: str, case: str
     assert (after.revision, after.point_count) == (0, 0)
 
 
+@pytest.mark.parametrize(("name", "shown"), [("", "''"), ("a b", "'a b'"), ("ü", "'ü'"), ("a%", "a%")])
+def test_a_name_in_a_message_cannot_be_misread(stub: HullServiceStub, name: str, shown: str) -> None:
+    with pytest.raises(grpc.RpcError) as refused:
+        stub.CreateHull(pb.CreateHullRequest(name=name))
+    assert refused.value.details() == (
+        f'name is {shown}: a hull\'s name is 1 to 200 of the letters a to z and A to Z, digits and "._-/"'
+    )
+
+
 def finish(response: object) -> object:
     """A unary response as it is; all of a stream."""
     return list(response) if isinstance(response, Iterator) else response

@@ -16,7 +16,7 @@ NOTHING = np.empty((0, 2))
 
 
 def no_progress(done, total):
-    """Nobody watches."""
+    """Ignore the progress."""
 
 
 def opened(path, *options, **more):
@@ -46,7 +46,7 @@ def same(found, expected):
         assert type(found) is type(expected)
         for field in dataclasses.fields(expected):
             same(getattr(found, field.name), getattr(expected, field.name))
-    elif isinstance(expected, list):
+    elif isinstance(expected, list | tuple):
         assert len(found) == len(expected)
         for one, other in zip(found, expected, strict=True):
             same(one, other)
@@ -79,7 +79,7 @@ def killed(path, target):
 
 
 def stopped(path, last=9):
-    """A folder with one hull and so many batches."""
+    """A folder with one hull, at revision `last`."""
     storage, _ = opened(path)
     fill(storage, last)
     storage.close()

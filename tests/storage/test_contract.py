@@ -1,4 +1,4 @@
-"""What every storage promises, whatever is behind it."""
+"""The promises of the port, which every storage keeps."""
 
 import io
 import itertools

@@ -27,7 +27,7 @@ def failure(code):
 
 
 class FaultyDisk(Disk):
-    """Fails once, where it is told to.
+    """Fails once, at a given statement.
 
     Attributes:
         statement: how the statement begins that fails.

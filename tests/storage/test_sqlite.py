@@ -20,7 +20,7 @@ from folders import (
     stopped,
 )
 
-from dynhull_server.state.records import Append, Delete
+from dynhull_server.state.records import Append, Create, Delete, HullRow, HullSettings, Window
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
 from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES, HEADER_BYTES
@@ -122,6 +122,21 @@ def test_a_damaged_schema_is_refused(folder, bit):
     (folder / DATABASE).write_bytes(content)
     with pytest.raises(StorageError, match=r"restore a backup|cannot be opened"):
         opened(folder)
+
+
+def test_damaged_settings_are_refused(folder):
+    storage, _ = opened(folder)
+    settings = HullSettings("int", 7, Window(max_age=25, max_skew=0, clamps=True), by_event_time=True)
+    storage.commit([Create(HullRow(1, "fleet", "", 0.0, settings))])
+    storage.close()
+    whole = (folder / DATABASE).read_bytes()
+    first = whole.index(b'{"by_event_time"')
+    for byte in range(first, whole.index(b"}}", first) + 2):
+        content = bytearray(whole)
+        content[byte] ^= 1 << byte % 8
+        (folder / DATABASE).write_bytes(content)
+        with pytest.raises(DamagedError, match=r"the row of hull 1, .* is damaged|cannot be read"):
+            opened(folder)
 
 
 @pytest.mark.parametrize("gone", ["first IN (4, 5)", "first = 9", "first = 1"])

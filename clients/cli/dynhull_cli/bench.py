@@ -1,24 +1,20 @@
 """`dynhull bench`: the speed of a server, measured by one client."""
 
-from functools import partial
-from time import perf_counter
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 from uuid import uuid4
 
-import numpy as np
 import typer
-
-from dynhull_client import HullClient
 
 from .connected import AsJson, connected
 from .json_lines import json_line
 
-Milliseconds = list[float]
+if TYPE_CHECKING:
+    from dynhull_client import HullClient
 
 
 @connected
 def bench(
-    client: HullClient,
+    client: "HullClient",
     seconds: Annotated[float, typer.Option(min=0.1, help="Seconds of writing, and seconds of reading.")] = 5.0,
     points: Annotated[int, typer.Option(min=1, help="Points in the hull.")] = 100_000,
     batch: Annotated[int, typer.Option(min=1, help="Points that each batch moves.")] = 1000,
@@ -33,10 +29,13 @@ def bench(
     of a batch lasts from its sending to its acknowledgement, while other batches are under way. Then it reads: single
     points are located, one after the other.
     """
+    from .speed import read_speed, write_speed
+
     name = f"bench-{uuid4().hex}"
     client.create_hull(name)
     try:
-        figures = _write(client, name, seconds, max(points, batch), batch, in_flight) | _read(client, name, seconds)
+        figures = write_speed(client, name, seconds, max(points, batch), batch, in_flight)
+        figures |= read_speed(client, name, seconds)
     finally:
         client.delete_hull(name)
     if as_json:
@@ -46,43 +45,3 @@ def bench(
     for what in ("acknowledgement", "locate"):
         median, tail = figures[f"{what}_ms_median"], figures[f"{what}_ms_p99"]
         typer.echo(f"{what}: median {median:.2f} ms, 99th percentile {tail:.2f} ms")
-
-
-def _write(client: HullClient, name: str, seconds: float, points: int, batch: int, in_flight: int) -> dict[str, float]:
-    rng = np.random.default_rng(0)
-    there = rng.normal(size=(points, 2))
-    delays: Milliseconds = []
-
-    def delayed(sent: float, _: object) -> None:
-        delays.append(1e3 * (perf_counter() - sent))
-
-    with client.writer(name, batch_points=1, in_flight=in_flight) as writer:
-        for part in np.array_split(there, -(-points // 8192)):
-            writer.put(insert=part)
-        writer.flush()
-        begun, moved, first = perf_counter(), 0, 0
-        while perf_counter() - begun < seconds:
-            rows = np.arange(first, first + batch) % points
-            fresh = rng.normal(size=(batch, 2))
-            writer.put(move=(there[rows], fresh)).add_done_callback(partial(delayed, perf_counter()))
-            there[rows] = fresh
-            first, moved = (first + batch) % points, moved + batch
-        writer.flush()
-        passed = perf_counter() - begun
-    return {"updates_per_second": 2 * moved / passed, **_summary("acknowledgement", delays)}
-
-
-def _read(client: HullClient, name: str, seconds: float) -> dict[str, float]:
-    rng = np.random.default_rng(1)
-    delays: Milliseconds = []
-    begun = perf_counter()
-    while perf_counter() - begun < seconds:
-        sent = perf_counter()
-        client.locate(name, rng.normal(size=(1, 2)) * 4)
-        delays.append(1e3 * (perf_counter() - sent))
-    return _summary("locate", delays)
-
-
-def _summary(what: str, delays: Milliseconds) -> dict[str, float]:
-    median, tail = np.quantile(delays, [0.5, 0.99]).tolist()
-    return {f"{what}_ms_median": median, f"{what}_ms_p99": tail}

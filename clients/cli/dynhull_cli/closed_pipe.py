@@ -1,4 +1,4 @@
-"""A reader that closes the pipe early, as `head` does, has what it wants: the command ends with success."""
+"""Ends the command with success when the reader closes the pipe early, as `head` does."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""Columns of coordinates by name, and the numbers in them."""
+"""Finds the columns of coordinates by name, and reads the numbers in them."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ def has_pair(columns: Sequence[str]) -> bool:
 def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, y: str | None) -> tuple[int, int]:
     """The indices of the columns of x and y: those given, or the first known pair.
 
-    ValueError where a column is not there; the message says which ones are.
+    ValueError where a column is not there; the message names the columns that are.
     """
     pair = _pair(columns)
     if x is None and y is None and pair is not None:
@@ -30,6 +30,8 @@ def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, 
 
 def column_index(path: Path | str, columns: Sequence[str], option: str, column: str) -> int:
     """The index of a column, given by its name or, where none has that name, by its number from 1."""
+    if columns.count(column) > 1:
+        raise ValueError(f"{path} has {columns.count(column)} columns {column!r}: give the number of one with {option}")
     if column in columns:
         return columns.index(column)
     if column.isdecimal() and 1 <= int(column) <= len(columns):
@@ -38,13 +40,16 @@ def column_index(path: Path | str, columns: Sequence[str], option: str, column: 
 
 
 def decimal_mark(texts: Iterable[str], delimiter: str) -> str:
-    """A comma where columns do not end at commas, some number has one and none has a point; otherwise a point."""
+    """The decimal mark: a comma if some number has one, none has a point, and commas do not separate columns.
+
+    Otherwise a point.
+    """
     numbers = [text for text in texts if is_number(text)] if delimiter != "," else []
     return "," if any("," in each for each in numbers) and not any("." in each for each in numbers) else "."
 
 
 def coordinate(text: str | None, column: str, decimal: str = ".") -> float:
-    """A finite number with that decimal mark; the ValueError of anything else says what is wrong."""
+    """Read a finite number with this decimal mark; ValueError says what is wrong with anything else."""
     if not text:
         raise ValueError(f"{column} is missing")
     try:
@@ -67,7 +72,7 @@ def is_number(text: str) -> bool:
 
 
 def plain(text: str, decimal: str) -> str:
-    """The number as Python reads it; ValueError for what only Python reads as a number, such as 1_000."""
+    """The text with a point as decimal mark, for `float`; ValueError for notation of Python, such as 1_000."""
     if "_" in text or (decimal == "," and "." in text):
         raise ValueError
     return text.replace(decimal, ".")
@@ -75,4 +80,5 @@ def plain(text: str, decimal: str) -> str:
 
 def _pair(columns: Sequence[str]) -> tuple[int, int] | None:
     lowered = [column.strip().lower() for column in columns]
-    return next(((lowered.index(x), lowered.index(y)) for x, y in COLUMN_NAMES if x in lowered and y in lowered), None)
+    pairs = (pair for pair in COLUMN_NAMES if all(lowered.count(each) == 1 for each in pair))
+    return next(((lowered.index(x), lowered.index(y)) for x, y in pairs), None)

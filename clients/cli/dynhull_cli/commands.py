@@ -16,13 +16,14 @@ from typer.core import TyperCommand, TyperGroup
 
 GROUP = "dynhull.commands"
 PANELS = {
-    "Hulls and their points": ("list", "create", "delete", "insert", "remove", "load", "import"),
+    "Hulls and their points": ("list", "create", "delete", "insert", "put", "remove", "load", "import"),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Server": ("serve", "config", "token", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export"),
     "Getting to know dynhull": ("demo", "explain"),
 }
 OTHERS = "More"
+PACKAGES: dict[str | None, str | None] = {"google": "protobuf", "grpc": "grpcio"}  # of modules with other names
 
 
 class InstalledCommands(TyperGroup):
@@ -83,7 +84,7 @@ def _imported(entry: EntryPoint) -> Any:
 
 
 def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..., None]:
-    """The command; where a module that it imports late is missing, it says what to install."""
+    """The command; if a module that it imports late is missing, it prints what to install."""
 
     @wraps(function)
     def run(*arguments: Any, **options: Any) -> None:
@@ -96,12 +97,12 @@ def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..
 
 
 def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[], None]:
-    """A command that only says what to install."""
+    """A command that only prints what to install."""
     extras = ",".join(entry.extras)
 
     def explain() -> None:
         typer.echo(
-            f"error: dynhull {entry.name} needs {error.name}, which is not installed. "
+            f"error: dynhull {entry.name} needs {PACKAGES.get(error.name, error.name)}, which is not installed. "
             f"Install it with: pip install 'dynhull[{extras}]'",
             err=True,
         )
@@ -128,11 +129,11 @@ def options(
         bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_show_version)
     ] = False,
 ) -> None:
-    """Exact convex hulls of points that come and go.
+    """Exact convex hulls of points that are inserted, moved and deleted.
 
     Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
     DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
 
     Exit codes: 0 success, 1 a hull differs or the server refused a request, 2 the command or its input is unusable,
-    3 the server does not answer, 4 the server wants another token, 130 interrupted.
+    3 the server does not answer, 4 the server requires another token, 130 interrupted.
     """

@@ -1,4 +1,4 @@
-"""What the commands that talk to a server share: the options of the connection, the client, and how errors end them."""
+"""Shared by the commands that connect to a server: the options of the connection, the client, and exit codes."""
 
 import inspect
 import sys
@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
 
 import typer
-
-from .address import target
 
 if TYPE_CHECKING:
     import grpc
@@ -62,7 +60,7 @@ def connected(command: Callable[..., None]) -> Callable[..., None]:
     """A typer command with the options of a connection; `command` receives the client as its first argument.
 
     An error ends it with a message that says what to do, and with the exit code of its kind. The SDK is imported when a
-    command runs: its help and shell completion need half the time without.
+    command runs, because help and shell completion do without it.
     """
 
     @wraps(command)
@@ -91,12 +89,11 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         import dynhull_client as sdk
 
         try:
-            address, encrypted = target(address)
-            tls = tls or encrypted
             credentials = _credentials(tls, tls_ca, client_cert, client_key)
             command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
-            encryption = "does it serve TLS at all" if tls or tls_ca or client_cert else "does it want TLS (--tls)"
+            encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
+            encryption = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
             advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
         except sdk.UnauthenticatedError as error:

@@ -19,14 +19,14 @@ def read_points(
 
     Args:
         path: the file.
-        x: the column of x, by name or by number from 1; without `x` and `y`, x and y, lon and lat, or the like.
+        x: the column of x, by name or by number from 1; by default the first known pair of names, such as lon and lat.
         y: the column of y.
-        identity: the column of each point's name; without, the name is the number of its line.
-        time: the column of each point's time; without, the time is empty.
+        identity: the column of each point's name; None to name points by the number of their line.
+        time: the column of each point's time; None for empty times.
 
     Returns:
-        The rows, and lines of text about them: their number, and which were left out because they have no finite
-        coordinates, no name or no time.
+        The rows, and lines of text: the number of rows, and the rows left out because they lack finite coordinates, a
+        name or a time.
 
     Raises:
         ValueError: the file does not have the columns, or no points.
@@ -55,12 +55,13 @@ def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
 
 def _read(table: CsvTable, time: int | None, identity: int | None) -> tuple[list[Row], list[str]]:
     """Good rows, and a reason for each bad one."""
-    records = [(line, dict(enumerate(row))) for line, row in numbered(table.rows, table.first_line)]
+    records = [(line, row, dict(enumerate(row))) for line, row in numbered(table.rows, table.first_line)]
     places = table.x, table.y
-    mark = decimal_mark((fields.get(place, "") for _, fields in records for place in places), table.delimiter)
+    mark = decimal_mark((fields.get(place, "") for *_, fields in records for place in places), table.delimiter)
     rows, bad = [], []
-    for line, fields in records:
+    for line, row, fields in records:
         try:
+            table.require_no_more_fields(row)
             x, y = (coordinate(fields.get(place), table.names[place], mark) for place in places)
             when, name = (_label(fields, table.names, place) for place in (time, identity))
         except ValueError as reason:

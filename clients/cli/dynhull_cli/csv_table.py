@@ -1,4 +1,4 @@
-"""CSV files as people have them: delimiter, header and encoding are found, or given."""
+"""Reads CSV files whose delimiter, header and encoding are given or detected."""
 
 import codecs
 import csv
@@ -18,7 +18,7 @@ UTF16_MARKS = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 
 
 class UnclearTableError(ValueError):
-    """A file that cannot be read without further options; `advice` says which, for commands that have them."""
+    """A file that cannot be read without further options; `advice` names them, for commands that have them."""
 
     def __init__(self, message: str, advice: str) -> None:
         super().__init__(message)
@@ -27,7 +27,7 @@ class UnclearTableError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class CsvFormat:
-    """What is known of a file beforehand; None for what is to be found out.
+    """What the caller knows of a file; None for what is to be detected.
 
     Attributes:
         x: the column of x: its name, or its number from 1.
@@ -56,7 +56,7 @@ class CsvTable:
         first_line: the line of the first row.
         rows: the rows, without the header.
         next_line: returns the line of the row that `rows` gives next, once it has given one.
-        notes: what was found out and may surprise.
+        notes: lines about what was detected and may surprise.
     """
 
     names: list[str]
@@ -67,6 +67,12 @@ class CsvTable:
     rows: Iterator[list[str]]
     next_line: Callable[[], int]
     notes: list[str]
+
+    def require_no_more_fields(self, row: list[str]) -> None:
+        """Raise ValueError if the row has more fields than there are columns, other than empty ones at its end."""
+        columns = len(self.names)
+        if len(row) > columns and any(field.strip() for field in row[columns:]):
+            raise ValueError(f"{len(row)} fields in a table of {columns} columns")
 
 
 @contextmanager
@@ -164,7 +170,7 @@ def _delimiter(given: str | None, line: str) -> str:
 
 
 def _is_header(first: list[str], given: CsvFormat) -> bool:
-    """Numbers are data, unless the row has the names of the columns too."""
+    """Whether the first row names the columns. Numbers are data, unless the given names of columns are among them."""
     if given.header is not None:
         return given.header
     named = {given.x, given.y} <= set(first) and not (is_number(given.x or "") or is_number(given.y or ""))

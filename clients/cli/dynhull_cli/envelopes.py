@@ -1,4 +1,4 @@
-"""`dynhull phases` and `dynhull frontier`: the lower and the upper side of a hull, with a meaning."""
+"""`dynhull phases` and `dynhull frontier`: a hull as a phase diagram or as an efficient frontier."""
 
 import math
 from itertools import zip_longest
@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
 from .connected import AsJson, connected
 from .json_lines import json_line
-from .rows import number_rows
 from .tab_lines import tab_line
 
 
@@ -34,6 +33,8 @@ def phases(
     Without entries: one line per stable entry, from left to right. With entries: one line each, with the entry, its
     energy above the hull, the stable entries to its left and right, and the share of each; nan beyond the outermost.
     """
+    from .rows import number_rows
+
     if not entries:
         for entry in client.phase_diagram(name).stable.tolist():
             typer.echo(json_line(stable=entry) if as_json else tab_line(entry))
@@ -69,6 +70,8 @@ def frontier(
     With rates: one line each, with the rate, the best point (the tangency: the most excess return per risk), and that
     ratio (Sharpe's).
     """
+    from .rows import number_rows
+
     if not points and not rates:
         found = client.frontier(name)
         for corner, rate in zip_longest(found.efficient, found.turning_rates, fillvalue=math.nan):

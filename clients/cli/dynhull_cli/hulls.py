@@ -1,18 +1,35 @@
 """`dynhull list`, `dynhull create` and `dynhull delete`: the hulls of a server."""
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from .connected import AsJson, Exit, connected, fail
+from .durations import duration, shown
 from .json_lines import json_line
 from .plural import plural
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from dynhull_client import HullClient, HullInfo
+
+
+class KeyKind(StrEnum):
+    """The kinds of keys."""
+
+    STR = "str"
+    INT = "int"
+
+
+class ClockKind(StrEnum):
+    """The clocks of a window."""
+
+    SERVER = "server"
+    DATA = "data"
+
 
 Names = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
 
@@ -23,12 +40,14 @@ def list_hulls(
     prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="List only hulls whose names begin with this.")] = "",
     as_json: AsJson = False,
 ) -> None:
-    """List the hulls of the server by name, with their points, distinct points and revision.
+    """List the hulls of the server by name, with their points, distinct points, revision, kind of keys and window.
 
     dynhull list fleet/ --json | jq -r .name
 
     A terminal shows a table; a pipe receives one line per hull with tabs between the columns.
     """
+    from rich.console import Console
+
     hulls = client.list_hulls(prefix)
     console = Console(highlight=False)
     if console.is_terminal and not as_json:
@@ -36,32 +55,82 @@ def list_hulls(
         return
     for info in hulls:
         if as_json:
-            counts = {"points": info.points, "distinct": info.distinct, "revision": info.revision}
-            typer.echo(json_line(name=info.name, **counts, created=info.created.isoformat(), uid=info.uid))
+            typer.echo(json_line(**_members(info)))
         else:
-            typer.echo(f"{info.name}\t{info.points}\t{info.distinct}\t{info.revision}")
+            counts = f"{info.points}\t{info.distinct}\t{info.revision}"
+            typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}")
+
+
+def _setting(text: str, *names: str) -> Any:
+    return typer.Option(*names, help=text, rich_help_panel="Settings, fixed from then on")
 
 
 @connected
 def create(
     client: "HullClient",
     names: Names,
-    exist_ok: Annotated[bool, typer.Option("--exist-ok", help="Accept a hull that exists already.")] = False,
+    keyed: Annotated[
+        KeyKind | None,
+        _setting("Name each point by a key, a string or an integer. Default: points without keys.", "--keyed"),
+    ] = None,
+    max_age: Annotated[
+        str | None, _setting("Age at which points leave: 500ms, 90s, 30m, 2h or 7d. Default: never.")
+    ] = None,
+    max_points: Annotated[
+        int | None, _setting("Number of points beyond which the oldest leave. Default: no such limit.")
+    ] = None,
+    clock: Annotated[
+        ClockKind, _setting("Clock that decides what is too old: the server's, or data for the latest event time.")
+    ] = ClockKind.SERVER,
+    max_skew: Annotated[
+        str | None,
+        _setting("How far an event time may be ahead of the server's clock. Default: any distance."),
+    ] = None,
+    clamp: Annotated[
+        bool, _setting("Reduce event times further ahead to the latest allowed, rather than refuse them.", "--clamp")
+    ] = False,
+    event_order: Annotated[
+        bool,
+        _setting(
+            "Of two positions of a key, keep the one with the later event time. Default: that which arrives last."
+        ),
+    ] = False,
+    point_limit: Annotated[
+        int | None, _setting("Number of points beyond which batches are refused. Default: the server's limit.")
+    ] = None,
+    exist_ok: Annotated[
+        bool, typer.Option("--exist-ok", help="Accept a hull that exists already with the same settings.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Create hulls without points.
 
-    dynhull create fleet/north fleet/south
+        dynhull create fleet/north fleet/south
+        dynhull create vehicles --keyed str --max-age 30m
+
+    A hull with --keyed holds one point for each key: `dynhull put` inserts or moves it. With --max-age or --max-points,
+    points leave the hull by themselves.
     """
     from dynhull_client import HullExistsError
 
+    settings: dict[str, Any] = {
+        "keyed": keyed and keyed.value,
+        "max_age": duration(max_age, "--max-age"),
+        "max_points": max_points,
+        "clock": clock.value,
+        "max_skew": duration(max_skew, "--max-skew"),
+        "ahead": "clamp" if clamp else "refuse",
+        "ordering": "event_time" if event_order else "arrival",
+        "point_limit": point_limit,
+    }
     for name in names:
         try:
-            client.create_hull(name)
+            client.create_hull(name, **settings)
             created = True
         except HullExistsError:
             if not exist_ok:
                 raise
+            client.create_hull(name, **settings, exist_ok=True)  # refuses other settings
             created = False
         typer.echo(
             json_line(name=name, created=created) if as_json else f"{name}: {'created' if created else 'exists'}"
@@ -110,10 +179,41 @@ def _confirm(found: "list[HullInfo]") -> None:
         fail(Exit.FAILED, "nothing was deleted")
 
 
-def _table(hulls: "list[HullInfo]") -> Table:
+def _members(info: "HullInfo") -> dict[str, Any]:
+    window = info.window
+    return {
+        "name": info.name,
+        "points": info.points,
+        "distinct": info.distinct,
+        "revision": info.revision,
+        "created": info.created.isoformat(),
+        "uid": info.uid,
+        "keyed": info.keyed,
+        "ordering": info.ordering,
+        "point_limit": info.point_limit,
+        "max_age": None if window is None or window.max_age is None else window.max_age.total_seconds(),
+        "max_points": None if window is None else window.max_points,
+        "clock": None if info.clock is None else info.clock.isoformat(),
+    }
+
+
+def _window(info: "HullInfo") -> str:
+    """The limits of the window in a few characters; empty without one."""
+    if info.window is None:
+        return ""
+    age = [] if info.window.max_age is None else [shown(info.window.max_age)]
+    return ", ".join([*age, *([] if info.window.max_points is None else [f"{info.window.max_points:,} points"])])
+
+
+def _table(hulls: "list[HullInfo]") -> "Table":
+    from rich.table import Table
+
     table = Table("hull")
     for heading in ("points", "distinct", "revision"):
         table.add_column(heading, justify="right")
+    table.add_column("keys")
+    table.add_column("window")
     for info in hulls:
-        table.add_row(info.name, *(f"{each:,}" for each in (info.points, info.distinct, info.revision)))
+        counts = (f"{each:,}" for each in (info.points, info.distinct, info.revision))
+        table.add_row(info.name, *counts, info.keyed or "", _window(info))
     return table

@@ -1,4 +1,4 @@
-"""The `dynhull` command. Starts with the standard library alone, to be able to say what is not installed."""
+"""The `dynhull` command. At first it needs only the standard library, so that it can name what is not installed."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The beginning of a file, to find out what it is."""
+"""Reads the beginning of a file without consuming it, to detect its format."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Numbers of things in messages."""
+"""Counts with nouns, for messages."""
 
 
 def plural(count: int, noun: str) -> str:

@@ -1,18 +1,17 @@
-"""`dynhull insert` and `dynhull remove`: a few points into a hull or out of it. Files are for `dynhull load`."""
+"""`dynhull insert`, `dynhull put` and `dynhull remove`: a few points. `dynhull load` reads files."""
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 import typer
 
 from .connected import AsJson, Exit, HullName, connected, fail
+from .durations import duration
 from .json_lines import json_line
-from .load.chunks import Points
 from .plural import plural
-from .rows import given_or_read, number_rows
 
 if TYPE_CHECKING:
-    from dynhull_client import Applied, HullClient
+    from dynhull_client import Applied, HullClient, Points
 
 Rows = Annotated[
     list[str] | None,
@@ -33,53 +32,108 @@ def insert(client: "HullClient", name: HullName, points: Rows = None, as_json: A
 
 
 @connected
+def put(
+    client: "HullClient",
+    name: HullName,
+    row: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="KEY X Y", help="A key and its position. Default, or -: lines KEY,X,Y of standard input."
+        ),
+    ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(help="Event time of the positions: ISO 8601 with a time zone, or a number since 1970."),
+    ] = None,
+    ttl: Annotated[
+        str | None, typer.Option(help="Time after which the points leave the hull: 500ms, 90s, 30m, 2h or 7d.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Put keys into a keyed hull, in one batch: a new key is inserted, a known key moves.
+
+        dynhull put vehicles LH400 -73.9 40.7
+
+    The corners of the hull have names from then on: `dynhull query vehicles vertices --keys`. A missing hull is created
+    by `dynhull create vehicles --keyed str`. Use `dynhull load --key` for files and for more than fits into one batch.
+    """
+    from .keyed_rows import keyed_rows, keys_for
+    from .times import TimeReader
+
+    keys, points = keyed_rows(row)
+    times = None if time is None else [TimeReader("--time").read(time)] * len(keys)
+    applied = client.put(name, keys_for(client, name, keys), points, times, ttl=duration(ttl, "--ttl"))
+    _report(
+        name, applied, f"{plural(applied.inserted, 'key')} new, {applied.moved:,} moved{_left_out(applied)}", as_json
+    )
+
+
+@connected
 def remove(
     client: "HullClient",
     name: HullName,
     points: Rows = None,
-    missing_ok: Annotated[bool, typer.Option("--missing-ok", help="Skip points that are not in the hull.")] = False,
+    key: Annotated[
+        list[str] | None, typer.Option(help="Key to remove from a keyed hull, in place of points. May be repeated.")
+    ] = None,
+    missing_ok: Annotated[
+        bool, typer.Option("--missing-ok", help="Skip points and keys that are not in the hull.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Remove points from a hull, in one batch: all of them or none.
+    """Remove points or keys from a hull, in one batch: all of them or none.
 
         dynhull remove fleet/north -73.9,40.7
+        dynhull remove vehicles --key LH400 --key UA17
 
     Of a point that is there several times, one is removed for each time it is given.
     """
-    from dynhull_client import PointMissingError
+    from dynhull_client import KeyMissingError, PointMissingError
 
+    missing: Literal["raise", "count"] = "count" if missing_ok else "raise"
     try:
-        applied = client.apply(name, delete=_all_rows(points), missing="count" if missing_ok else "raise")
-    except PointMissingError as error:
-        which = "a point" if error.row is None else f"point {error.row + 1}, {error.value},"
-        fail(Exit.FAILED, f"{which} is not in the hull; nothing was removed. --missing-ok skips such points")
+        if key:
+            if points:
+                raise ValueError(f"give either points or --key: {points[0]!r} was given, too")
+            from .keyed_rows import keys_for
+
+            applied = client.remove(name, keys_for(client, name, key), missing=missing)
+        else:
+            applied = client.apply(name, delete=_all_rows(points), missing=missing)
+    except (PointMissingError, KeyMissingError) as error:
+        what = "key" if key else "point"
+        which = f"a {what}" if error.row is None else f"{what} {error.row + 1}, {error.value},"
+        fail(Exit.FAILED, f"{which} is not in the hull; nothing was removed. --missing-ok skips such {what}s")
     skipped = f", {applied.missing:,} not there" if applied.missing else ""
-    _report(name, applied, f"{plural(applied.deleted, 'point')} removed{skipped}", as_json)
+    _report(name, applied, f"{plural(applied.deleted, 'key' if key else 'point')} removed{skipped}", as_json)
 
 
-def _all_rows(points: list[str] | None) -> Points:
+def _all_rows(points: list[str] | None) -> "Points":
+    import numpy as np
+
+    from .rows import given_or_read, number_rows
+
     rows = list(number_rows(given_or_read(points)))
     if not rows:
         raise ValueError("no points: give X,Y for each of them, as arguments or as lines of standard input")
     return np.concatenate(rows)
 
 
+def _left_out(applied: "Applied") -> str:
+    """The rows that changed nothing, or were changed, by kind; empty if there are none."""
+    kinds = ("stale", "late", "skipped", "clamped", "evicted")
+    return "".join(f", {getattr(applied, kind):,} {kind}" for kind in kinds if getattr(applied, kind))
+
+
 def _report(name: str, applied: "Applied", what: str, as_json: bool) -> None:
     if as_json:
-        counts = {"inserted": applied.inserted, "deleted": applied.deleted, "missing": applied.missing}
-        typer.echo(
-            json_line(
-                name=name,
-                revision=applied.revision,
-                **counts,
-                points=applied.points,
-                hull_changed=applied.hull_changed,
-            )
-        )
+        members = asdict(applied) | {"clock": applied.clock and applied.clock.isoformat()}
+        typer.echo(json_line(name=name, **members))
     else:
         changed = "changed" if applied.hull_changed else "unchanged"
         typer.echo(f"{name}: {what}, {applied.points:,} in the hull, its shape {changed}")
 
 
 # A point may begin with a minus sign.
-insert.context_settings = remove.context_settings = {"ignore_unknown_options": True}  # type: ignore[attr-defined]
+for _command in (insert, put, remove):
+    _command.context_settings = {"ignore_unknown_options": True}  # type: ignore[attr-defined]

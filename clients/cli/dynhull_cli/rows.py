@@ -1,4 +1,4 @@
-"""Rows of numbers that a command is given: as arguments, or as lines of standard input."""
+"""Reads rows of numbers from the arguments of a command or from standard input."""
 
 import math
 import sys
@@ -13,7 +13,7 @@ SHAPES = {2: "X,Y", 4: "X,Y,X,Y"}
 
 
 def given_or_read(arguments: list[str] | None) -> list[str]:
-    """The arguments; those of standard input where there are none. ValueError where that is a terminal."""
+    """The arguments, or "-" for standard input if there are none. ValueError if standard input is a terminal."""
     if not arguments and sys.stdin.isatty():
         raise ValueError("no points: give X,Y for each of them, or - to type them in")
     return arguments or STANDARD_INPUT

@@ -7,11 +7,10 @@ from itertools import islice
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.live import Live
-from rich.table import Table
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from dynhull_client import HullClient, HullInfo
 
 from .connected import AsJson, connected
@@ -42,6 +41,9 @@ def top(
 
     dynhull top fleet/ --interval 5
     """
+    from rich.console import Console
+    from rich.live import Live
+
     console = Console(highlight=False)
     live = console.is_terminal and not as_json
     tables = islice(_readings(client, prefix, interval), looks if looks or live else 1)
@@ -75,7 +77,9 @@ def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[li
         before, then = {info.uid: info for info in infos}, now
 
 
-def _shown(rows: list[Row]) -> Table:
+def _shown(rows: list[Row]) -> "Table":
+    from rich.table import Table
+
     table = Table()
     table.add_column("hull")
     for heading in ("revision", "points", "distinct", "batches/s", "points/s"):

@@ -1,15 +1,10 @@
 """The command `dynhull dashboard`."""
 
-import asyncio
 from typing import Annotated
 
 import typer
 
 from dynhull_cli.connected import Connect, connecting
-from dynhull_client import AsyncHullClient
-
-from .hub import Hub
-from .units import Units
 
 
 @connecting
@@ -41,7 +36,13 @@ def dashboard(
 
     dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # with dynhull serve --metrics-port 9464
     """
+    import asyncio
+
+    from dynhull_client import AsyncHullClient
+
+    from .hub import Hub
     from .serve import serve  # imports Bokeh, which --help does not need
+    from .units import Units
 
     async def show() -> None:
         async with connect(AsyncHullClient, retries=0) as client:

@@ -7,13 +7,23 @@
 ...     print(client.get_hull("fleet").vertices)
 """
 
+try:
+    import google.protobuf  # noqa: F401
+    import grpc  # noqa: F401
+except ModuleNotFoundError as _missing:
+    raise ModuleNotFoundError(
+        "dynhull_client needs grpcio and protobuf. Install them with: pip install 'dynhull[client]'", name=_missing.name
+    ) from None
+
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_watch import AsyncWatch
 from ._async_writer import AsyncWriter
+from ._batch import Batch
 from ._client import HullClient
 from ._errors import (
     DeadlineError,
+    DuplicateKeyError,
     DynhullError,
     HullEmptyError,
     HullExistsError,
@@ -21,6 +31,7 @@ from ._errors import (
     HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
+    KeyMissingError,
     LimitExceededError,
     OutcomeUnknownError,
     PermissionDeniedError,
@@ -42,6 +53,7 @@ from ._messages import (
     Deleted,
     Difference,
     Distances,
+    Entities,
     Event,
     Hull,
     HullInfo,
@@ -49,6 +61,7 @@ from ._messages import (
     Located,
     Measures,
     Points,
+    Positions,
     Progress,
     Sampled,
     Sketch,
@@ -56,6 +69,7 @@ from ._messages import (
     Supported,
     Tangents,
     Verification,
+    Window,
 )
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import Watch
@@ -67,6 +81,7 @@ __all__ = [
     "AsyncIngest",
     "AsyncWatch",
     "AsyncWriter",
+    "Batch",
     "ChanRound",
     "Change",
     "Counted",
@@ -75,8 +90,10 @@ __all__ = [
     "Deleted",
     "Difference",
     "Distances",
+    "DuplicateKeyError",
     "DynhullError",
     "Efficient",
+    "Entities",
     "Event",
     "Hull",
     "HullClient",
@@ -90,6 +107,7 @@ __all__ = [
     "Ingest",
     "Ingested",
     "InvalidRequestError",
+    "KeyMissingError",
     "LimitExceededError",
     "Located",
     "Measured",
@@ -99,6 +117,7 @@ __all__ = [
     "Phases",
     "PointMissingError",
     "Points",
+    "Positions",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -113,6 +132,7 @@ __all__ = [
     "UnavailableError",
     "Verification",
     "Watch",
+    "Window",
     "Writer",
     "__version__",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from ._ingest import Ingest
 
@@ -38,9 +38,16 @@ class AsyncIngest:
         insert: npt.ArrayLike | None = None,
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+        *,
+        keys: Any = None,
+        points: npt.ArrayLike | None = None,
+        times: Any = None,
+        remove: Any = None,
     ) -> None:
         """Send a batch; arguments and errors as for `Ingest.apply`."""
-        await asyncio.to_thread(self._ingest.apply, insert, delete, move)
+        await asyncio.to_thread(
+            self._ingest.apply, insert, delete, move, keys=keys, points=points, times=times, remove=remove
+        )
 
     def __repr__(self) -> str:
         return f"<AsyncIngest to {self._name!r}>"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
+from functools import partial
 from time import monotonic
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
-from ._batch import encode_batch
 from ._calls import Writing, last_sequence
 from ._errors import DynhullError, error_of
+from ._gathering import put_parts, remove_parts
 from ._window import Window, settle
 from ._writer import CLOSED
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
     from ._connection import AsyncConnection
+    from ._gathering import Part
     from ._messages import Applied
 
 
@@ -52,20 +54,22 @@ class AsyncWriter:
         insert: npt.ArrayLike | None = None,
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+        *,
+        keys: Any = None,
+        points: npt.ArrayLike | None = None,
+        times: Any = None,
     ) -> asyncio.Future[Applied]:
         """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
 
         Returns the future of the batch's effect. Arguments and errors as for `Writer.put`.
         """
-        batch = encode_batch(insert, delete, move, self._writing.missing)
-        window = await self._open()
-        async with self._turn:
-            await self._turn.wait_for(lambda: not window.full or window.failure or self._closed)
-            if self._closed:
-                raise RuntimeError(CLOSED)
-            outcome = window.put(batch, monotonic())
-            self._turn.notify_all()
-        return outcome
+        writing = self._writing
+        coalesce = writing.coalesce == "last"
+        return await self._add(put_parts(insert, delete, move, keys, points, times, writing.missing, coalesce=coalesce))
+
+    async def remove(self, keys: Any) -> asyncio.Future[Applied]:
+        """Remove keys, as `Writer.remove` does."""
+        return await self._add(remove_parts(keys, self._writing.missing))
 
     async def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
@@ -102,6 +106,23 @@ class AsyncWriter:
 
     def __repr__(self) -> str:
         return f"<AsyncWriter to {self._writing.name!r} as producer {self._writing.producer!r}>"
+
+    async def _add(self, parts: list[Part]) -> asyncio.Future[Applied]:
+        window = await self._open()
+        async with self._turn:
+            for part in parts:
+                if not window.admits(part):
+                    window.hurry(monotonic())
+                    self._turn.notify_all()
+                await self._turn.wait_for(partial(self._may_put, window, part))
+                if self._closed:
+                    raise RuntimeError(CLOSED)
+                outcome = window.put(part, monotonic())
+            self._turn.notify_all()
+        return outcome
+
+    def _may_put(self, window: Window[asyncio.Future[Applied]], part: Part) -> bool:
+        return window.admits(part) or window.failure is not None or self._closed
 
     async def _open(self) -> Window[asyncio.Future[Applied]]:
         async with self._opening:

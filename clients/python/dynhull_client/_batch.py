@@ -1,58 +1,185 @@
 """Batches as messages."""
 
-from collections.abc import Sequence
-from typing import Literal
+from __future__ import annotations
 
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from google.protobuf.message import Message
 
 from dynhull.arrays import as_points
-from dynhull_proto.v1 import batch_pb2, points_pb2
+from dynhull_proto.v1 import batch_pb2
 
+from ._keys import checked_keys, decode_keys, encode_keys, plain_keys, rows_of
 from ._messages import encode_points
+from ._times import encode_duration, encode_times
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from datetime import timedelta
+
+    import numpy.typing as npt
 
 Missing = Literal["raise", "count"]
+"""The treatment of a point to delete, or of a key to remove, that the hull does not hold."""
+
+Only = Literal["absent", "present"]
+"""The keys to put: only new ones, or only known ones."""
+
+CONDITIONS = {
+    None: batch_pb2.PUT_CONDITION_UNSPECIFIED,
+    "absent": batch_pb2.PUT_CONDITION_IF_ABSENT,
+    "present": batch_pb2.PUT_CONDITION_IF_PRESENT,
+}
 BYTES_PER_POINT = 16
+BYTES_PER_INTEGER = 8
+BYTES_PER_TIME = 8
 
 
-def encode_batch(
-    insert: npt.ArrayLike | None,
-    delete: npt.ArrayLike | None,
-    move: tuple[npt.ArrayLike, npt.ArrayLike] | None,
-    missing: Missing,
-) -> batch_pb2.Batch:
-    """Arrays as a batch; ValueError or TypeError names the argument and the first bad row."""
-    if missing not in ("raise", "count"):
-        raise ValueError(f'missing must be "raise" or "count", got {missing!r}')
-    batch = batch_pb2.Batch()
-    if missing == "count":
-        batch.missing_points = batch_pb2.MISSING_POINT_POLICY_COUNT
-    if insert is not None:
-        batch.inserts.CopyFrom(encode_points(as_points(insert, "insert")))
-    if delete is not None:
-        batch.deletes.CopyFrom(encode_points(as_points(delete, "delete")))
-    if move is not None:
-        origins, destinations = as_points(move[0], "move[0]"), as_points(move[1], "move[1]")
+class Batch:
+    """Changes that are applied to a hull together, for `HullClient.transfer`: all of them or none, as one revision.
+
+    Args:
+        keys: n keys to put, as for `HullClient.put`,
+        points: (n, 2) their positions,
+        times: and their event times or, with `insert`, those of the points.
+        remove: keys to remove.
+        insert: (n, 2) points to insert, in a hull without keys.
+        delete: (n, 2) points to delete.
+        move: origins and destinations, (n, 2) each.
+        only: as for `HullClient.put`.
+        ttl: as for `HullClient.put`.
+        expire_times: as for `HullClient.put`.
+        missing: for a key to remove or a point to delete that the hull does not hold, "raise" refuses the batch and
+            "count" skips the row and counts it. By default "count" for keys and "raise" for points.
+
+    Raises:
+        ValueError, TypeError: an argument has a bad value. The message names the argument and the first bad row.
+    """
+
+    def __init__(
+        self,
+        *,
+        keys: Any = None,
+        points: npt.ArrayLike | None = None,
+        times: Any = None,
+        remove: Any = None,
+        insert: npt.ArrayLike | None = None,
+        delete: npt.ArrayLike | None = None,
+        move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+        only: Only | None = None,
+        ttl: float | timedelta | None = None,
+        expire_times: Any = None,
+        missing: Missing | None = None,
+    ) -> None:
+        self._message = batch_pb2.Batch()
+        self._set_policy(missing)
+        if (keys is None) != (points is None):
+            raise ValueError("keys and points are given together: the position of each key")
+        if not (keys is None and remove is None) and not (insert is None and delete is None and move is None):
+            raise ValueError("a batch either puts and removes keys, or inserts, deletes and moves points")
+        if insert is not None:
+            inserted = as_points(insert, "insert")
+            self._message.inserts.CopyFrom(encode_points(inserted))
+            if times is not None:
+                self._message.insert_times.CopyFrom(encode_times(times, len(inserted), "times"))
+        elif points is not None:
+            self._put(keys, as_points(points, "points"), times)
+        elif times is not None:
+            raise ValueError("times are given with the points to put or to insert")
+        if delete is not None:
+            self._message.deletes.CopyFrom(encode_points(as_points(delete, "delete")))
+        if move is not None:
+            self._move(as_points(move[0], "move[0]"), as_points(move[1], "move[1]"))
+        if remove is not None:
+            self._message.removes.CopyFrom(encode_keys(checked_keys(remove, "remove")))
+        self._set_conditions(only, ttl, expire_times)
+
+    @property
+    def message(self) -> batch_pb2.Batch:
+        """The batch as a protobuf message."""
+        return self._message
+
+    def __repr__(self) -> str:
+        return f"<Batch of {batch_rows(self._message)} rows>"
+
+    def _set_policy(self, missing: Missing | None) -> None:
+        if missing not in (None, "raise", "count"):
+            raise ValueError(f'missing must be "raise" or "count", got {missing!r}')
+        if missing == "count":
+            self._message.missing_points = batch_pb2.MISSING_POINT_POLICY_COUNT
+        if missing == "raise":
+            self._message.missing_keys = batch_pb2.MISSING_KEY_POLICY_REFUSE
+
+    def _put(self, keys: Any, positions: npt.NDArray[Any], times: Any) -> None:
+        checked = checked_keys(keys)
+        if len(checked) != len(positions):
+            raise ValueError(f"there are {len(checked)} keys and {len(positions)} points")
+        self._message.puts.keys.CopyFrom(encode_keys(checked))
+        self._message.puts.points.CopyFrom(encode_points(positions))
+        if times is not None:
+            self._message.puts.times.CopyFrom(encode_times(times, len(checked), "times"))
+
+    def _move(self, origins: npt.NDArray[Any], destinations: npt.NDArray[Any]) -> None:
         if len(origins) != len(destinations):
             raise ValueError(f"move has {len(origins)} origins and {len(destinations)} destinations")
-        batch.moves.origins.CopyFrom(encode_points(origins))
-        batch.moves.destinations.CopyFrom(encode_points(destinations))
-    return batch
+        self._message.moves.origins.CopyFrom(encode_points(origins))
+        self._message.moves.destinations.CopyFrom(encode_points(destinations))
+
+    def _set_conditions(self, only: Only | None, ttl: float | timedelta | None, expire_times: Any) -> None:
+        if only is None and ttl is None and expire_times is None:
+            return
+        if not self._message.HasField("puts"):
+            raise ValueError("only, ttl and expire_times are given with keys to put")
+        if only not in CONDITIONS:
+            raise ValueError(f'only must be "absent" or "present", got {only!r}')
+        if ttl is not None and expire_times is not None:
+            raise ValueError("give either ttl or expire_times, not both")
+        puts = self._message.puts
+        puts.condition = CONDITIONS[only]
+        if ttl is not None:
+            puts.ttl.CopyFrom(encode_duration(ttl, "ttl"))
+        if expire_times is not None:
+            rows = len(puts.points.packed) // BYTES_PER_POINT
+            puts.expire_times.CopyFrom(encode_times(expire_times, rows, "expire_times"))
 
 
 def batch_rows(batch: batch_pb2.Batch) -> int:
     """The number of rows of its arrays."""
-    return sum(len(points.packed) for points in _parts(batch)) // BYTES_PER_POINT
+    points = batch.inserts, batch.deletes, batch.moves.origins, batch.moves.destinations, batch.puts.points
+    rows = sum(len(each.packed) for each in points) // BYTES_PER_POINT
+    return rows + len(batch.removes.lengths) + len(batch.removes.packed_integers) // BYTES_PER_INTEGER
 
 
 def join_batches(batches: Sequence[batch_pb2.Batch]) -> batch_pb2.Batch:
-    """One batch with the effect of all these, which have the same policy for missing points."""
-    joined = batch_pb2.Batch(missing_points=batches[0].missing_points)
-    for whole, *pieces in zip(_parts(joined), *map(_parts, batches), strict=True):
-        packed = b"".join(piece.packed for piece in pieces)
-        if packed:
-            whole.packed = packed
+    """One batch with the effect of all these, which have the same policies.
+
+    Either all rows that are put or inserted have a time, or none has.
+    """
+    joined = batch_pb2.Batch(missing_points=batches[0].missing_points, missing_keys=batches[0].missing_keys)
+    _concatenate(joined, batches)
     return joined
 
 
-def _parts(batch: batch_pb2.Batch) -> tuple[points_pb2.Points, ...]:
-    return batch.inserts, batch.deletes, batch.moves.origins, batch.moves.destinations
+def keep_last_rows(batch: batch_pb2.Batch) -> None:
+    """Keep the last row of each key that is put."""
+    keys = decode_keys(batch.puts.keys)
+    rows = np.array(sorted({key: row for row, key in enumerate(plain_keys(keys))}.values()), np.intp)
+    if len(rows) == len(keys):
+        return
+    batch.puts.keys.CopyFrom(encode_keys(rows_of(keys, rows)))
+    for packed, width in ((batch.puts.points, BYTES_PER_POINT), (batch.puts.times, BYTES_PER_TIME)):
+        packed.packed = np.frombuffer(packed.packed, f"V{width}")[rows].tobytes() if packed.packed else b""
+
+
+def _concatenate(whole: Message, pieces: Sequence[Message]) -> None:
+    """Set the bytes in a message and its parts to those of all the pieces, one after the other."""
+    parts: dict[str, list[Any]] = {}
+    for piece in pieces:
+        for field, value in piece.ListFields():
+            parts.setdefault(field.name, []).append(value)
+    for name, values in parts.items():
+        if isinstance(values[0], bytes):
+            setattr(whole, name, b"".join(values))
+        elif isinstance(values[0], Message):
+            _concatenate(getattr(whole, name), values)

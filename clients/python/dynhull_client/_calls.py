@@ -6,43 +6,61 @@ The methods of `HullClient` and `AsyncHullClient` are made of these functions an
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Generic, Literal, Never, TypeVar
 from uuid import uuid4
 
+import grpc
 import numpy as np
-from google.protobuf.duration_pb2 import Duration
 
 from dynhull.arrays import as_points
+from dynhull_proto.v1 import hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_proto.v1 import points_pb2
 
 from . import _messages as messages
-from ._batch import encode_batch
+from ._batch import Batch
 from ._errors import DynhullError, HullExistsError, HullNotFoundError
+from ._keys import checked_keys, decode_names, encode_keys
 from ._messages import (
     Applied,
     Counted,
     Crossings,
     Distances,
+    Entities,
     Hull,
     HullInfo,
     Located,
+    Positions,
     Sampled,
     Supported,
     Tangents,
     Verification,
 )
+from ._times import encode_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+    from datetime import timedelta
 
     import numpy.typing as npt
     from google.protobuf.message import Message
 
+    from dynhull.keys import KeyType
+
+    from ._batch import Missing, Only
     from ._hull_copy import HullCopy
+    from ._messages import Ahead, Clock, Ordering
 
 Answer = TypeVar("Answer")
+
+
+IDENTITIES = {
+    None: hull_pb2.IDENTITY_MULTISET,
+    "str": hull_pb2.IDENTITY_STRING_KEYS,
+    "int": hull_pb2.IDENTITY_INTEGER_KEYS,
+}
+ORDERINGS = {"arrival": hull_pb2.ORDERING_UNSPECIFIED, "event_time": hull_pb2.ORDERING_EVENT_TIME}
+CLOCKS = {"server": hull_pb2.CLOCK_SERVER, "data": hull_pb2.CLOCK_DATA}
+AHEAD_POLICIES = {"refuse": hull_pb2.AHEAD_POLICY_REFUSE, "clamp": hull_pb2.AHEAD_POLICY_CLAMP}
 
 
 def _nothing(_: DynhullError) -> None:
@@ -61,6 +79,7 @@ class Call(Generic[Answer]):
         repeatable: whether it may be sent again when its outcome is unknown.
         instead: the call to make after an error; None for none.
         awaits_hull: whether to repeat it until there is a hull and a server.
+        in_parts: whether the answer is a stream of messages, which `decode` receives as a list.
     """
 
     method: str
@@ -70,32 +89,111 @@ class Call(Generic[Answer]):
     repeatable: bool = True
     instead: Callable[[DynhullError], Call[Answer] | None] = _nothing
     awaits_hull: bool = False
+    in_parts: bool = False
 
 
-def create_hull(name: str, *, exist_ok: bool = False, timeout: float | None = None) -> Call[HullInfo]:
-    """Create an empty hull.
+def create_hull(
+    name: str,
+    *,
+    keyed: KeyType | None = None,
+    max_age: float | timedelta | None = None,
+    max_points: int | None = None,
+    clock: Clock = "server",
+    max_skew: float | timedelta | None = None,
+    ahead: Ahead = "refuse",
+    ordering: Ordering = "arrival",
+    point_limit: int | None = None,
+    exist_ok: bool = False,
+    timeout: float | None = None,
+) -> Call[HullInfo]:
+    """Create an empty hull. Its settings are fixed from then on.
+
+    With `max_age` or `max_points`, the hull has a sliding window: points leave when they are too old or too many. The
+    time of a point is its event time or, if the batch has none, the time at which the server received it.
 
     Args:
-        name: 1 to 200 letters, digits and "._-/".
-        exist_ok: whether to return an existing hull of that name, with its points, instead of raising HullExistsError.
+        name: 1 to 200 letters a to z and A to Z, digits and "._-/".
+        keyed: the kind of the keys, "str" or "int"; None for a hull of points without keys.
+        max_age: the age at which points leave, in seconds or as a timedelta.
+        max_points: the number of points beyond which the oldest leave. For a limit that refuses, see `point_limit`.
+        clock: the clock that decides what is too old: "server", or "data" for the greatest event time so far.
+        max_skew: how far an event time may be ahead of the server's clock; None for any distance.
+        ahead: what happens to event times further ahead: "refuse" the batch, or "clamp" the time to the latest allowed.
+        ordering: which of two positions of a key is the later one: the one that arrives last ("arrival"), or the one
+            with the later event time ("event_time"): an older one then changes nothing.
+        point_limit: the number of points beyond which a batch is refused; None for the server's own limit.
+        exist_ok: whether to return an existing hull of that name and kind, with its points. HullExistsError if it has
+            other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
     """
+    config = _config(keyed, ordering, point_limit)
+    if max_age is not None or max_points is not None:
+        config.window.CopyFrom(_window(max_age, max_points, clock, max_skew, ahead))
+    elif clock != "server" or max_skew is not None or ahead != "refuse":
+        raise ValueError("clock, max_skew and ahead are settings of a window: give max_age or max_points, too")
     create: Call[HullInfo] = Call(
         "CreateHull",
-        pb.CreateHullRequest(name=name),
+        pb.CreateHullRequest(name=name, config=config),
         lambda response: messages.decode_info(response.hull),
         timeout,
         repeatable=exist_ok,
         instead=lambda error: existing if exist_ok and isinstance(error, HullExistsError) else None,
     )
+    wanted = messages.decode_info(hull_pb2.Hull(name=name, config=config))
     existing: Call[HullInfo] = Call(
         "GetHull",
         pb.GetHullRequest(name=name, view=pb.HULL_VIEW_BASIC),
-        lambda response: messages.decode_info(response.hull),
+        lambda response: _as_wanted(messages.decode_info(response.hull), wanted),
         timeout,
         instead=lambda error: create if isinstance(error, HullNotFoundError) else None,  # deleted in the meantime
     )
     return create
+
+
+def _config(keyed: KeyType | None, ordering: Ordering, point_limit: int | None) -> hull_pb2.HullConfig:
+    return hull_pb2.HullConfig(
+        identity=_choice("keyed", keyed, IDENTITIES),
+        ordering=_choice("ordering", ordering, ORDERINGS),
+        max_points=_positive("point_limit", point_limit),
+    )
+
+
+def _window(
+    max_age: float | timedelta | None,
+    max_points: int | None,
+    clock: Clock,
+    max_skew: float | timedelta | None,
+    ahead: Ahead,
+) -> hull_pb2.Window:
+    return hull_pb2.Window(
+        max_age=None if max_age is None else encode_duration(max_age, "max_age"),
+        max_points=_positive("max_points", max_points),
+        clock=_choice("clock", clock, CLOCKS),
+        max_skew=None if max_skew is None else encode_duration(max_skew, "max_skew"),
+        ahead=_choice("ahead", ahead, AHEAD_POLICIES),
+    )
+
+
+def _choice(argument: str, value: Any, choices: Mapping[Any, Any]) -> Any:
+    if value not in choices:
+        raise ValueError(f"{argument} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+    return choices[value]
+
+
+def _positive(argument: str, value: int | None) -> int:
+    if value is not None and value < 1:
+        raise ValueError(f"{argument} must be at least 1, got {value}")
+    return value or 0
+
+
+def _as_wanted(existing: HullInfo, wanted: HullInfo) -> HullInfo:
+    """The existing hull; HullExistsError if it has other settings than the one to create."""
+    for setting in ("keyed", "window", "ordering"):
+        has, wants = getattr(existing, setting), getattr(wanted, setting)
+        if has != wants:
+            message = f"the hull {existing.name!r} exists with other settings: its {setting} is {has!r}, not {wants!r}"
+            raise HullExistsError(message, grpc.StatusCode.ALREADY_EXISTS, "HULL_EXISTS", {"value": existing.name})
+    return existing
 
 
 def wait_for_hull(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[HullInfo]:
@@ -132,7 +230,8 @@ def apply(  # noqa: D417  # unnamed takes nothing
     insert: npt.ArrayLike | None = None,
     delete: npt.ArrayLike | None = None,
     move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
-    missing: Literal["raise", "count"] = "raise",
+    times: Any = None,
+    missing: Missing = "raise",
     producer: str = "",
     sequence: int = 0,
     timeout: float | None = None,
@@ -144,6 +243,7 @@ def apply(  # noqa: D417  # unnamed takes nothing
         insert: (n, 2) points to insert.
         delete: (n, 2) points to delete.
         move: origins and destinations, (n, 2) each: row by row a delete and an insert.
+        times: (n,) event times of the points to insert, in a hull with a window; as for `put`.
         missing: for a point to delete that the hull does not hold: "raise" refuses the batch with PointMissingError,
             which names the row; "count" skips the point and counts it.
         producer: a name for the sender that numbers the batch, so that it is applied once however often it is sent.
@@ -156,8 +256,99 @@ def apply(  # noqa: D417  # unnamed takes nothing
             f"apply({name!r}, points) does not say what to do with the points: "
             f"write apply({name!r}, insert=points) or apply({name!r}, delete=points)"
         )
-    batch = encode_batch(insert, delete, move, missing)
-    request = pb.ApplyRequest(name=name, batch=batch, producer=producer, sequence=sequence)
+    batch = Batch(insert=insert, delete=delete, move=move, times=times, missing=missing)
+    return _apply(name, batch, producer, sequence, timeout)
+
+
+def put(
+    name: str,
+    keys: Any,
+    points: npt.ArrayLike,
+    times: Any = None,
+    *,
+    remove: Any = None,
+    only: Only | None = None,
+    ttl: float | timedelta | None = None,
+    expire_times: Any = None,
+    producer: str = "",
+    sequence: int = 0,
+    timeout: float | None = None,
+) -> Call[Applied]:
+    """Put keys as one batch, as one revision: a new key is inserted, a known key moves.
+
+    HullUnsuitableError if the hull has no keys or keys of the other kind; DuplicateKeyError if a key comes twice.
+
+    Args:
+        name: the hull.
+        keys: n keys: strings or integers in a list, a numpy array, a column of pandas, polars or pyarrow; or
+            `dynhull.keys.PackedKeys`.
+        points: (n, 2) their positions.
+        times: (n,) their event times: datetimes with a time zone, datetime64 in UTC, a column of such times with a time
+            zone, or integers of microseconds since 1970.
+        remove: keys to remove in the same batch.
+        only: "absent" puts new keys only, "present" known keys only; the others are skipped and counted.
+        ttl: the time after which the keys leave the hull, in seconds or as a timedelta.
+        expire_times: (n,) the times at which the keys leave, instead of `ttl`.
+        producer: as for `apply`.
+        sequence: as for `apply`.
+        timeout: seconds, instead of the client's.
+    """
+    batch = Batch(keys=keys, points=points, times=times, remove=remove, only=only, ttl=ttl, expire_times=expire_times)
+    return _apply(name, batch, producer, sequence, timeout)
+
+
+def remove(
+    name: str,
+    keys: Any,
+    *,
+    missing: Missing = "count",
+    producer: str = "",
+    sequence: int = 0,
+    timeout: float | None = None,
+) -> Call[Applied]:
+    """Remove keys as one batch.
+
+    Args:
+        name: the hull.
+        keys: n keys, as for `put`.
+        missing: for a key that the hull does not hold: "count" skips the key and counts it; "raise" refuses the batch
+            with KeyMissingError, which names the row.
+        producer: as for `apply`.
+        sequence: as for `apply`.
+        timeout: seconds, instead of the client's.
+    """
+    return _apply(name, Batch(remove=keys, missing=missing), producer, sequence, timeout)
+
+
+def transfer(
+    batches: Mapping[str, Batch], *, producer: str = "", sequence: int = 0, timeout: float | None = None
+) -> Call[dict[str, Applied]]:
+    """Apply a batch to each of 2 to 16 hulls: all of them, as one revision each, or none.
+
+    Nobody sees some of the revisions without the others: a key that leaves one hull for another is always in exactly
+    one of them. Returns the effect of each batch, by hull.
+
+    >>> client.transfer(  # doctest: +SKIP
+    ...     {"fleet/north": Batch(remove=["LH400"]), "fleet/south": Batch(keys=["LH400"], points=[[4, 1]])}
+    ... )
+
+    Args:
+        batches: the batch of each hull. The hulls must exist.
+        producer: as for `apply`.
+        sequence: as for `apply`; counted in each of the hulls.
+        timeout: seconds, instead of the client's.
+    """
+    parts = [pb.HullBatch(name=name, batch=batch.message) for name, batch in batches.items()]
+    request = pb.ApplyTogetherRequest(batches=parts, producer=producer, sequence=sequence)
+
+    def decode(response: pb.ApplyTogetherResponse) -> dict[str, Applied]:
+        return dict(zip(batches, map(messages.decode_applied, response.results), strict=True))
+
+    return Call("ApplyTogether", request, decode, timeout, repeatable=sequence > 0)
+
+
+def _apply(name: str, batch: Batch, producer: str, sequence: int, timeout: float | None) -> Call[Applied]:
+    request = pb.ApplyRequest(name=name, batch=batch.message, producer=producer, sequence=sequence)
     return Call(
         "Apply", request, lambda response: messages.decode_applied(response.result), timeout, repeatable=sequence > 0
     )
@@ -169,17 +360,49 @@ def last_sequence(name: str, producer: str, *, timeout: float | None = None) -> 
     return Call("GetProducer", request, lambda response: int(response.last_sequence), timeout)
 
 
-def locate(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Located]:
+def locate(
+    name: str,
+    xy: npt.ArrayLike | None = None,
+    *,
+    keys: Any = None,
+    keys_of: str = "",
+    keys_min_revision: int = 0,
+    min_revision: int = 0,
+    timeout: float | None = None,
+) -> Call[Located]:
     """The side of each of (n, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact.
 
     With `min_revision`, this and the other reads wait until the hull has reached that revision.
+
+    Args:
+        name: the hull.
+        xy: (n, 2) points,
+        keys: or keys instead, whose positions are located; a missing one is on side -128.
+        keys_of: the keyed hull that has the keys; by default the hull itself, at the same revision.
+        keys_min_revision: a revision of that other hull to wait for.
+        min_revision: a revision of the hull to wait for.
+        timeout: seconds, instead of the client's.
     """
-    request = pb.LocateRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
+    request = pb.LocateRequest(name=name, min_revision=min_revision)
+    _ask_about(request, xy, keys, keys_of, keys_min_revision)
 
     def decode(response: pb.LocateResponse) -> Located:
-        return Located(response.revision, np.frombuffer(response.sides, np.int8))
+        sides = np.frombuffer(response.sides, np.int8)
+        return Located(response.revision, sides, response.keys_revision if keys_of else None)
 
     return Call("Locate", request, decode, timeout)
+
+
+def positions(name: str, keys: Any, *, min_revision: int = 0, timeout: float | None = None) -> Call[Positions]:
+    """The positions of keys, (n, 2), with NaN for missing ones. HullUnsuitableError if the hull is not keyed."""
+    request = pb.GetPositionsRequest(name=name, min_revision=min_revision, keys=encode_keys(checked_keys(keys)))
+    return Call("GetPositions", request, messages.decode_positions, timeout)
+
+
+def entities(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Entities]:
+    """All keys, their positions and times at one revision. HullUnsuitableError if the hull is not keyed."""
+    request = pb.ReadEntitiesRequest(name=name, min_revision=min_revision)
+    return Call("ReadEntities", request, messages.decode_entities, timeout, in_parts=True)
 
 
 def count(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Counted]:
@@ -193,17 +416,18 @@ def count(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float
 
 
 def support(
-    name: str, directions: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
+    name: str, directions: npt.ArrayLike, *, keys: bool = False, min_revision: int = 0, timeout: float | None = None
 ) -> Call[Supported]:
     """The extreme vertex in each of (n, 2) directions, which may have any length but 0. Exact.
 
-    HullEmptyError if the hull has no points.
+    With `keys`, also the key of each vertex, in a keyed hull. HullEmptyError if the hull has no points.
     """
     vectors = encoded(directions, "directions")
-    request = pb.SupportRequest(name=name, min_revision=min_revision, directions=vectors)
+    request = pb.SupportRequest(name=name, min_revision=min_revision, directions=vectors, include_keys=keys)
 
     def decode(response: pb.SupportResponse) -> Supported:
-        return Supported(response.revision, messages.decode_points(response.vertices))
+        named = decode_names(response.keys) if keys else None
+        return Supported(response.revision, messages.decode_points(response.vertices), named)
 
     return Call("Support", request, decode, timeout)
 
@@ -219,14 +443,47 @@ def tangents(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: fl
     return Call("Tangents", request, decode, timeout)
 
 
-def distance(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Distances]:
-    """The distance of each of (n, 2) points to the hull: 0 inside and on the boundary, inf if the hull is empty."""
-    request = pb.DistanceRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
+def distance(
+    name: str,
+    xy: npt.ArrayLike | None = None,
+    *,
+    keys: Any = None,
+    keys_of: str = "",
+    keys_min_revision: int = 0,
+    min_revision: int = 0,
+    timeout: float | None = None,
+) -> Call[Distances]:
+    """The distance of each of (n, 2) points to the hull: 0 inside and on the boundary, inf if the hull is empty.
+
+    Arguments as for `locate`; a missing key has the distance NaN.
+    """
+    request = pb.DistanceRequest(name=name, min_revision=min_revision)
+    _ask_about(request, xy, keys, keys_of, keys_min_revision)
 
     def decode(response: pb.DistanceResponse) -> Distances:
-        return Distances(response.revision, np.array(response.distances, np.float64))
+        distances = np.array(response.distances, np.float64)
+        return Distances(response.revision, distances, response.keys_revision if keys_of else None)
 
     return Call("Distance", request, decode, timeout)
+
+
+def _ask_about(
+    request: pb.LocateRequest | pb.DistanceRequest,
+    xy: npt.ArrayLike | None,
+    keys: Any,
+    keys_of: str,
+    keys_min_revision: int,
+) -> None:
+    """Add the points, or the keys whose positions are asked about."""
+    if (xy is None) == (keys is None):
+        raise ValueError("give either points or keys")
+    if keys is None and (keys_of or keys_min_revision):
+        raise ValueError("keys_of and keys_min_revision are given with keys")
+    if xy is not None:
+        request.points.CopyFrom(encoded(xy, "xy"))
+        return
+    request.keys.CopyFrom(encode_keys(checked_keys(keys)))
+    request.keys_of, request.keys_min_revision = keys_of, keys_min_revision
 
 
 def intersect_lines(
@@ -245,19 +502,24 @@ def intersect_lines(
 
 
 def get_hull(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Hull]:
-    """The vertices, size, area, perimeter, centroid and bounds."""
-    return Call("GetHull", pb.GetHullRequest(name=name, min_revision=min_revision), messages.decode_hull, timeout)
+    """The vertices with their keys, size, area, perimeter, centroid and bounds."""
+    request = pb.GetHullRequest(name=name, min_revision=min_revision, include_keys=True)
+    return Call("GetHull", request, messages.decode_hull, timeout)
 
 
-def sample_points(name: str, size: int = 1000, *, min_revision: int = 0, timeout: float | None = None) -> Call[Sampled]:
+def sample_points(
+    name: str, size: int = 1000, *, keys: bool = False, min_revision: int = 0, timeout: float | None = None
+) -> Call[Sampled]:
     """A sample of at most `size` points, and never more than 100 000; all points if there are no more.
 
-    Inserting or deleting a point changes at most one point of the sample.
+    Inserting or deleting a point changes at most one point of the sample. With `keys`, also the key of each point, in a
+    keyed hull.
     """
-    request = pb.SamplePointsRequest(name=name, sample_size=size, min_revision=min_revision)
+    request = pb.SamplePointsRequest(name=name, sample_size=size, min_revision=min_revision, include_keys=keys)
 
     def decode(response: pb.SamplePointsResponse) -> Sampled:
-        return Sampled(response.revision, messages.decode_points(response.points))
+        named = decode_names(response.keys) if keys else None
+        return Sampled(response.revision, messages.decode_points(response.points), named)
 
     return Call("SamplePoints", request, decode, timeout)
 
@@ -273,25 +535,20 @@ class Ingesting:
     """An ingest to begin."""
 
     name: str
-    missing: Literal["raise", "count"]
+    missing: Missing | None
     timeout: float | None
 
     def first(self) -> pb.IngestRequest:
         """The first message, which only names the hull: a wrong name fails before the first batch."""
         return pb.IngestRequest(name=self.name)
 
-    def batch(
-        self,
-        insert: npt.ArrayLike | None,
-        delete: npt.ArrayLike | None,
-        move: tuple[npt.ArrayLike, npt.ArrayLike] | None,
-    ) -> pb.IngestRequest:
+    def batch(self, **changes: Any) -> pb.IngestRequest:
         """The message for a batch."""
-        return pb.IngestRequest(batch=encode_batch(insert, delete, move, self.missing))
+        return pb.IngestRequest(batch=Batch(**changes, missing=self.missing).message)
 
 
-def ingest(name: str, *, missing: Literal["raise", "count"] = "raise", timeout: float | None = None) -> Ingesting:
-    """A stream of batches in one call, for use in a with statement. `missing` as for `apply`.
+def ingest(name: str, *, missing: Missing | None = None, timeout: float | None = None) -> Ingesting:
+    """A stream of batches in one call, for use in a with statement. `missing` as for `apply` and `remove`.
 
     >>> with client.ingest("fleet") as stream:  # doctest: +SKIP
     ...     for minute in minutes:
@@ -311,7 +568,8 @@ class Writing:
     batch_points: int
     linger: float
     in_flight: int
-    missing: Literal["raise", "count"]
+    missing: Missing | None
+    coalesce: Literal["last"] | None
     stop_on_error: bool
     patience: float
 
@@ -323,7 +581,8 @@ def writer(
     batch_points: int = 8192,
     linger: float = 0.02,
     in_flight: int = 32,
-    missing: Literal["raise", "count"] = "raise",
+    missing: Missing | None = None,
+    coalesce: Literal["last"] | None = None,
     stop_on_error: bool = False,
     patience: float = 60.0,
 ) -> Writing:
@@ -344,7 +603,9 @@ def writer(
         batch_points: a batch is sent when it has this many points,
         linger: or this many seconds after its first point.
         in_flight: the most batches that are sent and not acknowledged.
-        missing: as for `apply`.
+        missing: as for `apply` and `remove`.
+        coalesce: "last" keeps only the last of several positions of a key in a batch; None begins a new batch where a
+            key comes again.
         stop_on_error: whether a refused batch ends the writer; otherwise the batches after it are still applied.
         patience: seconds without a server after which the writer gives up.
     """
@@ -352,7 +613,9 @@ def writer(
         if value < 1:
             raise ValueError(f"{argument} must be at least 1, got {value}")
     producer = f"writer-{uuid4().hex}" if producer is None else producer
-    return Writing(name, producer, batch_points, linger, in_flight, missing, stop_on_error, patience)
+    if coalesce not in (None, "last"):
+        raise ValueError(f'coalesce must be None or "last", got {coalesce!r}')
+    return Writing(name, producer, batch_points, linger, in_flight, missing, coalesce, stop_on_error, patience)
 
 
 @dataclass(frozen=True, slots=True)
@@ -376,6 +639,7 @@ def watch(
     copy: HullCopy | None = None,
     resume: HullCopy | None = None,
     directions: npt.ArrayLike | None = None,
+    keys: bool = False,
     follow: bool = False,
     reconnect: bool = True,
     timeout: float | None = None,
@@ -397,6 +661,7 @@ def watch(
         resume: a copy that the caller updates: the watch begins with the changes since then, not with a snapshot.
         directions: (k, 2) vectors; the watch then sends no vertices but `Sketch` events with the extreme vertices in
             these directions.
+        keys: whether events name the vertices, in a keyed hull; `HullCopy.vertex_keys` then has their keys.
         follow: whether the watch survives the deletion of the hull: it returns a `Deleted` event, and a Snapshot when
             there is a new hull of that name. It also waits for a hull that does not exist yet. Without it,
             HullNotFoundError ends the watch. With `directions`, the watch notices only a deletion that happens while it
@@ -407,7 +672,11 @@ def watch(
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """
     request = pb.WatchRequest(
-        name=name, min_revision=min_revision, max_events_per_second=max_rate, include_measures=measures
+        name=name,
+        min_revision=min_revision,
+        max_events_per_second=max_rate,
+        include_measures=measures,
+        include_keys=keys,
     )
     if copy is not None and resume is not None:
         raise ValueError("give either copy, which the watch updates, or resume, which the caller updates, not both")
@@ -417,9 +686,7 @@ def watch(
     if directions is not None:
         request.directions.CopyFrom(encoded(directions, "directions"))
     if progress_interval is not None:
-        duration = Duration()
-        duration.FromTimedelta(timedelta(seconds=progress_interval))
-        request.progress_interval.CopyFrom(duration)
+        request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
     return Watching(request, copy, follow, reconnect, timeout)
 
 

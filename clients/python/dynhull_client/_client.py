@@ -36,7 +36,7 @@ class HullClient(Client[BlockingConnection]):
     that are not finite points raise ValueError or TypeError, as in `dynhull`, and nothing is sent.
 
     Args:
-        address: host:port.
+        address: HOST or HOST:PORT; the port is 50051 unless given. https://HOST asks for TLS.
         timeout: seconds a call may take unless the call has its own timeout; None for no limit. Ingests, writers and
             watches have no limit by default.
         wait_for_ready: whether calls wait, within their timeout, for a server that is not there yet.
@@ -53,9 +53,14 @@ class HullClient(Client[BlockingConnection]):
     wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)
+    put = _answering(calls.put)
+    remove = _answering(calls.remove)
+    transfer = _answering(calls.transfer)
     last_sequence = _answering(calls.last_sequence)
     locate = _answering(calls.locate)
     count = _answering(calls.count)
+    positions = _answering(calls.positions)
+    entities = _answering(calls.entities)
     support = _answering(calls.support)
     tangents = _answering(calls.tangents)
     distance = _answering(calls.distance)

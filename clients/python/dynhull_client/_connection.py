@@ -10,6 +10,7 @@ import grpc
 
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
+from ._address import target
 from ._calls import Call
 from ._errors import DynhullError, error_of
 from ._retry import Attempts
@@ -52,10 +53,12 @@ class Connection:
         tls: grpc.ChannelCredentials | None,
         retries: int,
     ) -> None:
-        self.address = address
+        self.address, encrypted = target(address)
+        if tls is None and encrypted:
+            tls = grpc.ssl_channel_credentials()
         self.blocking = partial(
             BlockingConnection,
-            address,
+            self.address,
             timeout=timeout,
             wait_for_ready=wait_for_ready,
             token=token,
@@ -69,9 +72,9 @@ class Connection:
         # Call credentials would do the same, but gRPC sends them over TLS only, which a local server does not need.
         self._metadata = () if token is None else (("authorization", f"Bearer {token}"),)
         if tls is None:
-            self._channel = self._grpc.insecure_channel(address, OPTIONS)
+            self._channel = self._grpc.insecure_channel(self.address, OPTIONS)
         else:
-            self._channel = self._grpc.secure_channel(address, tls, OPTIONS)
+            self._channel = self._grpc.secure_channel(self.address, tls, OPTIONS)
         self.stub: Any = HullServiceStub(self._channel)
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
@@ -97,7 +100,8 @@ class BlockingConnection(Connection):
         attempts = self._attempts(call)
         while True:
             try:
-                return call.decode(self._begin(call, attempts))
+                begun = self._begin(call, attempts)
+                return call.decode(list(begun) if call.in_parts else begun)
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, error_of(failure))
             time.sleep(pause)
@@ -118,7 +122,8 @@ class AsyncConnection(Connection):
         attempts = self._attempts(call)
         while True:
             try:
-                return call.decode(await self._begin(call, attempts))
+                begun = self._begin(call, attempts)
+                return call.decode([part async for part in begun] if call.in_parts else await begun)
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, error_of(failure))
             await asyncio.sleep(pause)

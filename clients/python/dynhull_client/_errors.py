@@ -54,6 +54,19 @@ class PointMissingError(DynhullError, LookupError):
     """A batch deletes a point that is not in the hull; nothing of the batch was applied."""
 
 
+class DuplicateKeyError(InvalidRequestError):
+    """A batch names a key twice, in the rows `first_row` and `row`; nothing of it was applied."""
+
+    @property
+    def first_row(self) -> int | None:
+        """The row that names the key first; `row` names it again."""
+        return _number(self.metadata.get("first_row"))
+
+
+class KeyMissingError(DynhullError, LookupError):
+    """A batch removes a key that is not in the hull; nothing of the batch was applied."""
+
+
 class LimitExceededError(DynhullError):
     """The request exceeds a limit of the server, such as the size of a message."""
 
@@ -71,7 +84,7 @@ class HullEmptyError(DynhullError, ValueError):
 
 
 class HullUnsuitableError(DynhullError, ValueError):
-    """The query has no answer for a hull with the point that the message names."""
+    """The hull is not of the kind that the call needs: keyed or not, or with other points; the message says which."""
 
 
 class RevisionForgottenError(DynhullError, LookupError):
@@ -115,6 +128,8 @@ BY_REASON: Mapping[str, type[DynhullError]] = {
     "HULL_REPLACED": HullReplacedError,
     "HULL_UNSUITABLE": HullUnsuitableError,
     "INVALID_FIELD": InvalidRequestError,
+    "KEY_MISSING": KeyMissingError,
+    "KEY_REPEATED": DuplicateKeyError,
     "LIMIT_EXCEEDED": LimitExceededError,
     "MALFORMED_MESSAGE": InvalidRequestError,
     "OUTCOME_UNKNOWN": OutcomeUnknownError,

@@ -4,10 +4,12 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull._shown import geometry, svg
 from dynhull.arrays import Points
 
+from ._keys import KeyTuple
 from ._messages import Change, Deleted, Event, Snapshot
 
 
@@ -20,12 +22,14 @@ class HullCopy:
         points: the number of points at that revision, duplicates included.
         vertices: (h, 2) counter-clockwise from the lexicographically smallest; exactly the hull's at that revision.
             Read-only.
+        vertex_keys: the key of each vertex; None unless the watch has `keys=True`.
     """
 
     uid: str
     revision: int
     points: int
     vertices: Points
+    vertex_keys: KeyTuple | None
 
     def __init__(self) -> None:
         self._clear()
@@ -36,8 +40,9 @@ class HullCopy:
             self._clear()
             return
         if isinstance(event, Snapshot):
-            self.vertices, self.uid = event.vertices, event.uid
+            self.vertices, self.uid, self.vertex_keys = event.vertices, event.uid, event.vertex_keys
         elif isinstance(event, Change):
+            self.vertex_keys = _changed_keys(self.vertex_keys, len(self.vertices), event)
             self.vertices = _changed(self.vertices, event)
         self.revision, self.points = event.revision, event.points
 
@@ -62,14 +67,30 @@ class HullCopy:
         self.revision = 0
         self.points = 0
         self.vertices = np.empty((0, 2))
+        self.vertex_keys = None
 
 
 def _changed(vertices: Points, change: Change) -> Points:
-    kept = np.roll(np.delete(vertices, change.removed_rows, axis=0), -change.rotation, axis=0)
-    changed = np.empty((len(kept) + len(change.added), 2))
+    changed: Points = _edited(vertices, change.added, change)
+    changed.flags.writeable = False
+    return changed
+
+
+def _changed_keys(keys: KeyTuple | None, count: int, change: Change) -> KeyTuple | None:
+    """The keys after a change; those of a copy that had none are all among the renamed ones."""
+    if change.added_keys is None or change.renamed_keys is None:
+        return None
+    before = np.empty(count, object) if keys is None else np.array(keys, object)
+    changed = _edited(before, np.array(change.added_keys, object), change)
+    changed[change.renamed_rows] = change.renamed_keys
+    return tuple(changed.tolist())
+
+
+def _edited(rows: npt.NDArray[Any], added: npt.NDArray[Any], change: Change) -> npt.NDArray[Any]:
+    kept = np.roll(np.delete(rows, change.removed_rows, axis=0), -change.rotation, axis=0)
+    changed = np.empty((len(kept) + len(added), *rows.shape[1:]), rows.dtype)
     is_added = np.zeros(len(changed), np.bool_)
     is_added[change.added_rows] = True
-    changed[is_added] = change.added
+    changed[is_added] = added
     changed[~is_added] = kept
-    changed.flags.writeable = False
     return changed

@@ -72,15 +72,22 @@ class Ingest:
         insert: npt.ArrayLike | None = None,
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+        *,
+        keys: Any = None,
+        points: npt.ArrayLike | None = None,
+        times: Any = None,
+        remove: Any = None,
     ) -> None:
-        """Send a batch; arguments as for `HullClient.apply`.
+        """Send a batch; arguments as for `HullClient.apply` or, in a keyed hull, `HullClient.put`.
 
         Raises:
-            ValueError, TypeError: an argument is not an array of finite points; nothing was sent.
+            ValueError, TypeError: an argument has a bad value; nothing was sent.
             DynhullError: the server refused an earlier batch.
             RuntimeError: the context was not entered, or was left.
         """
-        request = self._ingesting.batch(insert, delete, move)
+        request = self._ingesting.batch(
+            insert=insert, delete=delete, move=move, keys=keys, points=points, times=times, remove=remove
+        )
         if self._call is None:
             raise RuntimeError("an Ingest works only inside its context: write `with client.ingest(...) as stream:`")
         with self._turn:

@@ -1,9 +1,10 @@
 """The server's answers, as values with read-only numpy arrays. Points are (n, 2) arrays of float64."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timedelta
 from html import escape
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -11,14 +12,55 @@ import numpy.typing as npt
 from dynhull._shown import geometry, svg
 from dynhull._value import Value
 from dynhull.arrays import Points as Points
+from dynhull.keys import Keys, KeyType
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+
+from ._keys import KeyTuple, decode_keys, decode_names, join_keys
+from ._times import Times, decode_time, decode_times
+
+Clock = Literal["server", "data"]
+Ordering = Literal["arrival", "event_time"]
+Ahead = Literal["refuse", "clamp"]
+Cause = Literal["batch", "expiry"]
+
+KEY_TYPES: dict[int, KeyType] = {hull_pb2.IDENTITY_STRING_KEYS: "str", hull_pb2.IDENTITY_INTEGER_KEYS: "int"}
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A hull's sliding window: points leave when they are too old or too many.
+
+    Attributes:
+        max_age: the age at which points leave; None for no such limit.
+        max_points: the number of points beyond which the oldest leave; None for no such limit.
+        clock: the clock that decides what is too old: "server", or "data" for the greatest event time so far.
+        max_skew: how far an event time may be ahead of the server's clock; None for any distance.
+        ahead: whether a batch with an event time further ahead is refused ("refuse"), or the time reduced ("clamp").
+    """
+
+    max_age: timedelta | None = None
+    max_points: int | None = None
+    clock: Clock = "server"
+    max_skew: timedelta | None = None
+    ahead: Ahead = "refuse"
 
 
 @dataclass(frozen=True, slots=True)
 class HullInfo:
-    """A hull and its size: `points` counts duplicates, `distinct` does not.
+    """A hull, its size and its settings.
 
-    `uid` differs from that of an earlier or later hull of the same name.
+    Attributes:
+        name: its name.
+        revision: its revision.
+        points: the number of points with duplicates: in a keyed hull, of keys.
+        distinct: the number of distinct points.
+        created: when it was created.
+        uid: differs from that of an earlier or later hull of the same name.
+        keyed: the kind of its keys; None for a hull without keys.
+        window: its sliding window; None for a hull without one.
+        ordering: which of two positions of a key is the later one: by arrival or by event time.
+        point_limit: the number of points beyond which a batch is refused; None for the server's own limit.
+        clock: its clock, which decides what is too old; None if it has none so far.
     """
 
     name: str
@@ -27,6 +69,11 @@ class HullInfo:
     distinct: int
     created: datetime
     uid: str
+    keyed: KeyType | None = None
+    window: Window | None = None
+    ordering: Ordering = "arrival"
+    point_limit: int | None = None
+    clock: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -44,11 +91,15 @@ class Measures(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Hull(Value):
-    """A hull at one revision: (h, 2) vertices, counter-clockwise from the lexicographically smallest, and measures."""
+    """A hull at one revision: (h, 2) vertices, counter-clockwise from the lexicographically smallest, and measures.
+
+    `vertex_keys` has the key of each vertex, of several at one place the least; None for a hull without keys.
+    """
 
     info: HullInfo
     vertices: Points
     measures: Measures
+    vertex_keys: KeyTuple | None = None
 
     @property
     def revision(self) -> int:
@@ -82,10 +133,23 @@ class Hull(Value):
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """The effect of a batch, and the number of points after it. A move counts as one deleted and one inserted.
+    """The effect of a batch.
 
-    `missing` counts the deletes that were skipped because the hull did not hold the point. A `duplicate` had been
-    applied before: its counts are 0, and the revision is one that includes it.
+    Attributes:
+        revision: the hull's revision after it.
+        inserted: points inserted, with the destinations of moves; in a keyed hull, new keys.
+        deleted: points deleted, with the origins of moves; in a keyed hull, keys removed.
+        missing: points to delete or keys to remove that were skipped because the hull did not hold them.
+        hull_changed: whether the vertices changed.
+        points: the number of points after it.
+        duplicate: whether it had been applied before: its counts are 0, and the revision is one that includes it.
+        moved: known keys whose position was written.
+        stale: positions left out because the stored one has a later event time.
+        late: rows left out because they are too old for the window.
+        skipped: positions left out because of `only`.
+        clamped: rows whose event time was too far ahead and was reduced.
+        evicted: the oldest points, removed because the window has room for no more.
+        clock: the hull's clock after it; None for a hull without one.
     """
 
     revision: int
@@ -95,13 +159,21 @@ class Applied:
     hull_changed: bool
     points: int
     duplicate: bool = False
+    moved: int = 0
+    stale: int = 0
+    late: int = 0
+    skipped: int = 0
+    clamped: int = 0
+    evicted: int = 0
+    clock: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Ingested:
     """The effect of all `batches` of an ingest, and the hull's revision and number of points after the last one.
 
-    `duplicates` counts the batches that an earlier call of the same producer had applied before.
+    `duplicates` counts the batches that an earlier call of the same producer had applied before. The other counts are
+    sums of those in `Applied`.
     """
 
     batches: int
@@ -111,14 +183,59 @@ class Ingested:
     missing: int
     points: int
     duplicates: int = 0
+    moved: int = 0
+    stale: int = 0
+    late: int = 0
+    skipped: int = 0
+    clamped: int = 0
+    evicted: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Located(Value):
-    """The side of each point, (n,) int8: +1 inside, 0 on the boundary, -1 outside."""
+    """The side of each point or key, (n,) int8: +1 inside, 0 on the boundary, -1 outside, -128 for a missing key.
+
+    `keys_revision` is the revision of the other hull, if keys of another hull were located.
+    """
 
     revision: int
     sides: npt.NDArray[np.int8]
+    keys_revision: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Positions(Value):
+    """The positions of n keys.
+
+    Attributes:
+        revision: the hull's revision.
+        positions: (n, 2) a position in each row, NaN for a missing key.
+        present: (n,) whether the hull has the key.
+        times: (n,) the event time of each key as datetime64[us] in UTC, 1970-01-01 for a key without one; None if the
+            hull has no times.
+    """
+
+    revision: int
+    positions: Points
+    present: npt.NDArray[np.bool_]
+    times: Times | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Entities(Value):
+    """All n keys of a hull at one revision, with their positions.
+
+    Attributes:
+        revision: the hull's revision.
+        keys: n keys, ascending, strings bytewise: `dynhull.keys.PackedKeys` or (n,) uint64.
+        points: (n, 2) their positions.
+        times: as in `Positions`.
+    """
+
+    revision: int
+    keys: Keys
+    points: Points
+    times: Times | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -131,26 +248,32 @@ class Counted(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Supported(Value):
-    """The extreme vertex in each direction, (n, 2)."""
+    """The extreme vertex in each direction, (n, 2), and its key if requested."""
 
     revision: int
     vertices: Points
+    keys: KeyTuple | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Distances(Value):
-    """Distances of points to the hull, (n,): 0 inside and on the boundary, infinite from an empty hull."""
+    """Distances of points or keys to the hull, (n,).
+
+    0 inside and on the boundary, infinite from an empty hull, NaN for a missing key. `keys_revision` as in `Located`.
+    """
 
     revision: int
     distances: npt.NDArray[np.float64]
+    keys_revision: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sampled(Value):
-    """A sample of the points, (n, 2), in lexicographic order."""
+    """A sample of the points, (n, 2), in lexicographic order, and a key of each if requested."""
 
     revision: int
     points: Points
+    keys: KeyTuple | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -171,13 +294,20 @@ class Tangents(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Snapshot(Value):
-    """The whole hull. `uid` identifies it when a watch resumes."""
+    """The whole hull. `uid` identifies it when a watch resumes.
+
+    This and the other events have the cause of their revision, "batch" or "expiry", and the hull's clock at that
+    revision, which is None for a hull without one. Keys are None unless requested.
+    """
 
     revision: int
     points: int
     vertices: Points
     measures: Measures | None
     uid: str = ""
+    vertex_keys: KeyTuple | None = None
+    cause: Cause = "batch"
+    clock: datetime | None = None
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
@@ -193,7 +323,8 @@ class Change(Value):
     """The difference to the vertices of the previous event, which `HullCopy` applies.
 
     Remove the rows `removed_rows`, move the first `rotation` of the remaining rows to the end, and insert `added` so
-    that they become rows `added_rows` of the result.
+    that they become rows `added_rows` of the result, with the keys `added_keys`. Then rows `renamed_rows` have the keys
+    `renamed_keys`: vertices that were there before and have another key now.
     """
 
     revision: int
@@ -204,16 +335,24 @@ class Change(Value):
     added_rows: npt.NDArray[np.intp]
     rotation: int
     measures: Measures | None
+    added_keys: KeyTuple | None = None
+    renamed_rows: npt.NDArray[np.intp] | None = None
+    renamed_keys: KeyTuple | None = None
+    cause: Cause = "batch"
+    clock: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sketch(Value):
-    """The extreme vertex in each requested direction, (k, 2); (0, 2) if the hull has no points."""
+    """The extreme vertex in each requested direction, (k, 2), and its key; (0, 2) if the hull has no points."""
 
     revision: int
     points: int
     vertices: Points
     measures: Measures | None
+    keys: KeyTuple | None = None
+    cause: Cause = "batch"
+    clock: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,6 +361,8 @@ class Progress:
 
     revision: int
     points: int
+    cause: Cause = "batch"
+    clock: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +406,10 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The live hull compared with a hull computed anew from the stored points; `difference` is None if `equal`."""
+    """The live hull compared with a hull computed anew from the stored points; `difference` is None if `equal`.
+
+    `keys_equal` says whether the points of a keyed hull are the positions of its keys; True for a hull without keys.
+    """
 
     revision: int
     equal: bool
@@ -273,6 +417,7 @@ class Verification:
     vertices: int
     rounds: tuple[ChanRound, ...]
     difference: Difference | None
+    keys_equal: bool = True
 
 
 def encode_points(xy: Points) -> points_pb2.Points:
@@ -286,10 +431,20 @@ def decode_points(message: points_pb2.Points) -> Points:
 
 
 def decode_info(message: hull_pb2.Hull) -> HullInfo:
-    """A hull and its size."""
-    created = message.create_time.ToDatetime(UTC)
+    """A hull, its size and its settings."""
+    config = message.config
     return HullInfo(
-        message.name, message.revision, message.point_count, message.distinct_point_count, created, message.uid
+        message.name,
+        message.revision,
+        message.point_count,
+        message.distinct_point_count,
+        decode_time(message.create_time),
+        message.uid,
+        KEY_TYPES.get(config.identity),
+        _window(config.window) if config.HasField("window") else None,
+        "event_time" if config.ordering == hull_pb2.ORDERING_EVENT_TIME else "arrival",
+        config.max_points or None,
+        _clock(message),
     )
 
 
@@ -305,7 +460,9 @@ def decode_measures(message: hull_pb2.Measures) -> Measures:
 
 def decode_hull(message: hull_service_pb2.GetHullResponse) -> Hull:
     """A hull with vertices and measures."""
-    return Hull(decode_info(message.hull), decode_points(message.vertices), decode_measures(message.measures))
+    info = decode_info(message.hull)
+    keys = None if info.keyed is None else decode_names(message.vertex_keys)
+    return Hull(info, decode_points(message.vertices), decode_measures(message.measures), keys)
 
 
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:
@@ -318,6 +475,13 @@ def decode_applied(message: batch_pb2.BatchResult) -> Applied:
         message.hull_changed,
         message.point_count,
         message.duplicate,
+        message.moved,
+        message.stale,
+        message.late,
+        message.skipped,
+        message.clamped,
+        message.evicted,
+        _clock(message),
     )
 
 
@@ -331,31 +495,63 @@ def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
         message.missing,
         message.point_count,
         message.duplicates,
+        message.moved,
+        message.stale,
+        message.late,
+        message.skipped,
+        message.clamped,
+        message.evicted,
     )
 
 
-def decode_event(message: hull_service_pb2.WatchResponse) -> Event | None:
+def decode_positions(message: hull_service_pb2.GetPositionsResponse) -> Positions:
+    """The positions of keys."""
+    present = np.frombuffer(message.present, np.bool_)
+    times = decode_times(message.times) if message.HasField("times") else None
+    return Positions(message.revision, decode_points(message.positions), present, times)
+
+
+def decode_entities(parts: Iterable[hull_service_pb2.ReadEntitiesResponse]) -> Entities:
+    """All keys of a hull, received in one or more parts."""
+    received = list(parts)
+    return Entities(
+        received[0].revision,
+        join_keys([decode_keys(part.keys) for part in received]),
+        np.concatenate([decode_points(part.positions) for part in received]),
+        np.concatenate([decode_times(part.times) for part in received]) if received[0].HasField("times") else None,
+    )
+
+
+def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False) -> Event | None:
     """An event of a watch; None if this version of the client does not know its kind."""
     measures = decode_measures(message.measures) if message.HasField("measures") else None
+    head = message.revision, message.point_count
+    cause: Cause = "expiry" if message.cause == batch_pb2.CAUSE_EXPIRY else "batch"
+    made = cause, _clock(message)
     if message.HasField("snapshot"):
         snapshot = message.snapshot
-        return Snapshot(message.revision, message.point_count, decode_points(snapshot.vertices), measures, snapshot.uid)
+        named = decode_names(snapshot.vertex_keys) if keys else None
+        return Snapshot(*head, decode_points(snapshot.vertices), measures, snapshot.uid, named, *made)
     if message.HasField("sketch"):
-        return Sketch(message.revision, message.point_count, decode_points(message.sketch.vertices), measures)
+        named = decode_names(message.sketch.keys) if keys else None
+        return Sketch(*head, decode_points(message.sketch.vertices), measures, named, *made)
     if message.HasField("change"):
         change = message.change
         return Change(
-            message.revision,
-            message.point_count,
+            *head,
             decode_points(change.removed),
             np.array(change.removed_indices, np.intp),
             decode_points(change.added),
             np.array(change.added_indices, np.intp),
             change.rotation,
             measures,
+            decode_names(change.added_keys) if keys else None,
+            np.array(change.renamed_indices, np.intp) if keys else None,
+            decode_names(change.renamed_keys) if keys else None,
+            *made,
         )
     if message.HasField("progress"):
-        return Progress(message.revision, message.point_count)
+        return Progress(*head, *made)
     return None
 
 
@@ -366,7 +562,22 @@ def decode_verification(message: hull_service_pb2.VerifyResponse) -> Verificatio
         first = message.first_difference
         difference = Difference(first.index, _only(first.live), _only(first.recomputed))
     rounds = tuple(ChanRound(r.guess, r.groups, r.steps, r.cost, r.closed) for r in message.rounds)
-    return Verification(message.revision, message.equal, message.point_count, message.vertex_count, rounds, difference)
+    counts = message.point_count, message.vertex_count
+    return Verification(message.revision, message.equal, *counts, rounds, difference, message.keys_equal)
+
+
+def _window(message: hull_pb2.Window) -> Window:
+    return Window(
+        message.max_age.ToTimedelta() if message.HasField("max_age") else None,
+        message.max_points or None,
+        "data" if message.clock == hull_pb2.CLOCK_DATA else "server",
+        message.max_skew.ToTimedelta() if message.HasField("max_skew") else None,
+        "clamp" if message.ahead == hull_pb2.AHEAD_POLICY_CLAMP else "refuse",
+    )
+
+
+def _clock(message: hull_pb2.Hull | batch_pb2.BatchResult | hull_service_pb2.WatchResponse) -> datetime | None:
+    return decode_time(message.clock_time) if message.HasField("clock_time") else None
 
 
 def _only(message: points_pb2.Points) -> tuple[float, float] | None:

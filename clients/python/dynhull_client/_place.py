@@ -46,7 +46,7 @@ class Place:
         """The event to return for a message; None for one that the caller did not request or cannot know."""
         if self.lost is not None or not self._begun:
             self.lost, self._begun, self._pauses = None, True, self._new_pauses()
-        event = decode_event(message)
+        event = decode_event(message, keys=self.request.include_keys)
         if event is None:
             self._note(message)
             return None

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import grpc
 
-from dynhull_proto.v1 import batch_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._batch import batch_rows, join_batches
 from ._calls import Writing
 from ._errors import (
     DynhullError,
@@ -23,6 +21,7 @@ from ._errors import (
     SequenceGapError,
     UnauthenticatedError,
 )
+from ._gathering import Gathering, Part
 from ._messages import Applied, decode_applied
 from ._retry import passes, pauses
 
@@ -37,24 +36,33 @@ Settled = list[tuple[Any, Applied | DynhullError]]
 
 
 @dataclass(slots=True)
-class Batch(Generic[Future]):
-    """Points to send as one batch, which gets its number when it is first sent.
+class Next(Generic[Future]):
+    """The batch being gathered.
 
     Attributes:
         outcome: the future of its effect.
         due: the time at which it is sent at the latest.
-        parts: the points put so far.
-        rows: their number.
-        sent: how often it was sent.
-        request: the message, once it was sent.
+        gathering: the parts put so far.
     """
 
     outcome: Future
     due: float
-    parts: list[batch_pb2.Batch]
-    rows: int = 0
+    gathering: Gathering
+
+
+@dataclass(slots=True)
+class Batch(Generic[Future]):
+    """A numbered batch.
+
+    Attributes:
+        outcome: the future of its effect.
+        request: the message.
+        sent: how often it was sent.
+    """
+
+    outcome: Future
+    request: pb.StreamRequest
     sent: int = 0
-    request: pb.StreamRequest | None = None
 
 
 class Window(Generic[Future]):
@@ -74,7 +82,7 @@ class Window(Generic[Future]):
         self.settled = 0
         self._writing = writing
         self._new_outcome: Callable[[], Future] = new_outcome
-        self._gathering: Batch[Future] | None = None
+        self._next: Next[Future] | None = None
         self._under_way: deque[Batch[Future]] = deque()
         self._on_this_connection = 0
         self._one_at_a_time = False
@@ -85,28 +93,32 @@ class Window(Generic[Future]):
     @property
     def full(self) -> bool:
         """Whether there is no room for more points."""
-        return self._gathering is not None and self._gathering.rows >= self._writing.batch_points
+        return self._next is not None and self._next.gathering.rows >= self._writing.batch_points
 
     @property
     def empty(self) -> bool:
         """Whether everything is acknowledged."""
-        return self._gathering is None and not self._under_way
+        return self._next is None and not self._under_way
 
-    def put(self, batch: batch_pb2.Batch, now: float) -> Future:
-        """Add points to the batch being gathered; returns its outcome."""
+    def admits(self, part: Part) -> bool:
+        """Whether the part can be put now: there is room, and it may go into the batch being gathered."""
+        return self._next is None or (not self.full and self._next.gathering.admits(part))
+
+    def put(self, part: Part, now: float) -> Future:
+        """Add a part to the batch being gathered; returns its outcome."""
         if self.failure is not None:
             raise self.failure
-        if self._gathering is None:
-            self._gathering = Batch(self._new_outcome(), now + self._writing.linger, [])
+        if self._next is None:
+            gathering = Gathering(coalesce=self._writing.coalesce == "last")
+            self._next = Next(self._new_outcome(), now + self._writing.linger, gathering)
             self.begun += 1
-        self._gathering.parts.append(batch)
-        self._gathering.rows += batch_rows(batch)
-        return self._gathering.outcome
+        self._next.gathering.add(part)
+        return self._next.outcome
 
     def hurry(self, now: float) -> None:
         """Make the gathered points due now."""
-        if self._gathering is not None:
-            self._gathering.due = now
+        if self._next is not None:
+            self._next.due = now
 
     def first(self) -> pb.StreamRequest:
         """The first message of a connection."""
@@ -118,15 +130,13 @@ class Window(Generic[Future]):
         if self._on_this_connection >= most:
             return None
         if self._on_this_connection == len(self._under_way):
-            gathered = self._gathering
-            if gathered is None or (gathered.due > now and not self.full):
+            following = self._next
+            if following is None or (following.due > now and not self.full):
                 return None
-            self._gathering = None
-            gathered.request = pb.StreamRequest(
-                batch=join_batches(gathered.parts), sequence=self.sequence + len(self._under_way) + 1
-            )
-            gathered.parts.clear()
-            self._under_way.append(gathered)
+            self._next = None
+            sequence = self.sequence + len(self._under_way) + 1
+            request = pb.StreamRequest(batch=following.gathering.joined(), sequence=sequence)
+            self._under_way.append(Batch(following.outcome, request))
         batch = self._under_way[self._on_this_connection]
         self._on_this_connection += 1
         batch.sent += 1
@@ -134,8 +144,8 @@ class Window(Generic[Future]):
 
     def due_in(self, now: float) -> float | None:
         """Seconds until the gathered points are due; None if nothing waits for that."""
-        waits = self._gathering is not None and self._on_this_connection == len(self._under_way)
-        return max(0.0, self._gathering.due - now) if self._gathering is not None and waits else None
+        waits = self._next is not None and self._on_this_connection == len(self._under_way)
+        return max(0.0, self._next.due - now) if self._next is not None and waits else None
 
     def acknowledge(self, response: pb.StreamResponse) -> Settled:
         """Settle the first batch under way, which was applied."""
@@ -174,9 +184,9 @@ class Window(Generic[Future]):
     def abandon(self) -> list[Future]:
         """Drop all batches; returns their outcomes, which stay unknown."""
         left = [each.outcome for each in self._under_way]
-        if self._gathering is not None:
-            left.append(self._gathering.outcome)
-        self._gathering = None
+        if self._next is not None:
+            left.append(self._next.outcome)
+        self._next = None
         self._under_way.clear()
         return left
 
@@ -195,7 +205,6 @@ class Window(Generic[Future]):
         self.settled += 1
         self._lost_since = None
         for batch in self._under_way:
-            assert batch.request is not None  # batches under way were sent
             batch.request.sequence -= 1
             batch.sent = 0
         return [(refused.outcome, error)], 0.0

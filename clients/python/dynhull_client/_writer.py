@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import Future
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
-from ._batch import encode_batch
 from ._calls import Writing, last_sequence
 from ._errors import DynhullError, error_of
+from ._gathering import put_parts, remove_parts
 from ._window import Window, settle
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
     from ._connection import BlockingConnection
+    from ._gathering import Part
     from ._messages import Applied
 
 
@@ -63,27 +65,42 @@ class Writer:
         insert: npt.ArrayLike | None = None,
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+        *,
+        keys: Any = None,
+        points: npt.ArrayLike | None = None,
+        times: Any = None,
     ) -> Future[Applied]:
-        """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
+        """Add points to the next batch; waits while too many are not acknowledged.
+
+        A batch holds a key once. Where a key comes again, a new batch begins, so that no position is lost; with
+        `coalesce="last"` the last position replaces the ones before it in the same batch. All other points of a call go
+        into the same batch.
+
+        Args:
+            insert: (n, 2) points to insert, in a hull without keys.
+            delete: (n, 2) points to delete.
+            move: origins and destinations, (n, 2) each.
+            keys: n keys to put, in a keyed hull; as for `HullClient.put`.
+            points: (n, 2) positions of the keys.
+            times: (n,) event times of the keys or of the points to insert.
 
         Returns:
-            The effect of the batch once it is acknowledged, or the error of a refused batch. Several calls may share a
-            batch: its counts, and the row in its error, refer to all of them. A callback must not put.
+            The effect of the batch, or of the last one of several, once it is acknowledged; or the error of a refused
+            batch. Several calls may share a batch: its counts, and the row in its error, refer to all of them. A
+            callback must not put.
 
         Raises:
-            ValueError, TypeError: an argument is not an array of finite points; nothing was added.
+            ValueError, TypeError: an argument has a bad value; nothing was added.
             DynhullError: the writer has ended: nothing after its error was applied.
             RuntimeError: the writer is closed.
         """
-        batch = encode_batch(insert, delete, move, self._writing.missing)
-        window = self._open()
-        with self._turn:
-            self._turn.wait_for(lambda: not window.full or window.failure or self._closed)
-            if self._closed:
-                raise RuntimeError(CLOSED)
-            outcome = window.put(batch, monotonic())
-            self._turn.notify_all()
-        return outcome
+        writing = self._writing
+        coalesce = writing.coalesce == "last"
+        return self._add(put_parts(insert, delete, move, keys, points, times, writing.missing, coalesce=coalesce))
+
+    def remove(self, keys: Any) -> Future[Applied]:
+        """Remove keys in the next batch, as `put` adds points. Removing a key that was put before is a new batch."""
+        return self._add(remove_parts(keys, self._writing.missing))
 
     def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
@@ -120,6 +137,23 @@ class Writer:
 
     def __repr__(self) -> str:
         return f"<Writer to {self._writing.name!r} as producer {self._writing.producer!r}>"
+
+    def _add(self, parts: list[Part]) -> Future[Applied]:
+        window = self._open()
+        with self._turn:
+            for part in parts:
+                if not window.admits(part):
+                    window.hurry(monotonic())
+                    self._turn.notify_all()
+                self._turn.wait_for(partial(self._may_put, window, part))
+                if self._closed:
+                    raise RuntimeError(CLOSED)
+                outcome = window.put(part, monotonic())
+            self._turn.notify_all()
+        return outcome
+
+    def _may_put(self, window: Window[Future[Applied]], part: Part) -> bool:
+        return window.admits(part) or window.failure is not None or self._closed
 
     def _open(self) -> Window[Future[Applied]]:
         with self._opening:

@@ -28,8 +28,7 @@ class Window : public Hull {
 
   std::optional<double> oldest() {
     writable();  // may open a bucket of the wheel
-    const Dated* const front = expiry_.front();
-    return front == nullptr ? std::nullopt : known(front->time);
+    return known(expiry_.oldest().value_or(Expiry::NEVER));
   }
 
   std::int64_t add(const nb::object& xy, const nb::object& times) {

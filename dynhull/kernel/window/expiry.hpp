@@ -50,16 +50,14 @@ class Expiry {
     Entering entering(*this, points, times, count);
     Leaving leaving(*this);
     leaving.take_until(entering.limit());
-    const std::size_t expired_now = leaving.size();
-    const std::size_t added = entering.size();
+    const std::size_t expired_now = leaving.size(), added = entering.size();
     const std::size_t total = tree.size() - expired_now + added;
     const std::size_t surplus = total > max_points_ ? total - max_points_ : 0;
     if (surplus > 0) evict(surplus, entering, leaving);
-    queue_.reserve(entering.in_order().size());
     wheel_.reserve(entering.others().size());
-    apply(tree, leaving.items(), entering.in_order(), entering.others());
+    apply(tree, leaving, entering);
+    entering.commit();
     leaving.commit();
-    for (const Dated& item : entering.in_order()) queue_.push_back(item);
     for (const Dated& item : entering.others()) wheel_.push(item);
     arrivals_ += count;
     now_ = entering.newest();
@@ -78,9 +76,11 @@ class Expiry {
 
   // Removes the points of this time or before, without moving the clock. Returns their number.
   std::size_t expire(HullTree& tree, double until) {
+    Entering nothing(*this, nullptr, nullptr, 0);
     Leaving leaving(*this);
     leaving.take_until(until);
-    apply(tree, leaving.items(), {}, {});
+    apply(tree, leaving, nothing);
+    nothing.commit();
     leaving.commit();
     expired += leaving.size();
     return leaving.size();
@@ -131,20 +131,20 @@ class Expiry {
   void restore(HullTree& tree, const Point* points, const double* times, std::size_t count, double now) {
     Queue<Dated> queue;
     queue.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) queue.push_back({points[i], times[i], i});
+    for (std::size_t i = 0; i < count; ++i) queue[i] = {points[i], times[i], i};
+    queue.extend(count);
     tree = HullTree(points, count);
     queue_ = std::move(queue);
     arrivals_ = count;
     now_ = now;
   }
 
-  // The oldest item; nullptr if there is none.
-  const Dated* front() {
-    for (;;) {
-      const Dated* const item = first();
-      if (item == nullptr || tombstones_.empty() || !consume(tombstones_, *item)) return item;
-      pop(item);
-    }
+  // The time of the oldest point; none if there is no point.
+  std::optional<double> oldest() {
+    Leaving leaving(*this);
+    const Dated* const front = leaving.next();
+    leaving.commit();  // of items that were deleted
+    return front == nullptr ? std::nullopt : std::optional(front->time);
   }
 
   // The items of the points in the tree, oldest first. O(n log n).
@@ -156,7 +156,12 @@ class Expiry {
     if (wheel_.size() > 0) std::sort(items.begin(), items.end());
     if (!tombstones_.empty()) {
       Tombstones left = tombstones_;
-      std::erase_if(items, [&](const Dated& item) { return consume(left, item); });
+      std::erase_if(items, [&](const Dated& item) {
+        const auto found = tombstone_of(left, item);
+        if (found == left.end()) return false;
+        left.erase(found);
+        return true;
+      });
     }
     return items;
   }
@@ -199,88 +204,143 @@ class Expiry {
 
   static constexpr std::size_t MOST_TOMBSTONES = 1024;  // beyond the number of points
 
-  // The rows of a batch that are not late: those that continue the queue, and others.
+  // The rows of a batch that are not late. Those that continue the queue are in it at once, and leave it unless they
+  // are committed; the others wait.
   class Entering {
    public:
-    Entering(const Expiry& expiry, const Point* points, const double* times, std::size_t count)
-        : rows_(count), others_(count), newest_(expiry.now_) {
+    Entering(Expiry& expiry, const Point* points, const double* times, std::size_t count)
+        : queue_(expiry.queue_), before_(queue_.size()), newest_(expiry.now_) {
+      queue_.reserve(count);
       Plain plain;
       double strange = 0;  // becomes NaN with a time that is not finite
       for (std::size_t i = 0; i < count; ++i) {
         const double time = times == nullptr ? expiry.now_ : times[i] + 0.0;
         if (times != nullptr) strange += time - time;
-        rows_[i] = {plain(points[i]), time, expiry.arrivals_ + i};
+        queue_[before_ + i] = {plain(points[i]), time, expiry.arrivals_ + i};
         newest_ = std::max(newest_, time);
       }
       if (!plain.finite() || strange != 0) throw NotFinite();
       limit_ = expiry.limit(newest_);
-      double last = expiry.queue_.empty() ? NEVER : expiry.queue_.back().time;
-      for (std::size_t i = 0; i < count; ++i) {
-        const Dated row = rows_[i];
+      double last = before_ > 0 ? queue_[before_ - 1].time : NEVER;
+      std::size_t end = before_;
+      for (std::size_t i = before_; i < before_ + count; ++i) {
+        const Dated row = queue_[i];
         if (row.time <= limit_) continue;
-        if (row.time >= last) {
-          last = row.time;
-          rows_[in_order_end_++] = row;
-        } else {
-          others_[others_end_++] = row;
+        if (row.time < last) {
+          others_.push_back(row);
+          continue;
         }
+        last = row.time;
+        queue_[end++] = row;
       }
+      queue_.extend(end - before_);
+    }
+    Entering(const Entering&) = delete;
+    ~Entering() {
+      if (!committed_) queue_.shrink(before_);
     }
 
     double newest() const { return newest_; }
     double limit() const { return limit_; }
-    std::size_t size() const { return in_order().size() + others().size(); }
-    std::span<const Dated> in_order() const { return {rows_.data() + in_order_, rows_.data() + in_order_end_}; }
-    std::span<const Dated> others() const { return {others_.data() + other_, others_.data() + others_end_}; }
+    std::size_t size() const { return queue_.size() - before_ + others().size(); }
+    std::size_t before() const { return before_; }  // the size of the queue before
+    std::span<const Dated> others() const { return std::span(others_).subspan(evicted_); }
 
-    // For `front` and `pop_front`.
-    void sort_others() { std::sort(others_.data() + other_, others_.data() + others_end_); }
-
-    // The oldest row; nullptr if there is none.
-    const Dated* front() const {
-      if (in_order().empty()) return others().empty() ? nullptr : &others().front();
-      return others().empty() || in_order().front() < others().front() ? &in_order().front() : &others().front();
-    }
-    void pop_front() { ++(front() == &rows_[in_order_] ? in_order_ : other_); }
+    void sort_others() { std::sort(others_.begin(), others_.end()); }
+    void evict_other() { ++evicted_; }
+    void commit() { committed_ = true; }
 
    private:
-    Scratch<Dated> rows_, others_;
-    std::size_t in_order_ = 0, in_order_end_ = 0, other_ = 0, others_end_ = 0;
+    Queue<Dated>& queue_;
+    std::size_t before_;
+    std::vector<Dated> others_;
+    std::size_t evicted_ = 0;  // of the others
     double newest_, limit_;
+    bool committed_ = false;
   };
 
-  // Items taken from the front of the order. They go back unless they are committed.
+  // The first items of the order. They stay, or go back, unless they are committed.
   class Leaving {
    public:
     explicit Leaving(Expiry& expiry) : expiry_(expiry) {}
     Leaving(const Leaving&) = delete;
     ~Leaving() {
-      if (committed_) return;
-      for (auto item = items_.rbegin(); item != items_.rend(); ++item) expiry_.queue_.push_front(*item);
+      if (!committed_) {
+        expiry_.tombstones_.merge(consumed_);
+        for (const auto& items : {std::span(from_wheel_), std::span(deleted_from_wheel_)})
+          for (const Dated& item : items) expiry_.wheel_.push(item);
+      }
+      expiry_.wheel_.settle();
     }
 
-    void take(const Dated* front) {
-      items_.push_back(*front);
-      expiry_.pop(front);
-    }
-    void take_until(double limit) {
-      for (const Dated* front = next(); front != nullptr && front->time <= limit; front = next()) take(front);
-    }
-
-    // The oldest item of the order. Makes room for it: all items may go back to the queue.
+    // The oldest item that is not deleted; nullptr if there is none.
     const Dated* next() {
-      const Dated* const front = expiry_.front();
-      if (front != nullptr && expiry_.in_wheel(front)) expiry_.queue_.reserve(items_.size() + 1);
-      return front;
+      for (;;) {
+        const Dated* const item = first();
+        if (item == nullptr || expiry_.tombstones_.empty()) return item;
+        const auto found = tombstone_of(expiry_.tombstones_, *item);
+        if (found == expiry_.tombstones_.end()) return item;
+        if (in_queue(item)) {
+          deleted_.push_back(taken_++);
+        } else {
+          deleted_from_wheel_.push_back(*item);
+          expiry_.wheel_.pop_front();
+        }
+        consumed_.insert(expiry_.tombstones_.extract(found));
+      }
     }
 
-    void commit() { committed_ = true; }
-    std::size_t size() const { return items_.size(); }
-    std::span<const Dated> items() const { return items_; }
+    // Takes the item that `next` has returned.
+    void take(const Dated* item) {
+      if (in_queue(item)) {
+        ++taken_;
+      } else {
+        from_wheel_.push_back(*item);
+        expiry_.wheel_.pop_front();
+      }
+    }
+
+    void take_until(double limit) {
+      for (const Dated* item = next(); item != nullptr && item->time <= limit; item = next()) take(item);
+    }
+
+    std::size_t size() const { return taken_ - deleted_.size() + from_wheel_.size(); }
+    std::size_t taken() const { return taken_; }  // from the queue, with deleted ones
+
+    // Visits the points that were in the tree before the batch, when the queue had this size.
+    template <class Visit>
+    void for_each(std::size_t before, Visit visit) const {
+      auto deleted = deleted_.begin();
+      for (std::size_t i = 0; i < std::min(taken_, before); ++i) {
+        if (deleted != deleted_.end() && *deleted == i)
+          ++deleted;
+        else
+          visit(expiry_.queue_[i].p);
+      }
+      for (const Dated& item : from_wheel_) visit(item.p);
+    }
+
+    void commit() {
+      expiry_.queue_.pop_front(taken_);
+      committed_ = true;
+    }
 
    private:
+    bool in_queue(const Dated* item) const { return taken_ < expiry_.queue_.size() && item == &expiry_.queue_[taken_]; }
+
+    // The first item of the queue and the wheel.
+    const Dated* first() {
+      const Dated* const other = expiry_.wheel_.front();
+      if (taken_ == expiry_.queue_.size()) return other;
+      const Dated* const item = &expiry_.queue_[taken_];
+      return other == nullptr || *item < *other ? item : other;
+    }
+
     Expiry& expiry_;
-    std::vector<Dated> items_;
+    std::size_t taken_ = 0;
+    std::vector<std::size_t> deleted_;  // numbers in the queue
+    std::vector<Dated> from_wheel_, deleted_from_wheel_;
+    Tombstones consumed_;
     bool committed_ = false;
   };
 
@@ -293,56 +353,47 @@ class Expiry {
     return max_age_ == INFINITE ? std::numeric_limits<double>::quiet_NaN() : horizon(now, max_age_);
   }
 
-  // The first item of the queue and the wheel.
-  const Dated* first() {
-    const Dated* const other = wheel_.front();
-    if (queue_.empty()) return other;
-    return other == nullptr || queue_.front() < *other ? &queue_.front() : other;
-  }
-  bool in_wheel(const Dated* first) const { return queue_.empty() || first != &queue_.front(); }
-  void pop(const Dated* first) { in_wheel(first) ? wheel_.pop_front() : queue_.pop_front(); }
-
   // The oldest of the window and of the entering rows leave.
-  void evict(std::size_t surplus, Entering& entering, Leaving& leaving) {
+  static void evict(std::size_t surplus, Entering& entering, Leaving& leaving) {
     entering.sort_others();
     for (; surplus > 0; --surplus) {
-      const Dated *const old = leaving.next(), *const fresh = entering.front();
-      if (old != nullptr && (fresh == nullptr || *old < *fresh))
-        leaving.take(old);
-      else
-        entering.pop_front();
+      const Dated* const item = leaving.next();
+      const bool other = !entering.others().empty() && (item == nullptr || entering.others().front() < *item);
+      other ? entering.evict_other() : leaving.take(item);
     }
   }
 
-  static void apply(HullTree& tree, std::span<const Dated> leaving, std::span<const Dated> in_order,
-                    std::span<const Dated> others) {
-    const std::size_t inserts = in_order.size() + others.size(), count = leaving.size() + inserts;
-    if (count == 0) return;
-    const Scratch<Point> points(count);
-    const Scratch<std::int8_t> ops(count);
+  void apply(HullTree& tree, const Leaving& leaving, const Entering& entering) const {
+    const std::size_t from = std::max(leaving.taken(), entering.before()), to = queue_.size();
+    const std::size_t inserts = to - from + entering.others().size();
+    const Scratch<Point> points(inserts + leaving.size());
     Point* next = points.data();
-    for (const auto& rows : {in_order, others, leaving})
-      for (const Dated& row : rows) *next++ = row.p;
+    for (std::size_t i = from; i < to; ++i) *next++ = queue_[i].p;
+    for (const Dated& row : entering.others()) *next++ = row.p;
+    leaving.for_each(entering.before(), [&](Point p) { *next++ = p; });
+    const auto count = static_cast<std::size_t>(next - points.data());
+    if (count == 0) return;
+    const Scratch<std::int8_t> ops(count);
     std::fill_n(ops.data(), inserts, std::int8_t{1});
-    std::fill_n(ops.data() + inserts, leaving.size(), std::int8_t{-1});
-    const bool alike = inserts == 0 || leaving.empty();
+    std::fill_n(ops.data() + inserts, count - inserts, std::int8_t{-1});
+    const bool alike = inserts == 0 || inserts == count;
     tree.apply({ops.data(), alike ? 0u : 1u}, points.data(), count, false);
   }
 
-  // Whether a tombstone has taken the oldest item; the tombstone goes with it.
-  static bool consume(Tombstones& tombstones, const Dated& oldest) {
+  // The tombstone that has taken the oldest item; the end if there is none.
+  static Tombstones::const_iterator tombstone_of(const Tombstones& tombstones, const Dated& oldest) {
     const auto found = tombstones.upper_bound({oldest.p, oldest.arrival});
-    if (found == tombstones.end() || !(found->p == oldest.p)) return false;
-    tombstones.erase(found);
-    return true;
+    return found == tombstones.end() || found->p == oldest.p ? found : tombstones.end();
   }
 
   // Builds the order anew once most of its items are deleted.
   void drop_tombstones(const HullTree& tree) {
     if (tombstones_.size() <= tree.size() + MOST_TOMBSTONES) return;
+    const std::vector<Dated> live = items();
     Queue<Dated> queue;
-    queue.reserve(tree.size());
-    for (const Dated& item : items()) queue.push_back(item);
+    queue.reserve(live.size());
+    for (std::size_t i = 0; i < live.size(); ++i) queue[i] = live[i];
+    queue.extend(live.size());
     queue_ = std::move(queue);
     wheel_ = Wheel<Dated, OldestFirst>();
     tombstones_.clear();

@@ -17,7 +17,8 @@ class Queue {
   Queue(Queue&& other) noexcept { swap(other); }
   Queue(const Queue& other) {
     reserve(other.size_);
-    for (std::size_t i = 0; i < other.size_; ++i) push_back(other[i]);
+    for (std::size_t i = 0; i < other.size_; ++i) data_[i] = other[i];
+    size_ = other.size_;
   }
   Queue& operator=(Queue other) noexcept {
     swap(other);
@@ -29,7 +30,6 @@ class Queue {
   bool empty() const { return size_ == 0; }
   Record& operator[](std::size_t i) { return data_[slot(i)]; }
   const Record& operator[](std::size_t i) const { return data_[slot(i)]; }
-  const Record& front() const { return data_[head_]; }
   const Record& back() const { return (*this)[size_ - 1]; }
 
   // Makes room for `extra` more records. Grows by at least half.
@@ -45,19 +45,14 @@ class Queue {
     capacity_ = capacity;
   }
 
-  void push_back(const Record& record) { data_[slot(size_++)] = record; }
-  void push_front(const Record& record) {
-    head_ = (head_ > 0 ? head_ : capacity_) - 1;
-    ++size_;
-    data_[head_] = record;
-  }
-  void pop_front() {
-    if (++head_ == capacity_) head_ = 0;
-    --size_;
+  // Adds records that were written behind the last one, where `reserve` has made room.
+  void extend(std::size_t extra) { size_ += extra; }
+  void shrink(std::size_t size) { size_ = size; }
+  void pop_front(std::size_t count) {
+    head_ = slot(count);
+    size_ -= count;
   }
   void clear() { head_ = size_ = 0; }
-
-  std::size_t reserved_bytes() const { return bytes(capacity_); }
 
  private:
   static std::size_t bytes(std::size_t capacity) { return memory::whole_pages(capacity * sizeof(Record)); }

@@ -26,7 +26,7 @@ class Wheel {
 
   // Makes room for `extra` more items.
   void reserve(std::size_t extra) {
-    const std::size_t heap = heap_.size() + extra;
+    const std::size_t heap = heap_.size() + popped_ + extra;
     if (heap > heap_.capacity()) heap_.reserve(std::max(heap, heap_.capacity() + heap_.capacity() / 2));
     reserve_chunks(extra);
   }
@@ -53,11 +53,13 @@ class Wheel {
     }
   }
 
-  // Removes the item that `front` has returned.
+  // Removes the item that `front` has returned. Its room stays, so that it can be pushed again, until `settle`.
   void pop_front() {
     remove_first();
     --size_;
+    ++popped_;
   }
+  void settle() { popped_ = 0; }
 
   // Visits all items, in no order.
   template <class Visit>
@@ -97,7 +99,7 @@ class Wheel {
       return;
     }
     const int bucket = static_cast<int>(columns_(time));
-    if (bucket > open_) return append(buckets_[bucket], item);
+    if (bucket > open_ && time >= start_) return append(buckets_[bucket], item);
     heap_.push_back({time, item});
     std::push_heap(heap_.begin(), heap_.end(), after());
   }
@@ -127,6 +129,7 @@ class Wheel {
   void lay_buckets() {
     reserve_chunks(later_size_);
     columns_ = Columns(later_least_, later_greatest_, BUCKETS);
+    start_ = later_least_;
     end_ = later_greatest_;
     open_ = -1;
     later_least_ = INFINITE;
@@ -163,14 +166,14 @@ class Wheel {
   }
 
   Order order_;
-  std::size_t size_ = 0;
+  std::size_t size_ = 0, popped_ = 0;
   std::vector<Entry> heap_;
   Pool<Chunk> chunks_;
   std::array<Number, BUCKETS> buckets_;
   Columns columns_;
-  int open_ = BUCKETS - 1;  // buckets up to this one are empty; their items wait in the heap
-  double end_ = -INFINITE;  // of the span
-  Number later_ = NOWHERE;  // the list of items after the span
+  int open_ = BUCKETS - 1;                      // buckets up to this one are empty; their items wait in the heap
+  double start_ = -INFINITE, end_ = -INFINITE;  // of the span
+  Number later_ = NOWHERE;                      // the list of items after the span
   std::size_t later_size_ = 0;
   double later_least_ = INFINITE, later_greatest_ = -INFINITE;
 };

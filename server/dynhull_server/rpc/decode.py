@@ -14,6 +14,7 @@ from dynhull_proto.v1 import hull_service_pb2, points_pb2
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
+NAME_WORDS = '1 to 200 of the letters a to z and A to Z, digits and "._-/"'
 NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
 DEFAULT_PAGE = 100
 LARGEST_PAGE = 1000
@@ -46,14 +47,14 @@ class InvalidFieldError(Exception):
 def decode_name(name: str, field: str = "name") -> str:
     """The name of a hull."""
     if not NAME.fullmatch(name):
-        raise InvalidFieldError(field, name, 'a hull\'s name is 1 to 200 letters, digits and "._-/"')
+        raise InvalidFieldError(field, name, f"a hull's name is {NAME_WORDS}")
     return name
 
 
 def decode_producer(producer: str) -> str:
     """The name of a producer, or an empty one."""
     if producer and not NAME.fullmatch(producer):
-        raise InvalidFieldError("producer", producer, 'a producer\'s name is 1 to 200 letters, digits and "._-/"')
+        raise InvalidFieldError("producer", producer, f"a producer's name is {NAME_WORDS}")
     return producer
 
 

@@ -1,5 +1,6 @@
 """Conversion of refusals to gRPC statuses with google.rpc details."""
 
+import re
 from collections.abc import Mapping
 
 from google.protobuf.any_pb2 import Any
@@ -34,6 +35,8 @@ DOMAIN = "dynhull.v1"
 HULL_TYPE = "dynhull.v1.Hull"
 # Statuses are sent as headers, whose size is limited.
 LONGEST_VALUE = 120
+# Numbers, points and counts such as "8 bytes" are shown as they are, names without spaces too.
+PLAIN = re.compile(r"[!-~]+|\(.*\)|\d+ [a-z]+|[a-z]+ and [a-z]+")
 
 PART_FIELDS = {"deletes": "batch.deletes", "origins": "batch.moves.origins"}
 
@@ -193,8 +196,8 @@ def _invalid_field(
     name = within + error.field
     field = name if error.row is None else f"{name}[{error.row}]"
     detail = BadRequest()
-    detail.field_violations.add(field=field, description=f"{error.problem}, got {value}")
-    message = f"{field} is {value}: {error.problem}"
+    detail.field_violations.add(field=field, description=f"{error.problem}, got {_quoted(value)}")
+    message = f"{field} is {_quoted(value)}: {error.problem}"
     metadata = {"field": name, **row, "value": value, **where}
     return _status(code.INVALID_ARGUMENT, message, reason, metadata, detail)
 
@@ -206,6 +209,11 @@ def _status(number: int, message: str, reason: str, metadata: Mapping[str, str],
         packed.Pack(detail)
         status.details.append(packed)
     return status
+
+
+def _quoted(value: str) -> str:
+    """The value in quotation marks if it could be misread without: because it is empty or has spaces around a text."""
+    return value if PLAIN.fullmatch(value) else repr(value)
 
 
 def _short(value: object) -> str:

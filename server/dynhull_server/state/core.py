@@ -215,7 +215,7 @@ class Core:
 
     def _asked(self, request: CreateHull | DeleteHull | Expire | ReadHull | WriteBatch, effects: list[Effect]) -> None:
         name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
-        queue = self._queue(name)
+        queue = self._queues.get(name) or self._queue(name)
         if queue.trip is None and not queue.waiting and not self._stopping and not request.abandoned:
             if request.rows <= SMALL and type(request) is ReadHull:
                 self._read(queue, request)
@@ -265,7 +265,8 @@ class Core:
                 effects.append(Commit(None, [Append(hull.row.number, records)]))
             hull.counts = hull.state.counts
             effects.append(Reply([request], () if applied.duplicate else (hull,)))
-            self._plan(hull)
+            if hull.timed:
+                self._plan(hull)
         elif hull.state.torn:
             trip = self._new_trip([queue], [request])
             trip.torn = True

@@ -2,23 +2,19 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.text import Text
 
-from dynhull_client import DynhullError, HullClient
+from ..durations import duration
 
-from .replay import Step, replay
-from .scene import Scene
-from .server import server_process
-from .table import Table
+if TYPE_CHECKING:
+    from datetime import timedelta
+
+    from .scene import Scene
 
 # Snow: the longest mean delay of the year, 180 flights cancelled.
 DEFAULT_DAY = "2013-03-08"
-MOST_CORNERS = 12
 
 
 def demo(
@@ -44,65 +40,44 @@ def demo(
     ] = None,
     time: Annotated[str | None, typer.Option(help="Column to order by: one batch for each value.")] = None,
     batches: Annotated[int, typer.Option(min=1, help="Without --time: number of batches to cut the file into.")] = 100,
+    window: Annotated[
+        str | None,
+        typer.Option(
+            help="Replay all positions of the last 30m (or 90s, 2h) in place of the latest ones: points without keys, "
+            "which the server removes when they are that old."
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(dir_okay=False, help="PNG file to write the picture to.")] = Path(
         "dynhull-demo.png"
     ),
 ) -> None:
     """Replay real points through a real server and verify every step.
 
-    The command starts a server of its own and streams one batch per minute of the day: each flight is deleted where it
-    was and inserted where it is. A watcher follows. After every batch the command compares the live hull with Chan's
-    static recomputation and with the watcher's copy. It ends with VERIFIED and exit code 0, or with the first
-    difference and exit code 1.
+    The command starts a server of its own and sends one batch per minute of the day, which puts each flight, by its
+    number, where it is, and removes those that have landed. The server names the corners of the hull. A watcher
+    follows. After every batch the command compares the live hull with Chan's static recomputation, its keys and their
+    positions with those sent, and the watcher's copy with the live hull. It ends with VERIFIED and exit code 0, or with
+    the first difference and exit code 1.
 
     Your own points: dynhull demo --points fleet.csv --x lon --y lat --id vehicle --time minute
     """
+    from rich.console import Console
+    from rich.text import Text
+
+    from dynhull_client import DynhullError
+
+    from .show import show
+
     console = Console(highlight=False, soft_wrap=True)
     try:
-        scene = _scene(day, points, x, y, identity, time, batches)
-        verified = _show(console, scene, out)
+        scene = _scene(day, points, x, y, identity, time, batches, duration(window, "--window"))
+        verified = show(console, scene, out)
     except (ValueError, OSError, RuntimeError, DynhullError) as error:
         message = Text.assemble(("error: ", "red"), str(error))
         Console(stderr=True, soft_wrap=True).print(message)
         raise typer.Exit(2) from None
     if not verified:
         raise typer.Exit(1)
-
-
-def _show(console: Console, scene: Scene, out: Path) -> bool:
-    """Replay a scene, print its milestones and draw the picture; returns whether every step agreed."""
-    console.print(f"[bold]{scene.title}[/bold]")
-    for note in scene.notes:
-        console.print(note, markup=False)
-    agreed = 0
-    largest: Step | None = None
-    difference = None
-    columns = [BarColumn(), MofNCompleteColumn(), TextColumn(scene.step), TimeRemainingColumn()]
-    with (
-        server_process() as address,
-        HullClient(address) as client,
-        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
-    ):
-        for step in progress.track(replay(client, scene), total=scene.length):
-            if step.difference:
-                difference = f"{step.frame.clock}: {step.difference}"
-                break
-            agreed += 1
-            if largest is None or step.area > largest.area:
-                largest = step
-            if step.frame.milestone:
-                console.print(_line(scene, step), markup=False)
-    if largest and len(largest.vertices):
-        from .picture import draw  # matplotlib takes a while to load, and only the end needs it
-
-        draw(out, scene, largest.frame, largest.vertices, largest.area)
-        console.print(f"Largest at {largest.frame.clock}: {largest.area:,.0f} {scene.area_unit}. Picture: {out}")
-    console.print(f"Live hull compared with Chan's recomputation and with the watcher's copy: {agreed} {scene.step}")
-    if difference:
-        console.print(f"[red]DIFFERENT[/red] at {difference}")
-        return False
-    console.print(f"[green]VERIFIED {agreed}/{scene.length}[/green]")
-    return True
 
 
 def _scene(
@@ -113,20 +88,19 @@ def _scene(
     identity: str | None,
     time: str | None,
     batches: int,
-) -> Scene:
+    max_age: "timedelta | None",
+) -> "Scene":
     if points is not None:
+        if max_age is not None:
+            raise ValueError("--window is for the flights, not for --points")
+        from .table import Table
+
         return Table(points, x, y, identity, time, batches)
     from .flights import Flights  # pandas and pyproj, which a CSV file does not need
 
-    return Flights(day.date())
+    flights = Flights(day.date())
+    if max_age is None:
+        return flights
+    from .window import RecentPositions
 
-
-def _line(scene: Scene, step: Step) -> str:
-    names = step.frame.names_at(step.vertices)
-    corners = ", ".join(names[:MOST_CORNERS]) + (
-        f" and {len(names) - MOST_CORNERS} more" if len(names) > MOST_CORNERS else ""
-    )
-    return (
-        f"{step.frame.clock:>5}  {len(step.frame.positions):>5,} {scene.counted}  {len(names):>3} vertices  "
-        f"{step.area:>14,.0f} {scene.area_unit}  {corners}"
-    )
+    return RecentPositions(flights, max_age)

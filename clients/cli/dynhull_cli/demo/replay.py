@@ -4,10 +4,12 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from time import monotonic
+from typing import Literal
 
 import numpy as np
 
-from dynhull_client import HullClient, HullCopy
+from dynhull import convex_hull
+from dynhull_client import Applied, Hull, HullClient, HullCopy
 
 from .scene import Frame, Points, Scene
 
@@ -22,23 +24,29 @@ class Step:
         frame: the frame.
         vertices: (h, 2) vertices of the live hull.
         area: the live hull's area.
+        keys: the key of each vertex, as the server names it; None in a scene without keys.
         difference: the first thing that differed, None where everything agreed.
     """
 
     frame: Frame
     vertices: Points
     area: float
+    keys: tuple[object, ...] | None
     difference: str | None
+
+    def corners(self) -> list[str]:
+        """The names of the vertices."""
+        return self.frame.names_at(self.vertices) if self.keys is None else [str(key) for key in self.keys]
 
 
 class Watcher:
     """A copy of a hull that a thread keeps up to date from a watch."""
 
-    def __init__(self, client: HullClient, name: str) -> None:
+    def __init__(self, client: HullClient, name: str, *, keys: bool) -> None:
         self._moved = threading.Condition()
         self._copy = HullCopy()
         self._failure: Exception | None = None
-        self._events = client.watch(name)
+        self._events = client.watch(name, keys=keys)
         self._thread = threading.Thread(target=self._follow, name="watcher", daemon=True)
         self._thread.start()
 
@@ -53,8 +61,8 @@ class Watcher:
                 self._failure = failure
                 self._moved.notify_all()
 
-    def vertices_at(self, revision: int) -> Points | None:
-        """The copy at a revision; None if it does not get there in time, or skips it."""
+    def vertices_at(self, revision: int) -> tuple[Points, tuple[object, ...] | None] | None:
+        """The copy's vertices and their keys at a revision; None if it does not get there in time, or skips it."""
         deadline = monotonic() + PATIENCE
         with self._moved:
             while self._copy.revision < revision:
@@ -62,7 +70,8 @@ class Watcher:
                     raise self._failure
                 if not self._moved.wait(deadline - monotonic()):
                     return None
-            return self._copy.vertices if self._copy.revision == revision else None
+            reached = self._copy.revision == revision
+            return (self._copy.vertices, self._copy.vertex_keys) if reached else None
 
     def stop(self) -> None:
         """End the subscription."""
@@ -71,30 +80,74 @@ class Watcher:
 
 
 def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
-    """Send every frame as one batch over one open stream, and check the hull after each in three ways.
+    """Send every frame as one batch, and check the hull after each.
 
-    The live hull must equal Chan's recomputation from the points in the server, the number of these points must be the
-    number sent, and the watcher's copy must equal the live hull.
+    The live hull must equal Chan's recomputation from the points in the server. These must be the points sent: the same
+    keys at the same positions or, without keys, as many points with the same hull. The watcher's copy must equal the
+    live hull, and the keys of the vertices must be at the vertices.
     """
     name = scene.hull_name
-    client.create_hull(name)
-    watcher = Watcher(client, name)
+    clock: Literal["server", "data"] = "server" if scene.max_age is None else "data"
+    client.create_hull(name, keyed="str" if scene.keyed else None, max_age=scene.max_age, clock=clock)
+    watcher = Watcher(client, name, keys=scene.keyed)
     try:
-        with client.ingest(name) as stream:
-            for revision, frame in enumerate(scene.frames(), start=1):
-                stream.apply(insert=frame.insert, delete=frame.delete)
-                verified = client.verify(name, min_revision=revision)
-                live = client.get_hull(name, min_revision=revision)
-                copy = watcher.vertices_at(revision)
-                difference = None
-                if not verified.equal:
-                    difference = f"the live hull differs from Chan's recomputation: {verified.difference}"
-                elif verified.points != len(frame.positions):
-                    difference = f"the server holds {verified.points} points, {len(frame.positions)} were sent"
-                elif copy is None:
-                    difference = f"the watcher did not reach revision {revision}"
-                elif not np.array_equal(copy, live.vertices):
-                    difference = f"the watcher's copy differs: {copy.tolist()} instead of {live.vertices.tolist()}"
-                yield Step(frame, live.vertices, live.measures.area, difference)
+        for frame in scene.frames():
+            revision = _send(client, scene, frame).revision
+            live = client.get_hull(name, min_revision=revision)
+            difference = (
+                _verified(client, scene, frame, live)
+                or _named(frame, live)
+                or _watched(watcher.vertices_at(revision), live)
+            )
+            yield Step(frame, live.vertices, live.measures.area, live.vertex_keys, difference)
     finally:
         watcher.stop()
+
+
+def _send(client: HullClient, scene: Scene, frame: Frame) -> Applied:
+    if scene.keyed:
+        return client.put(scene.hull_name, frame.keys, frame.points, remove=frame.removed)
+    times = None if scene.max_age is None else [frame.time] * len(frame.points)
+    return client.apply(scene.hull_name, insert=frame.points, times=times)
+
+
+def _verified(client: HullClient, scene: Scene, frame: Frame, live: Hull) -> str | None:
+    """What is wrong with the points in the server; None if they are those of the frame."""
+    found = client.verify(scene.hull_name, min_revision=live.revision)
+    if not found.equal:
+        return f"the live hull differs from Chan's recomputation: {found.difference}"
+    if found.points != len(frame.positions):
+        return f"the server holds {found.points} points, {len(frame.positions)} were sent"
+    if not scene.keyed:
+        same = np.array_equal(live.vertices, convex_hull(frame.positions))
+        return None if same else "the server holds other points than those that were sent"
+    if not found.keys_equal:
+        return "the points of the hull are not the positions of its keys"
+    there = client.entities(scene.hull_name, min_revision=live.revision)
+    sent = dict(zip(frame.names, frame.positions.tolist(), strict=True))
+    if dict(zip(there.keys, there.points.tolist(), strict=True)) != sent:
+        return f"the server holds the keys {sorted(there.keys)}, {sorted(sent)} were sent, or their positions differ"
+    return None
+
+
+def _named(frame: Frame, live: Hull) -> str | None:
+    """A key that is not at its vertex; None if all are."""
+    if live.vertex_keys is None:
+        return None
+    sent = dict(zip(frame.names, frame.positions.tolist(), strict=True))
+    for key, vertex in zip(live.vertex_keys, live.vertices.tolist(), strict=True):
+        if sent.get(str(key)) != vertex:
+            return f"the vertex {vertex} has the key {key}, which is at {sent.get(str(key))}"
+    return None
+
+
+def _watched(copy: tuple[Points, tuple[object, ...] | None] | None, live: Hull) -> str | None:
+    """How the watcher's copy differs from the live hull; None if it does not."""
+    if copy is None:
+        return f"the watcher did not reach revision {live.revision}"
+    vertices, keys = copy
+    if not np.array_equal(vertices, live.vertices):
+        return f"the watcher's copy differs: {vertices.tolist()} instead of {live.vertices.tolist()}"
+    if keys != live.vertex_keys:
+        return f"the watcher's copy has the keys {keys} instead of {live.vertex_keys}"
+    return None

@@ -1,7 +1,8 @@
 """The input of a demo: points that appear, move and disappear, frame by frame."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Protocol
 
 from dynhull.arrays import Points as Points
@@ -13,19 +14,23 @@ class Frame:
 
     Attributes:
         clock: the time of the frame, or other text that orders the frames.
-        delete: (k, 2) points to delete.
-        insert: (m, 2) points to insert.
+        points: (k, 2) points to put or to insert.
         positions: (n, 2) all points after the batch.
         names: n names, one for each position.
         milestone: whether to print a line about it.
+        keys: k keys, in a scene with keys.
+        removed: keys to remove.
+        time: the time of the frame, where it is one.
     """
 
     clock: str
-    delete: Points
-    insert: Points
+    points: Points
     positions: Points
     names: list[str]
     milestone: bool
+    keys: Sequence[str] = ()
+    removed: Sequence[str] = ()
+    time: datetime | None = None
 
     def names_at(self, vertices: Points) -> list[str]:
         """The name of a point at each of (h, 2) vertices, with the number of others there."""
@@ -42,6 +47,8 @@ class Scene(Protocol):
     Attributes:
         title: the heading, also of the picture.
         hull_name: the hull's name on the server.
+        keyed: whether points have keys.
+        max_age: the age at which points leave the hull by themselves; None for never.
         counted: what the points are, in the plural.
         step: what a frame is, in the plural.
         length_unit: the unit of coordinates, as an adjective of an axis.
@@ -53,6 +60,8 @@ class Scene(Protocol):
 
     title: str
     hull_name: str
+    keyed: bool
+    max_age: timedelta | None
     counted: str
     step: str
     length_unit: str

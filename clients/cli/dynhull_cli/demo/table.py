@@ -4,11 +4,15 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..csv_points import Row, read_points
 from .scene import Frame, Points
+
+if TYPE_CHECKING:
+    from datetime import timedelta
 
 MILESTONES = 24
 
@@ -21,6 +25,7 @@ class Table:
     point; without, every row adds a point. Rows without finite coordinates are counted and shown.
     """
 
+    max_age: "timedelta | None" = None
     counted = "points"
     step = "batches"
     length_unit = "units"
@@ -33,7 +38,7 @@ class Table:
         self.hull_name = "points"
         rows, self.notes = read_points(path, x, y, identity, time)
         self._batches = _by_time(rows) if time else _equal_parts(rows, batches)
-        self._moves = identity is not None
+        self.keyed = identity is not None
         self.length = len(self._batches)
         self.background = np.empty((0, 2))
 
@@ -42,15 +47,12 @@ class Table:
         there: dict[str, tuple[float, float]] = {}
         every = max(1, math.ceil(self.length / MILESTONES))
         for i, (clock, rows) in enumerate(self._batches):
-            deleted, inserted = [], []
-            for name, position in {name: position for _, name, position in rows}.items():
-                if name in there:
-                    deleted.append(there[name])
-                inserted.append(position)
-                there[name] = position
-            names = list(there) if self._moves else [f"row {name}" for name in there]
+            put = {name: position for _, name, position in rows}
+            there |= put
+            names = list(there) if self.keyed else [f"row {name}" for name in there]
             milestone = i % every == 0 or i == self.length - 1
-            yield Frame(clock, _array(deleted), _array(inserted), _array(there.values()), names, milestone)
+            keys = list(put) if self.keyed else []
+            yield Frame(clock, _array(put.values()), _array(there.values()), names, milestone, keys)
 
 
 def _by_time(rows: Iterable[Row]) -> list[tuple[str, list[Row]]]:

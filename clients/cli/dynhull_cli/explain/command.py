@@ -1,24 +1,25 @@
 """The command: `dynhull explain`."""
 
-from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..csv_points import read_points
-from .scene import Point, Story
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .scene import Point, Story
 
 TREE = "tree"
 ALGORITHMS = ("graham_scan", "jarvis_march", "chan", "monotone_chain", TREE)
 SUFFIXES = (".html", ".png", ".svg", ".gif")
-EXAMPLE: list[Point] = [(7, 3), (13, 8), (2, 9), (10, 1), (0, 4), (12, 5), (4, 2), (15, 6), (9, 7), (5, 6)]
+EXAMPLE: "list[Point]" = [(7, 3), (13, 8), (2, 9), (10, 1), (0, 4), (12, 5), (4, 2), (15, 6), (9, 7), (5, 6)]
 EXAMPLE += [(14, 2), (3, 5), (8, 9.5), (1, 6), (11, 4), (6, 0)]
 
 
 class Boundary(StrEnum):
-    """What happens to points on the boundary that are not vertices."""
+    """Whether the hull keeps points on the boundary that are not vertices."""
 
     DROP = "drop"
     KEEP = "keep"
@@ -81,12 +82,14 @@ def _full_name(beginning: str) -> str:
     return found[0]
 
 
-def _read(path: Path, x: str | None, y: str | None) -> tuple[list[Point], list[str]]:
+def _read(path: Path, x: str | None, y: str | None) -> "tuple[list[Point], list[str]]":
+    from ..csv_points import read_points
+
     rows, notes = read_points(path, x, y)
     return [position for _, _, position in rows], notes
 
 
-def _story(algorithm: str, name: str, points: list[Point], collinear: Boundary) -> Story:
+def _story(algorithm: str, name: str, points: "list[Point]", collinear: Boundary) -> "Story":
     if algorithm != TREE:
         from .static_scene import static_story
 
@@ -98,8 +101,8 @@ def _story(algorithm: str, name: str, points: list[Point], collinear: Boundary) 
     return tree_story(name, points)
 
 
-def _writer(path: Path) -> Callable[[Path, Story], int]:
-    """What writes a file with this suffix, and returns the number of steps in it."""
+def _writer(path: Path) -> "Callable[[Path, Story], int]":
+    """The function that writes a file with this suffix and returns the number of steps in it."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"--out {path}: the name must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")

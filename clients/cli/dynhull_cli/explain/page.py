@@ -1,4 +1,4 @@
-"""A story as one HTML file that needs no other: a drawing to step through."""
+"""A story as a self-contained HTML page to step through."""
 
 import json
 from collections.abc import Iterable

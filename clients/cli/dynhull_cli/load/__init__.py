@@ -1,1 +1,1 @@
-"""`dynhull load`: the points of files and pipes into a hull."""
+"""`dynhull load`: adds the points of files and pipes to a hull."""

@@ -1,4 +1,4 @@
-"""Rows that cannot be read as points: counted, the first ones shown, all of them written to a file if wanted."""
+"""Rows that cannot be read as points: counts them, shows the first ones, and can write all to a file."""
 
 import csv
 from collections.abc import Iterable, Iterator
@@ -8,11 +8,12 @@ from typing import TextIO
 
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
 from ..plural import plural
-from .chunks import BadRow, Chunk, Points
+from .chunks import BadRow, Chunk, Rows
+from .source import Source
 
 
 class BadRows:
-    """The bad rows of a load, written to `file` if there is one; ValueError as soon as there are more than `most`."""
+    """The bad rows of a load, written to `file` if there is one; ValueError when there are more than `most`."""
 
     def __init__(self, file: TextIO | None, most: int | None) -> None:
         self.count = 0
@@ -22,11 +23,11 @@ class BadRows:
         if self._writer is not None:
             self._writer.writerow(["place", "reason", "row"])
 
-    def left_out(self, chunks: Iterable[Chunk]) -> Iterator[Points]:
-        """The points of the chunks."""
+    def left_out(self, chunks: Iterable[Chunk]) -> Iterator[Rows]:
+        """The good rows of the chunks."""
         for chunk in chunks:
             self._add(chunk.bad)
-            yield chunk.points
+            yield chunk.rows
 
     def report(self) -> list[str]:
         """Lines for the user: how many there are, and the first ones."""
@@ -41,6 +42,10 @@ class BadRows:
             raise ValueError("\n".join([f"more than {plural(self._most, 'bad row')} (--max-bad)", *self.report()]))
 
 
-def open_bad_rows(path: Path | None) -> AbstractContextManager[TextIO | None]:
-    """The file for the bad rows, if one is wanted."""
-    return nullcontext() if path is None else path.open("w", encoding="utf-8", newline="")
+def open_bad_rows(path: Path | None, source: Source) -> AbstractContextManager[TextIO | None]:
+    """Open the file for the bad rows; without a path, None. ValueError where it is the file that is being read."""
+    if path is None:
+        return nullcontext()
+    if path.exists() and source.is_file(path):
+        raise ValueError(f"--bad-rows {path} is the file that is loaded, and would replace it: name another file")
+    return path.open("w", encoding="utf-8", newline="")

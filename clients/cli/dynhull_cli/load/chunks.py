@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
-from typing import TypeVar
+from itertools import chain, islice
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from dynhull.arrays import Points as Points
 CHUNK_ROWS = 8192
 
 Position = tuple[float, float]
+Key = str | int
 Row = TypeVar("Row")
 
 
@@ -25,31 +26,66 @@ class BadRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
-    """(n, 2) finite points in the order of the file, and the bad rows between them."""
+class Rows:
+    """Good rows in the order of the file.
+
+    Attributes:
+        points: (n, 2) finite points.
+        keys: the key of each; None without a column of keys.
+        times: the time of each in microseconds since 1970; None without a column of times.
+    """
 
     points: Points
+    keys: list[Key] | None = None
+    times: list[int] | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __getitem__(self, rows: slice) -> "Rows":
+        keys, times = self.keys, self.times
+        return Rows(self.points[rows], None if keys is None else keys[rows], None if times is None else times[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Good rows, and the bad rows between them."""
+
+    rows: Rows
     bad: list[BadRow] = field(default_factory=list)
 
 
 Chunks = Generator[Chunk, None, None]
+Labels = tuple[Key | None, int | None]
 
 
 def picked(
-    rows: Iterable[tuple[str, Row]], positions: Callable[[Row], Sequence[Position]], text: Callable[[Row], str] = str
+    rows: Iterable[tuple[str, Row]],
+    positions: Callable[[Row], Sequence[Position]],
+    text: Callable[[Row], str] = str,
+    labels: Callable[[Row], Labels] | None = None,
 ) -> Chunk:
-    """A chunk from rows with their places.
+    """Make a chunk from rows with their places.
 
-    `positions` returns the points of a row and raises ValueError where it has none; `text` shows the row.
+    `positions` returns the points of a row, and `labels` their key and time; they raise ValueError if it has none.
+    `text` returns its text for messages.
     """
     points: list[Position] = []
+    keys: list[Any] = []
+    times: list[Any] = []
     bad = []
     for place, row in rows:
         try:
-            points.extend(positions(row))
+            found = positions(row)
+            key, time = (None, None) if labels is None else labels(row)
         except ValueError as reason:
             bad.append(BadRow(place, str(reason), text(row)))
-    return Chunk(np.array(points, np.float64).reshape(-1, 2), bad)
+            continue
+        points.extend(found)
+        keys.extend([key] * len(found))
+        times.extend([time] * len(found))
+    keyed, timed = (column if column and column[0] is not None else None for column in (keys, times))
+    return Chunk(Rows(np.array(points, np.float64).reshape(-1, 2), keyed, timed), bad)
 
 
 def cut(rows: Iterable[Row], size: int) -> Iterator[list[Row]]:
@@ -59,17 +95,39 @@ def cut(rows: Iterable[Row], size: int) -> Iterator[list[Row]]:
         yield piece
 
 
-def blocks(chunks: Iterable[Points], size: int) -> Iterator[Points]:
-    """The same points in arrays of `size`, the last one shorter."""
-    held: list[Points] = []
-    rows = 0
-    for points in chunks:
-        held.append(points)
-        rows += len(points)
-        if rows >= size:
-            whole = np.concatenate(held)
-            full = rows - rows % size
-            yield from np.split(whole[:full], full // size)
-            held, rows = [whole[full:]], rows % size
-    if rows:
-        yield np.concatenate(held)
+def blocks(chunks: Iterable[Rows], size: int) -> Iterator[Rows]:
+    """The same rows in blocks of `size`, the last one shorter. A block also ends before a key comes again in it."""
+    held: list[Rows] = []
+    count = 0
+    known: set[Key] = set()
+    for rows in chunks:
+        begin = 0
+        for end in _ends(rows, size - count, size, known):
+            held.append(rows[begin:end])
+            yield _joined(held)
+            held, count, begin = [], 0, end
+        if begin < len(rows):
+            held.append(rows[begin:])
+            count += len(rows) - begin
+    if held:
+        yield _joined(held)
+
+
+def _ends(rows: Rows, room: int, size: int, known: set[Key]) -> Iterator[int]:
+    """The rows before which a block ends, when there is room for so many more rows in the first one."""
+    if rows.keys is None:
+        yield from range(room, len(rows) + 1, size)
+        return
+    for row, key in enumerate(rows.keys):
+        if key in known or not room:
+            yield row
+            known.clear()
+            room = size
+        known.add(key)
+        room -= 1
+
+
+def _joined(parts: list[Rows]) -> Rows:
+    keys = None if parts[0].keys is None else list(chain.from_iterable(part.keys or () for part in parts))
+    times = None if parts[0].times is None else list(chain.from_iterable(part.times or () for part in parts))
+    return Rows(np.concatenate([part.points for part in parts]), keys, times)

@@ -1,28 +1,18 @@
 """The command: `dynhull load`."""
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing, contextmanager
-from itertools import chain
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..plural import plural
-from .bad_rows import BadRows, open_bad_rows
-from .chunks import Points, blocks
-from .source import STANDARD_INPUT, Format, Options, Source, open_source
+from ..times import TimeUnit
+from .options import STANDARD_INPUT, Format, Options
 
 if TYPE_CHECKING:
-    from dynhull_client import Applied, HullClient, Writer
-
-BATCH_POINTS = 8192  # part of the promise of --resume: the number of a batch says which points are in it
+    from dynhull_client import HullClient
 
 
 def _input(text: str, *names: str, **more: Any) -> Any:
@@ -70,6 +60,16 @@ def load(
         bool,
         _input("Take the vertices of lines, polygons and Multi-geometries as points.", "--vertices"),
     ] = False,
+    key: Annotated[
+        str | None, _input("Column of keys, which the points get; a row whose key is known moves it. GeoJSON: or id.")
+    ] = None,
+    time: Annotated[
+        str | None,
+        _input("Column of event times: ISO 8601 with a time zone, or numbers since 1970."),
+    ] = None,
+    time_unit: Annotated[
+        TimeUnit | None, _input("Unit of times that are numbers. Default: by the size of the first one; printed.")
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Read everything and report it. Needs no server and changes nothing.")
     ] = False,
@@ -87,7 +87,7 @@ def load(
     max_bad: Annotated[
         int | None, typer.Option(min=0, help="Stop if there are more bad rows than this. Default: never.")
     ] = None,
-    patience: Annotated[float, typer.Option(min=0, help="Seconds to wait for a server that went away.")] = 60.0,
+    patience: Annotated[float, typer.Option(min=0, help="Seconds to wait for a server that does not answer.")] = 60.0,
     as_json: AsJson = False,
 ) -> None:
     """Add the points of a file or a pipe to a hull, each exactly once.
@@ -99,41 +99,36 @@ def load(
     loaded before is refused unless --again or --replace is given. Memory does not grow with the file.
 
     While --replace loads, readers see the hull without points, then with a part of them.
+
+        dynhull create vehicles --keyed str --max-age 30m --clock data
+        dynhull load vehicles positions.csv --key id --time seen
+
+    With --key, each row puts its key: a row for a known key moves it, and rows are applied in the order of the file. A
+    missing hull is created with keys that are strings; create it before the load if it shall have other settings.
     """
+    from .bad_rows import BadRows, open_bad_rows
+    from .loading import load_points, producer_name, report_reading, require_readable
+    from .source import open_source
+
     _check(decimal, replace=replace, resume=resume, again=again)
-    options = Options(x, y, delimiter, decimal, header, encoding, vertices)
-    with open_source(file, format, options) as source, open_bad_rows(bad_rows) as bad_file:
+    if time_unit is not None and time is None:
+        raise ValueError("--time-unit is given with --time")
+    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit)
+    integers = not dry_run and key is not None and _has_integer_keys(client, name)
+    with (
+        open_source(file, format, options, integer_keys=integers) as source,
+        open_bad_rows(bad_rows, source) as bad_file,
+    ):
         bad = BadRows(bad_file, max_bad)
         if dry_run:
-            _report_reading(name, source, bad, as_json)
+            report_reading(name, source, bad, as_json)
             return
         if replace:
-            if source.size is None:
-                raise ValueError(
-                    f"--replace reads its input twice, and {source.name} is a pipe: write it to a file first"
-                )
-            _read_through(source, BadRows(None, max_bad))
-            source.rewind()
-        producer = producer or (None if again else _producer(source))
+            require_readable(source, max_bad)
+        producer = producer or (None if again else producer_name(source))
         if resume and producer is None:
             raise ValueError(f"{source.name} has no name to resume by: give --producer NAME, the same each time")
-        with closing(source.chunks()) as chunks:
-            batches = blocks(bad.left_out(chunks), BATCH_POINTS)
-            first = next(batches, None)  # before the hull is created: there may be no points at all
-            if first is None:
-                raise ValueError(_no_points(source, bad))
-            _print_notes(source.notes)
-            _make(client, name, silent=resume, replace=replace)
-            writer = client.writer(
-                name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
-            )
-            with (
-                _resumable("--resume in place of --replace" if replace else "--resume", producer),
-                _progress(source) as read,
-            ):
-                loaded, acknowledged = _send(writer, chain([first], batches), resume, read)
-    _print_notes(bad.report())
-    points = None if acknowledged is None else acknowledged.points
+        loaded, points = load_points(client, name, source, bad, producer, patience, resume=resume, replace=replace)
     if as_json:
         typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points))
     else:
@@ -142,129 +137,18 @@ def load(
         )
 
 
+def _has_integer_keys(client: "HullClient", name: str) -> bool:
+    """Whether the keys of the hull are integers. ValueError if it has none."""
+    from ..keyed_rows import key_type_of
+
+    known, keyed = key_type_of(client, name)
+    if known and keyed is None:
+        raise ValueError(f"the points of {name!r} have no keys: leave out --key, or load into another hull")
+    return keyed == "int"
+
+
 def _check(decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:
     if replace + resume + again > 1:
         raise ValueError("--resume continues a load, --again and --replace begin another: give one of them")
     if decimal not in (None, ".", ","):
         raise ValueError(f"--decimal {decimal!r} is neither . nor ,")
-
-
-def _read_through(source: Source, bad: BadRows) -> tuple[int, Points]:
-    """The number of points, and the least and the greatest x and y; ValueError where the input is unusable."""
-    count = 0
-    corners = np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
-    with closing(source.chunks()) as chunks, _progress(source) as read:
-        for points in bad.left_out(chunks):
-            count += len(points)
-            read(len(points))
-            if len(points):
-                corners = np.array([np.minimum(corners[0], points.min(0)), np.maximum(corners[1], points.max(0))])
-    if not count:
-        raise ValueError(_no_points(source, bad))
-    return count, corners
-
-
-def _report_reading(name: str, source: Source, bad: BadRows, as_json: bool) -> None:
-    count, corners = _read_through(source, bad)
-    _print_notes([*source.notes, *bad.report()])
-    if as_json:
-        typer.echo(json_line(name=name, points=count, bad_rows=bad.count, bounds=corners.ravel()))
-    else:
-        (left, bottom), (right, top) = corners.tolist()
-        where = f"x from {left} to {right}, y from {bottom} to {top}"
-        typer.echo(f"{name}: {plural(count, 'point')} would be loaded, {where}; nothing was changed")
-
-
-def _no_points(source: Source, bad: BadRows) -> str:
-    return "\n".join([f"{source.name} has no points", *source.notes, *bad.report()])
-
-
-def _print_notes(notes: Iterable[str]) -> None:
-    for note in notes:
-        typer.echo(note, err=True)
-
-
-def _producer(source: Source) -> str | None:
-    digest = source.digest()
-    return None if digest is None else f"load-{digest[:32]}"
-
-
-def _make(client: "HullClient", name: str, *, silent: bool, replace: bool) -> None:
-    from dynhull_client import HullExistsError, HullNotFoundError
-
-    if replace:
-        try:
-            client.delete_hull(name)
-        except HullNotFoundError:
-            typer.echo(f"there is no hull {name!r} to replace: creating it", err=True)
-    try:
-        client.create_hull(name)
-    except HullExistsError as known:
-        if not silent:
-            typer.echo(f"{known}: adding to it", err=True)
-
-
-def _send(
-    writer: "Writer", batches: Iterable[Points], resume: bool, read: Callable[[int], None]
-) -> "tuple[int, Applied | None]":
-    """Send each batch that was not applied before; the number of points sent, and what the last batch did."""
-    loaded, outcome = 0, None
-    with writer:
-        known = writer.sequence
-        if known and not resume:
-            raise LoadedBeforeError(
-                "loaded before, at least in part: --resume loads what is missing, --again all points once more, "
-                "--replace deletes the hull first"
-            )
-        for number, points in enumerate(batches, start=1):
-            if number > known:
-                outcome = writer.put(insert=points)
-                loaded += len(points)
-            read(len(points))
-        writer.flush()
-    return loaded, None if outcome is None else outcome.result()
-
-
-class LoadedBeforeError(ValueError):
-    """The hull has batches of this load already."""
-
-
-@contextmanager
-def _resumable(option: str, producer: str | None) -> Iterator[None]:
-    """Where a load with a name is interrupted, say how to continue it."""
-    from dynhull_client import DynhullError
-
-    try:
-        yield
-    except LoadedBeforeError:
-        raise
-    except (KeyboardInterrupt, DynhullError, ValueError):
-        if producer is not None:
-            typer.echo(
-                f"The points acknowledged so far are in the hull. The same command with {option} loads the rest; "
-                f"if you correct the file first, add --producer {producer}.",
-                err=True,
-            )
-        raise
-
-
-@contextmanager
-def _progress(source: Source) -> Iterator[Callable[[int], None]]:
-    """A bar on a terminal's standard error, nothing elsewhere. Call with the number of points read since then."""
-    console = Console(stderr=True)
-    columns = [
-        BarColumn(),
-        TextColumn("{task.fields[points]:,} points, {task.fields[rate]:,.0f} per second"),
-        TimeRemainingColumn(),
-    ]
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=source.size, points=0, rate=0)
-        points, begun = 0, monotonic()
-
-        def read(more: int) -> None:
-            nonlocal points
-            points += more
-            rate = points / (monotonic() - begun)
-            bar.update(task, completed=source.done(), points=points, rate=rate)
-
-        yield read

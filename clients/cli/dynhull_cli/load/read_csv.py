@@ -1,11 +1,15 @@
 """Points of a CSV file."""
 
+from collections.abc import Callable
+
 import numpy as np
 
-from ..columns import coordinate, decimal_mark, plain
+from ..columns import column_index, coordinate, decimal_mark, plain
 from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbered
-from .chunks import CHUNK_ROWS, Chunk, Chunks, Position, cut, picked
-from .source import Format, Source
+from .chunks import CHUNK_ROWS, Chunk, Chunks, Labels, Points, Position, Rows, cut, picked
+from .labels import label_reader
+from .options import Format
+from .source import Source
 
 
 def read_csv(source: Source) -> Chunks:
@@ -16,24 +20,65 @@ def read_csv(source: Source) -> Chunks:
     try:
         with csv_table(source.name, source.file, given) as table:
             source.notes.extend(table.notes)
-            yield from _chunks(table, options.decimal)
+            labels = _labels(source, table)
+            yield from _chunks(table, options.decimal, labels)
     except UnclearTableError as error:
         raise ValueError(f"{error}; {error.advice}") from None
 
 
-def _chunks(table: CsvTable, decimal: str | None) -> Chunks:
+def _labels(source: Source, table: CsvTable) -> Callable[[list[str]], Labels] | None:
+    """Reads the key and the time of a row; None if there is no column of either."""
+    read = label_reader(source)
+    if read is None:
+        return None
+    options = source.options
+    places = [
+        None if column is None else column_index(source.name, table.names, option, column)
+        for option, column in (("--key", options.key), ("--time", options.time))
+    ]
+
+    def labels(row: list[str]) -> Labels:
+        key, time = (None if place is None or place >= len(row) else row[place] for place in places)
+        return read(key, time)
+
+    return labels
+
+
+def _chunks(table: CsvTable, decimal: str | None, labels: Callable[[list[str]], Labels] | None) -> Chunks:
     line = table.first_line
     for rows in cut(table.rows, CHUNK_ROWS):
         if decimal is None:
             texts = (row[place] for row in rows for place in (table.x, table.y) if place < len(row))
             decimal = decimal_mark(texts, table.delimiter)
-        yield _chunk(rows, line, table, decimal)
+        yield _chunk(rows, line, table, decimal, labels)
         line = table.next_line()
 
 
-def _chunk(rows: list[list[str]], line: int, table: CsvTable, decimal: str) -> Chunk:
+def _chunk(
+    rows: list[list[str]],
+    line: int,
+    table: CsvTable,
+    decimal: str,
+    labels: Callable[[list[str]], Labels] | None,
+) -> Chunk:
     """The points of rows that begin on that line."""
     places = table.x, table.y
+    points = None if labels is not None else _all_points(rows, places, decimal, len(table.names))
+    if points is not None:
+        return Chunk(Rows(points))
+
+    def positions(row: list[str]) -> list[Position]:
+        table.require_no_more_fields(row)
+        x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
+        return [(x, y)]
+
+    return picked(((f"line {at}", row) for at, row in numbered(rows, line)), positions, ",".join, labels)
+
+
+def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str, columns: int) -> Points | None:
+    """The points of the rows, which is the usual case; None if a row is not two finite numbers, or is too long."""
+    if max(map(len, rows)) > columns:
+        return None
     try:
         texts = [[row[place] for row in rows] for place in places]
         # One check for all: a number with _ or with the other decimal mark is looked at below, row by row.
@@ -42,12 +87,5 @@ def _chunk(rows: list[list[str]], line: int, table: CsvTable, decimal: str) -> C
             texts = [[text.replace(decimal, ".") for text in column] for column in texts]
         points = np.array([[float(text) for text in column] for column in texts]).T
     except (ValueError, IndexError):
-        points = np.full((1, 2), np.nan)
-    if np.isfinite(points).all():
-        return Chunk(points + 0.0)
-
-    def positions(row: list[str]) -> list[Position]:
-        x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
-        return [(x, y)]
-
-    return picked(((f"line {at}", row) for at, row in numbered(rows, line)), positions, ",".join)
+        return None
+    return points + 0.0 if np.isfinite(points).all() else None

@@ -3,14 +3,16 @@
 import codecs
 import json
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from typing import IO, Any
 
 import ijson
 
 from ..columns import coordinate_columns
 from ..peek import peek
-from .chunks import CHUNK_ROWS, Chunks, Position, cut, picked
+from .chunks import CHUNK_ROWS, Chunks, Labels, Position, cut, picked
 from .geometry import json_text, number, position, positions
+from .labels import label_reader
 from .source import Source
 
 PREFIX = 4096  # bytes, which show the kind of JSON
@@ -36,17 +38,57 @@ def read_ndjson(source: Source) -> Chunks:
     _skip_byte_order_mark(source.file)
     read = _row_reader(source)
     lines = ((f"line {i}", line) for i, line in enumerate(source.file, start=1) if not line.isspace())
-    for rows in cut(lines, CHUNK_ROWS):
-        yield picked(rows, lambda line: read(json.loads(line)), lambda line: line.decode(errors="replace").strip())
+    parsed = ((place, _Line(line)) for place, line in lines)
+    labels = _labels(source)
+    for rows in cut(parsed, CHUNK_ROWS):
+        yield picked(
+            rows,
+            lambda line: read(line.value),
+            lambda line: line.text,
+            None if labels is None else lambda line: labels(line.value),
+        )
 
 
 def _read_items(source: Source, path: str, place: str, read: Callable[[Any], list[Position]]) -> Chunks:
+    labels = _labels(source)
     items: Iterable[tuple[int, Any]] = enumerate(ijson.items(source.file, path, use_float=True), start=1)
     try:
         for rows in cut(((f"{place} {i}", item) for i, item in items), CHUNK_ROWS):
-            yield picked(rows, read, json_text)
+            yield picked(rows, read, json_text, labels)
     except ijson.JSONError as error:
         raise ValueError(f"{source.name} is not valid JSON: {error}") from None
+
+
+class _Line:
+    """A line of JSON, parsed when its value is first asked for."""
+
+    def __init__(self, line: bytes) -> None:
+        self._line = line
+
+    @cached_property
+    def value(self) -> Any:
+        return json.loads(self._line)
+
+    @property
+    def text(self) -> str:
+        return self._line.decode(errors="replace").strip()
+
+
+def _labels(source: Source) -> Callable[[Any], Labels] | None:
+    """Reads the key and the time of a row from its members or, of a feature, from its id and properties."""
+    read = label_reader(source)
+    if read is None:
+        return None
+    options = source.options
+
+    def labels(value: Any) -> Labels:
+        if not isinstance(value, dict):
+            raise ValueError("an array has no key and no time")
+        if value.get("type") == "Feature":
+            value = {"id": value.get("id"), **(value.get("properties") or {})}
+        return read(value.get(options.key), value.get(options.time))
+
+    return labels
 
 
 def _row_reader(source: Source) -> Callable[[Any], list[Position]]:

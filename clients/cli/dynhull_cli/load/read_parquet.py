@@ -1,6 +1,7 @@
 """Points of a Parquet or GeoParquet file."""
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..columns import coordinate, coordinate_columns
-from .chunks import CHUNK_ROWS, Chunk, Chunks, Position, picked
+from ..columns import column_index, coordinate, coordinate_columns
+from .chunks import CHUNK_ROWS, Chunk, Chunks, Labels, Position, Rows, picked
 from .geometry import positions
+from .labels import label_reader
 from .source import Source
 from .wkb import decode
 
@@ -33,7 +35,7 @@ def read_parquet(source: Source) -> Chunks:
         yield from _of_columns(source, parquet)
     else:
         source.notes.append(f"{source.name}: points from the geometry column {geometry}")
-        yield from _of_geometries(parquet, geometry, source.options.vertices)
+        yield from _of_geometries(source, parquet, geometry)
 
 
 def _of_columns(source: Source, parquet: Any) -> Chunks:
@@ -44,26 +46,47 @@ def _of_columns(source: Source, parquet: Any) -> Chunks:
         if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
             raise ValueError(f"{source.name}: column {name} holds {kind}, not numbers")
     first = 1
-    for batch in parquet.iter_batches(CHUNK_ROWS, columns=names):
-        yield _chunk([batch[name] for name in names], names, first)
+    more, labels = _label_columns(source, schema.names)
+    for batch in parquet.iter_batches(CHUNK_ROWS, columns=[*names, *filter(None, more)]):
+        yield _chunk([batch[name] for name in names], names, first, _labels_of(batch, more, labels))
         first += len(batch)
 
 
-def _chunk(arrays: list[Any], names: list[str], first: int) -> Chunk:
-    points = np.stack([each.cast(pa.float64()).to_numpy(zero_copy_only=False) for each in arrays], axis=1)
-    if np.isfinite(points).all():
-        return Chunk(points + 0.0)
+def _label_columns(source: Source, names: list[str]) -> tuple[list[str | None], Callable[[Any, Any], Labels] | None]:
+    """The columns of the keys and times, None where there is none, and what reads them."""
+    given = (("--key", source.options.key), ("--time", source.options.time))
+    columns = [
+        None if name is None else names[column_index(source.name, names, option, name)] for option, name in given
+    ]
+    return columns, label_reader(source)
 
-    def position(row: tuple[Any, ...]) -> list[Position]:
-        x, y = map(coordinate, (None if value is None else str(value) for value in row), names)
+
+def _labels_of(
+    batch: Any, columns: list[str | None], read: Callable[[Any, Any], Labels] | None
+) -> Callable[[int], Labels] | None:
+    """Reads the key and the time of a row of the batch, given by its number."""
+    if read is None:
+        return None
+    keys, times = ([None] * len(batch) if name is None else batch[name].to_pylist() for name in columns)
+    return lambda row: read(keys[row], times[row])
+
+
+def _chunk(arrays: list[Any], names: list[str], first: int, labels: Callable[[int], Labels] | None) -> Chunk:
+    points = np.stack([each.cast(pa.float64()).to_numpy(zero_copy_only=False) for each in arrays], axis=1)
+    if labels is None and np.isfinite(points).all():
+        return Chunk(Rows(points + 0.0))
+    rows = list(zip(*(each.to_pylist() for each in arrays), strict=True))
+
+    def position(row: int) -> list[Position]:
+        x, y = map(coordinate, (None if value is None else str(value) for value in rows[row]), names)
         return [(x, y)]
 
-    rows = zip(*(each.to_pylist() for each in arrays), strict=True)
-    return picked(((f"row {i}", row) for i, row in enumerate(rows, start=first)), position)
+    places = ((f"row {first + row}", row) for row in range(len(rows)))
+    return picked(places, position, lambda row: str(rows[row]), labels)
 
 
 def _geometry_column(name: str, schema: Any) -> str | None:
-    """The primary geometry column of GeoParquet, None of other files; ValueError for an encoding that is not read."""
+    """The primary geometry column of GeoParquet, None for other files; ValueError for an unsupported encoding."""
     if GEO_KEY not in (schema.metadata or {}):
         return None
     geo = json.loads(schema.metadata[GEO_KEY])
@@ -74,23 +97,31 @@ def _geometry_column(name: str, schema: Any) -> str | None:
     return column
 
 
-def _of_geometries(parquet: Any, column: str, every_vertex: bool) -> Chunks:
-    def of_binary(data: bytes | None) -> list[Position]:
+def _of_geometries(source: Source, parquet: Any, column: str) -> Chunks:
+    first = 1
+    more, read = _label_columns(source, parquet.schema_arrow.names)
+    for batch in parquet.iter_batches(CHUNK_ROWS, columns=[column, *filter(None, more)]):
+        array, labels = batch[column], _labels_of(batch, more, read)
+        if pa.types.is_struct(array.type):
+            yield _chunk([pc.struct_field(array, axis) for axis in ("x", "y")], ["x", "y"], first, labels)
+        else:
+            yield _of_binaries(array.to_pylist(), first, source.options.vertices, labels)
+        first += len(batch)
+
+
+def _of_binaries(
+    rows: list[bytes | None], first: int, every_vertex: bool, labels: Callable[[int], Labels] | None
+) -> Chunk:
+    points = None if labels is not None else _wkb_points(rows)
+    if points is not None:
+        return Chunk(Rows(points))
+
+    def of_row(row: int) -> list[Position]:
+        data = rows[row]
         return positions(None if data is None else decode(data), every_vertex)
 
-    first = 1
-    for batch in parquet.iter_batches(CHUNK_ROWS, columns=[column]):
-        array = batch[column]
-        if pa.types.is_struct(array.type):
-            yield _chunk([pc.struct_field(array, axis) for axis in ("x", "y")], ["x", "y"], first)
-        else:
-            rows = array.to_pylist()
-            points = _wkb_points(rows)
-            if points is None:
-                yield picked(((f"row {i}", row) for i, row in enumerate(rows, start=first)), of_binary, _hex)
-            else:
-                yield Chunk(points)
-        first += len(batch)
+    places = ((f"row {first + row}", row) for row in range(len(rows)))
+    return picked(places, of_row, lambda row: _hex(rows[row]), labels)
 
 
 def _wkb_points(rows: list[bytes | None]) -> Any:

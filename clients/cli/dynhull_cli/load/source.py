@@ -3,61 +3,23 @@
 import gzip
 import hashlib
 import io
+import os
 import sys
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
-from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any, cast
 
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from .chunks import Chunks
+from .options import STANDARD_INPUT, Format, Options
 
-STANDARD_INPUT = "-"
 DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
-
-
-class Format(StrEnum):
-    """The formats."""
-
-    CSV = "csv"
-    TSV = "tsv"
-    PARQUET = "parquet"
-    JSON = "json"
-    GEOJSON = "geojson"
-    NDJSON = "ndjson"
-
-
 SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """How to read the input; None for what is to be found out. The fields are the options of the command.
-
-    Attributes:
-        x: the column or member of x.
-        y: the column or member of y.
-        delimiter: the character between columns of CSV.
-        decimal: the decimal mark of CSV.
-        header: whether the first row of CSV names the columns.
-        encoding: the encoding of CSV.
-        vertices: whether to take the vertices of geometries that are no single points.
-    """
-
-    x: str | None = None
-    y: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
-    header: bool | None = None
-    encoding: str | None = None
-    vertices: bool = False
-
-
 TABLES = {Format.CSV, Format.TSV}
 APPLIES_TO = {
     "x": set(Format) - {Format.GEOJSON},
@@ -67,6 +29,9 @@ APPLIES_TO = {
     "header": TABLES,
     "encoding": TABLES,
     "vertices": set(Format) - TABLES,
+    "key": set(Format),
+    "time": set(Format),
+    "time_unit": set(Format),
 }
 
 
@@ -75,13 +40,14 @@ class Source:
     """An input that is read once.
 
     Attributes:
-        name: what messages call it.
-        file: its bytes, decompressed; it can be peeked into.
+        name: its name in messages.
+        file: its bytes, decompressed; `peek` can look ahead in it.
         compressed: the bytes as they are stored.
         size: how many these are; None for a pipe.
         format: its format.
         options: how to read it.
-        notes: lines about what was found out while reading and may surprise.
+        integer_keys: whether keys are integers.
+        notes: lines about what was detected while reading and may surprise.
     """
 
     name: str
@@ -90,6 +56,7 @@ class Source:
     size: int | None
     format: Format
     options: Options
+    integer_keys: bool = False
     notes: list[str] = field(default_factory=list)
 
     def chunks(self) -> Chunks:
@@ -97,9 +64,16 @@ class Source:
         return _reader(self.format)(self)
 
     def rewind(self) -> None:
-        """Begin anew; not of a pipe."""
+        """Return to the beginning; not possible with a pipe."""
         self.file.seek(0)
         self.notes.clear()
+
+    def is_file(self, path: Path) -> bool:
+        """Whether that is the file that is read, perhaps by another name."""
+        try:
+            return os.path.samestat(os.fstat(self.compressed.fileno()), path.stat())
+        except io.UnsupportedOperation:
+            return False
 
     def done(self) -> int:
         """Bytes read so far, of `size`."""
@@ -123,29 +97,29 @@ Reader = Callable[[Source], Chunks]
 
 
 @contextmanager
-def open_source(name: str, kind: Format | None, options: Options) -> Iterator[Source]:
-    """Open a file, or standard input for "-". Without a `kind`, the end of the name says it; standard input is CSV.
+def open_source(name: str, kind: Format | None, options: Options, *, integer_keys: bool = False) -> Iterator[Source]:
+    """Open a file, or standard input for "-". Without a `kind`, the suffix of the name decides; standard input is CSV.
 
-    ValueError where the format is not known, an option is not for it, or the compressed data is damaged.
+    ValueError if the format is unknown, an option does not apply to it, or the compressed data is damaged.
     """
     kind = kind or _format_of(name)
     for option in _given(options):
         if kind not in APPLIES_TO[option]:
             formats = ", ".join(each for each in Format if each in APPLIES_TO[option])
-            raise ValueError(f"--{option} is for {formats}, not for {kind}")
+            raise ValueError(f"--{option.replace('_', '-')} is for {formats}, not for {kind}")
     try:
         if name == STANDARD_INPUT:
             raw: Any = getattr(sys.stdin.buffer, "raw", sys.stdin.buffer)
             stdin = io.BufferedReader(raw)
             try:
-                yield _source("standard input", stdin, None, kind, options)
+                yield _source("standard input", stdin, None, kind, options, integer_keys)
             finally:
                 stdin.detach()
         else:
             path = Path(name)
             with path.open("rb") as file:
                 size = path.stat().st_size if path.is_file() else None
-                yield _source(name, file, size, kind, options)
+                yield _source(name, file, size, kind, options, integer_keys)
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise ValueError(f"{name}: the compressed data is damaged: {error}") from None
 
@@ -159,7 +133,9 @@ def _format_of(name: str) -> Format:
     return SUFFIXES[suffix]
 
 
-def _source(name: str, stored: IO[bytes], size: int | None, kind: Format, options: Options) -> Source:
+def _source(
+    name: str, stored: IO[bytes], size: int | None, kind: Format, options: Options, integer_keys: bool
+) -> Source:
     file = stored
     if peek(stored, len(GZIP_MARK)) == GZIP_MARK:
         if kind is Format.PARQUET:
@@ -167,7 +143,7 @@ def _source(name: str, stored: IO[bytes], size: int | None, kind: Format, option
         file = cast("IO[bytes]", gzip.GzipFile(fileobj=stored))
     if kind not in TABLES and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
         raise ValueError(f"{name} is UTF-16, and JSON is UTF-8: convert it with iconv -f UTF-16 -t UTF-8")
-    return Source(name, file, stored, size, kind, options)
+    return Source(name, file, stored, size, kind, options, integer_keys)
 
 
 def _given(options: Options) -> dict[str, object]:

@@ -10,7 +10,7 @@ SRID_BYTES = 4
 
 
 def decode(data: bytes) -> dict[str, Any]:
-    """The geometry, with x and y alone; ValueError where the bytes are none."""
+    """The geometry, with x and y only; ValueError if the bytes are not a geometry."""
     try:
         return _Reader(data).geometry()
     except (struct.error, IndexError):

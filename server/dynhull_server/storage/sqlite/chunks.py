@@ -1,4 +1,4 @@
-"""Snapshots as bytes: their contents in chunks, each of which can be decoded by itself, and their state."""
+"""Snapshots as bytes: their contents, in chunks that can be decoded one by one, and their state."""
 
 import json
 import struct

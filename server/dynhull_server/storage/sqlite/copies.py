@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...state.records import Kept
+from ...state.records import HullRow, Kept
 from ..port import NEWEST, DamagedError, Progress, StorageError
 from .disk import Access, Disk
 from .examine import Findings, examine, format_of, load
@@ -104,8 +104,8 @@ def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = 
     return report
 
 
-def read(path: Path, name: str) -> tuple[Kept, list[str]]:
-    """A hull as of the last commit, and messages about losses at the end of the log.
+def read(path: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
+    """A hull as of the last commit: its row and its contents; and messages about losses at the end of the log.
 
     Raises:
         StorageError: no hull has that name.
@@ -116,7 +116,7 @@ def read(path: Path, name: str) -> tuple[Kept, list[str]]:
         hull = next((hull for hull in hulls if hull.row.name == name), None)
         if hull is None:
             raise StorageError(f"there is no hull {name!r} in {path}")
-        return read_hull(opened.connection, hull, NEWEST), opened.notes
+        return hull.row, read_hull(opened.connection, hull, NEWEST), opened.notes
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,14 +16,16 @@ def target(address: str) -> tuple[str, bool]:
     """The target for gRPC, and whether the address asks for TLS.
 
     The port is 50051 unless given. http:// and grpc:// add nothing to HOST:PORT; https:// and grpcs:// ask for TLS.
-    A bare IPv6 address needs no brackets. ValueError where the address cannot be understood.
+    A bare IPv6 address needs no brackets. ValueError or TypeError where the address cannot be understood.
     """
+    if not isinstance(address, str):
+        raise TypeError(f"address is {address!r}: must be a string. {EXAMPLE}")
     if address.split(":", 1)[0] in RESOLVERS:
         return address, False
     before, mark, after = address.partition("://")
     scheme, place = (before.lower(), after.removesuffix("/")) if mark else ("", address)
     if scheme not in TLS_BY_SCHEME:
-        raise ValueError(f"address {address!r}: a server is not reached by {scheme}://. {EXAMPLE}")
+        raise ValueError(f"address {address!r}: there is no scheme {scheme}:// for servers. {EXAMPLE}")
     found = PLACE.fullmatch(f"[{place}]" if _is_ipv6(place) else place)
     if found is None:
         raise ValueError(f"address {address!r} is not a host and a port. {EXAMPLE}")

@@ -1,0 +1,120 @@
+"""The changes of a hull as a live table, as lines of text or as lines of JSON."""
+
+from collections import deque
+from dataclasses import asdict
+from itertools import islice
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Snapshot, Watch
+
+from .json_lines import json_line
+
+SHOWN_EVENTS = 12
+NOTHING = np.empty((0, 2))
+
+
+class Corners:
+    """The keys of the vertices, and their difference to those before."""
+
+    def __init__(self, copy: HullCopy) -> None:
+        self.joined: list[str | int] = []
+        self.left: list[str | int] = []
+        self._copy = copy
+        self._keys: tuple[str, ...] | tuple[int, ...] = ()
+
+    def update(self) -> None:
+        """Compare the copy with its state at the last call."""
+        before, self._keys = self._keys, self._copy.vertex_keys or ()
+        self.joined = [key for key in self._keys if key not in set(before)]
+        self.left = [key for key in before if key not in set(self._keys)]
+
+
+def follow(client: HullClient, name: str, *, max_rate: float, events: int | None, as_json: bool, keys: bool) -> None:
+    """Print the changes of a hull: lines of JSON, a live table on a terminal, or else lines of text.
+
+    It returns after that number of events; None for never.
+    """
+    copy = HullCopy()
+    corners = Corners(copy) if keys else None
+    console = Console(highlight=False)
+    with client.watch(name, max_rate=max_rate, measures=True, copy=copy, keys=keys) as stream:
+        if not as_json and console.is_terminal:
+            _show(console, name, stream, copy, corners, events)
+            return
+        for event in islice(stream, events):
+            if corners is not None:
+                corners.update()
+            typer.echo(_json(event, corners) if as_json else "  ".join(_cells(event, copy, corners)))
+
+
+def _show(
+    console: Console, name: str, stream: Watch, copy: HullCopy, corners: Corners | None, events: int | None
+) -> None:
+    recent: deque[list[str]] = deque(maxlen=SHOWN_EVENTS)
+
+    def table() -> Table:
+        lost = Text(f"connection lost, trying again: {stream.lost}", "red") if stream.lost else None
+        shown = Table(title=f"{name} at revision {copy.revision:,}", caption=lost)
+        for heading in ("revision", "points", "vertices", "change", "area", "perimeter"):
+            shown.add_column(heading, justify="right")
+        if corners is not None:
+            shown.add_column("keys")
+        for cells in recent:
+            shown.add_row(*cells)
+        return shown
+
+    with Live(get_renderable=table, console=console):
+        for event in islice(stream, events):
+            if corners is not None:
+                corners.update()
+            recent.append(_cells(event, copy, corners))
+
+
+def _cells(event: Event, copy: HullCopy, corners: Corners | None) -> list[str]:
+    added, removed = _difference(event)
+    measures = _measures(event)
+    areas = [f"{measures.area:.6g}", f"{measures.perimeter:.6g}"] if measures else []
+    names = (
+        []
+        if corners is None
+        else [" ".join([*(f"+{key}" for key in corners.joined), *(f"-{key}" for key in corners.left)])]
+    )
+    return [
+        f"{event.revision:,}",
+        f"{event.points:,}",
+        f"{len(copy.vertices):,}",
+        f"+{len(added):,} -{len(removed):,}",
+        *(areas or ([""] * 2 if names else [])),
+        *names,
+    ]
+
+
+def _json(event: Event, corners: Corners | None) -> str:
+    added, removed = _difference(event)
+    measures = _measures(event)
+    return json_line(
+        revision=event.revision,
+        points=event.points,
+        snapshot=isinstance(event, Snapshot),
+        added=added,
+        removed=removed,
+        **({} if measures is None else asdict(measures)),
+        **({} if corners is None else {"joined": corners.joined, "left": corners.left}),
+    )
+
+
+def _difference(event: Event) -> tuple[Points, Points]:
+    """Vertices added, vertices removed."""
+    if isinstance(event, Snapshot):
+        return event.vertices, NOTHING
+    return (event.added, event.removed) if isinstance(event, Change) else (NOTHING, NOTHING)
+
+
+def _measures(event: Event) -> Measures | None:
+    return event.measures if isinstance(event, Snapshot | Change) else None

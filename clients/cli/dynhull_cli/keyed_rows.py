@@ -1,0 +1,81 @@
+"""Reads keys, and keys with positions, from the arguments of a command or from standard input."""
+
+import csv
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dynhull.keys import KeyType
+from dynhull_client import HullClient, Points
+
+from .columns import plain
+from .rows import STANDARD_INPUT
+
+FIELDS = 3
+
+
+def keyed_rows(arguments: list[str] | None) -> tuple[list[str], Points]:
+    """Keys and their positions: one from the arguments KEY X Y, or lines KEY,X,Y of standard input.
+
+    ValueError names the first row that is something else.
+    """
+    if arguments and arguments != STANDARD_INPUT:
+        if len(arguments) != FIELDS:
+            raise ValueError(f"give KEY X Y, three arguments: {len(arguments)} were given")
+        rows = [("arguments", arguments)]
+    else:
+        rows = [(f"line {line}", fields) for line, fields in enumerate(_lines(arguments), start=1) if fields]
+    if not rows:
+        raise ValueError("no keys: give KEY X Y as arguments, or lines KEY,X,Y on standard input")
+    positions = np.array([_position(place, fields) for place, fields in rows])
+    return [fields[0] for _, fields in rows], positions
+
+
+def given_keys(arguments: list[str] | None) -> list[str]:
+    """The arguments as keys, or the lines of standard input."""
+    if arguments and arguments != STANDARD_INPUT:
+        return arguments
+    return [fields[0] for fields in _lines(arguments) if fields]
+
+
+def keys_for(client: HullClient, name: str, keys: Sequence[str]) -> list[str] | list[int]:
+    """The keys as the hull has them: as integers if its keys are; as text also where there is no such hull yet."""
+    _, keyed = key_type_of(client, name)
+    return [integer_key(key, f"key {row}") for row, key in enumerate(keys, start=1)] if keyed == "int" else list(keys)
+
+
+def key_type_of(client: HullClient, name: str) -> tuple[bool, KeyType | None]:
+    """Whether there is such a hull, and the kind of its keys."""
+    first = next(client.list_hulls(name), None)
+    return (True, first.keyed) if first is not None and first.name == name else (False, None)
+
+
+def integer_key(key: Any, place: str) -> int:
+    """A key that is an integer; ValueError names the place."""
+    if isinstance(key, int) and not isinstance(key, bool):
+        return key
+    if not isinstance(key, str) or not key.strip().isdecimal():
+        raise ValueError(
+            f"{place} is {key!r}, not an integer from 0 to 2**64 - 1, and the keys of the hull are integers"
+        )
+    return int(key)
+
+
+def _lines(arguments: list[str] | None) -> Any:
+    if not arguments and sys.stdin.isatty():
+        raise ValueError("nothing given: give keys as arguments, or - to type them in")
+    return csv.reader(sys.stdin)
+
+
+def _position(place: str, fields: list[str]) -> tuple[float, float]:
+    try:
+        _, x, y = fields
+        found = float(plain(x, ".")), float(plain(y, "."))
+    except ValueError:
+        found = math.nan, math.nan
+    if not all(map(math.isfinite, found)):
+        raise ValueError(f"{place}: {','.join(fields)!r} is not KEY,X,Y with finite numbers")
+    return found

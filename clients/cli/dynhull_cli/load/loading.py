@@ -1,0 +1,203 @@
+"""Reads the points of an input and sends them to a hull, each exactly once."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
+from itertools import chain
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from dynhull_client import Applied, DynhullError, HullClient, HullExistsError, HullNotFoundError, Writer
+
+from ..json_lines import json_line
+from ..plural import plural
+from .bad_rows import BadRows
+from .chunks import Points, Rows, blocks
+from .source import Source
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    from dynhull.keys import KeyType
+
+BATCH_POINTS = 8192  # part of the promise of --resume: the number of a batch says which points are in it
+PRODUCER_DIGITS = 32  # of the file's digest
+
+
+class LoadedBeforeError(ValueError):
+    """The hull has batches of this load already."""
+
+
+def report_reading(name: str, source: Source, bad: BadRows, as_json: bool) -> None:
+    """Read the input to its end and print what a load would add; ValueError where the input is unusable."""
+    count, corners = _read_through(source, bad)
+    _print_notes([*source.notes, *bad.report()])
+    if as_json:
+        typer.echo(json_line(name=name, points=count, bad_rows=bad.count, bounds=corners.ravel()))
+    else:
+        (left, bottom), (right, top) = corners.tolist()
+        where = f"x from {left} to {right}, y from {bottom} to {top}"
+        typer.echo(f"{name}: {plural(count, 'point')} would be loaded, {where}; nothing was changed")
+
+
+def require_readable(source: Source, max_bad: int | None) -> None:
+    """Read the input to its end and rewind it; ValueError where it is unusable or can be read only once."""
+    if source.size is None:
+        raise ValueError(f"--replace reads its input twice, and {source.name} is a pipe: write it to a file first")
+    _read_through(source, BadRows(None, max_bad))
+    source.rewind()
+
+
+def producer_name(source: Source) -> str | None:
+    """The name of the load of a file, made from its contents and the options; None for a pipe."""
+    digest = source.digest()
+    return None if digest is None else f"load-{digest[:PRODUCER_DIGITS]}"
+
+
+def load_points(
+    client: HullClient,
+    name: str,
+    source: Source,
+    bad: BadRows,
+    producer: str | None,
+    patience: float,
+    *,
+    resume: bool,
+    replace: bool,
+) -> tuple[int, int | None]:
+    """Create the hull where it is missing, and add the points that earlier runs of the same load did not add.
+
+    Returns:
+        The number of points added, and the number in the hull afterwards; None where nothing was left to add.
+
+    Raises:
+        ValueError: the input is unusable, or was loaded before.
+        DynhullError: the server refused a request or did not answer.
+    """
+    with closing(source.chunks()) as chunks:
+        batches = blocks(bad.left_out(chunks), BATCH_POINTS)
+        first = next(batches, None)  # before the hull is created: there may be no points at all
+        if first is None:
+            raise ValueError(_no_points(source, bad))
+        _print_notes(source.notes)
+        _make(client, name, source, silent=resume, replace=replace)
+        writer = client.writer(
+            name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
+        )
+        with (
+            _resumable("--resume in place of --replace" if replace else "--resume", producer),
+            _progress(source) as read,
+        ):
+            loaded, acknowledged = _send(writer, chain([first], batches), resume, read)
+    _print_notes(bad.report())
+    return loaded, None if acknowledged is None else acknowledged.points
+
+
+def _read_through(source: Source, bad: BadRows) -> tuple[int, Points]:
+    """Returns the number of points, and the least and the greatest x and y; ValueError where the input is unusable."""
+    count = 0
+    corners = np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
+    with closing(source.chunks()) as chunks, _progress(source) as read:
+        for points in (rows.points for rows in bad.left_out(chunks)):
+            count += len(points)
+            read(len(points))
+            if len(points):
+                corners = np.array([np.minimum(corners[0], points.min(0)), np.maximum(corners[1], points.max(0))])
+    if not count:
+        raise ValueError(_no_points(source, bad))
+    return count, corners
+
+
+def _no_points(source: Source, bad: BadRows) -> str:
+    return "\n".join([f"{source.name} has no points", *source.notes, *bad.report()])
+
+
+def _print_notes(notes: Iterable[str]) -> None:
+    for note in notes:
+        typer.echo(note, err=True)
+
+
+def _make(client: HullClient, name: str, source: Source, *, silent: bool, replace: bool) -> None:
+    keyed: KeyType | None = None
+    if source.options.key is not None:
+        keyed = "int" if source.integer_keys else "str"
+    if replace:
+        try:
+            client.delete_hull(name)
+        except HullNotFoundError:
+            typer.echo(f"there is no hull {name!r} to replace: creating it", err=True)
+    try:
+        client.create_hull(name, keyed=keyed)
+    except HullExistsError as known:
+        if not silent:
+            typer.echo(f"{known}: adding to it", err=True)
+
+
+def _send(
+    writer: Writer, batches: Iterable[Rows], resume: bool, read: Callable[[int], None]
+) -> tuple[int, Applied | None]:
+    """Send each batch that was not applied before; returns the number of points sent and the last outcome."""
+    loaded, outcome = 0, None
+    with writer:
+        known = writer.sequence
+        if known and not resume:
+            raise LoadedBeforeError(
+                "loaded before, at least in part: --resume loads what is missing, --again all points once more, "
+                "--replace deletes the hull first"
+            )
+        for number, rows in enumerate(batches, start=1):
+            if number > known:
+                outcome = _put(writer, rows)
+                loaded += len(rows)
+            read(len(rows))
+        writer.flush()
+    return loaded, None if outcome is None else outcome.result()
+
+
+def _put(writer: Writer, rows: Rows) -> "Future[Applied]":
+    if rows.keys is None:
+        return writer.put(insert=rows.points, times=rows.times)
+    return writer.put(keys=rows.keys, points=rows.points, times=rows.times)
+
+
+@contextmanager
+def _resumable(option: str, producer: str | None) -> Iterator[None]:
+    """When a load with a name is interrupted, print how to continue it."""
+    try:
+        yield
+    except LoadedBeforeError:
+        raise
+    except (KeyboardInterrupt, DynhullError, ValueError):
+        if producer is not None:
+            typer.echo(
+                f"The points acknowledged so far are in the hull. The same command with {option} loads the rest; "
+                f"if you correct the file first, add --producer {producer}.",
+                err=True,
+            )
+        raise
+
+
+@contextmanager
+def _progress(source: Source) -> Iterator[Callable[[int], None]]:
+    """A bar on standard error, if it is a terminal. Call it with the number of points read since the last call."""
+    console = Console(stderr=True)
+    columns = [
+        BarColumn(),
+        TextColumn("{task.fields[points]:,} points, {task.fields[rate]:,.0f} per second"),
+        TimeRemainingColumn(),
+    ]
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=source.size, points=0, rate=0)
+        points, begun = 0, monotonic()
+
+        def read(more: int) -> None:
+            nonlocal points
+            points += more
+            rate = points / (monotonic() - begun)
+            bar.update(task, completed=source.done(), points=points, rate=rate)
+
+        yield read

@@ -1,0 +1,48 @@
+"""How to read the input of a load: the values of the command's options."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from ..times import TimeUnit
+
+STANDARD_INPUT = "-"
+
+
+class Format(StrEnum):
+    """The formats that `dynhull load` reads."""
+
+    CSV = "csv"
+    TSV = "tsv"
+    PARQUET = "parquet"
+    JSON = "json"
+    GEOJSON = "geojson"
+    NDJSON = "ndjson"
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How to read the input; None for what is to be detected. The fields are the options of the command.
+
+    Attributes:
+        x: the column or member of x.
+        y: the column or member of y.
+        delimiter: the character between columns of CSV.
+        decimal: the decimal mark of CSV.
+        header: whether the first row of CSV names the columns.
+        encoding: the encoding of CSV.
+        vertices: whether to take the vertices of geometries other than single points.
+        key: the column or member of the keys; None for points without keys.
+        time: the column or member of the times; None for points without times.
+        time_unit: the unit of times that are numbers.
+    """
+
+    x: str | None = None
+    y: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    header: bool | None = None
+    encoding: str | None = None
+    vertices: bool = False
+    key: str | None = None
+    time: str | None = None
+    time_unit: TimeUnit | None = None

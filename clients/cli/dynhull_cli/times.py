@@ -1,0 +1,90 @@
+"""Points in time, as files and people write them, in microseconds since 1970."""
+
+from datetime import UTC, datetime, timedelta
+from decimal import Decimal, InvalidOperation
+from enum import StrEnum
+from typing import Any
+
+
+class TimeUnit(StrEnum):
+    """The units of times that are numbers."""
+
+    SECONDS = "s"
+    MILLISECONDS = "ms"
+    MICROSECONDS = "us"
+    NANOSECONDS = "ns"
+
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+MICROSECONDS = {
+    TimeUnit.SECONDS: Decimal(1_000_000),
+    TimeUnit.MILLISECONDS: Decimal(1000),
+    TimeUnit.MICROSECONDS: Decimal(1),
+    TimeUnit.NANOSECONDS: Decimal("0.001"),
+}
+NAMES = {
+    TimeUnit.SECONDS: "seconds",
+    TimeUnit.MILLISECONDS: "milliseconds",
+    TimeUnit.MICROSECONDS: "microseconds",
+    TimeUnit.NANOSECONDS: "nanoseconds",
+}
+# A number below this is in the unit: seconds reach to the year 5138, and milliseconds begin in 1973.
+LIMITS = {
+    TimeUnit.SECONDS: Decimal(10) ** 11,
+    TimeUnit.MILLISECONDS: Decimal(10) ** 14,
+    TimeUnit.MICROSECONDS: Decimal(10) ** 17,
+}
+
+
+class TimeReader:
+    """Reads times: ISO 8601 with a time zone, or numbers since 1970, all in one unit.
+
+    Attributes:
+        unit: the unit of numbers; None until the first number decides it.
+        note: a line about the unit that the first number decided; None without one.
+    """
+
+    def __init__(self, name: str, unit: TimeUnit | None = None) -> None:
+        self.unit = unit
+        self.note: str | None = None
+        self._name = name
+
+    def read(self, value: Any) -> int:
+        """The time in microseconds since 1970; ValueError says what is wrong with the value."""
+        if isinstance(value, datetime):
+            return self._of_datetime(value, value.isoformat())
+        text = "" if value is None else str(value).strip()
+        if not text:
+            raise ValueError(f"{self._name} is missing")
+        try:
+            number = Decimal(text)
+        except InvalidOperation:
+            return self._of_text(text)
+        if not number.is_finite() or "_" in text:
+            raise ValueError(f"{self._name} is {text!r}, not a time")
+        if self.unit is None:
+            self.unit = unit_of(number)
+            first = EPOCH + timedelta(microseconds=int(number * MICROSECONDS[self.unit]))
+            self.note = (
+                f"{self._name}: times are {NAMES[self.unit]} since 1970, the first is {first.isoformat()}; "
+                "--time-unit reads them in another unit"
+            )
+        return int((number * MICROSECONDS[self.unit]).to_integral_value("ROUND_FLOOR"))
+
+    def _of_text(self, text: str) -> int:
+        try:
+            return self._of_datetime(datetime.fromisoformat(text), text)
+        except ValueError as error:
+            if "time zone" in str(error):
+                raise
+            raise ValueError(f"{self._name} is {text!r}, neither ISO 8601 with a time zone nor a number") from None
+
+    def _of_datetime(self, value: datetime, text: str) -> int:
+        if value.tzinfo is None:
+            raise ValueError(f"{self._name} is {text!r}, without a time zone: add Z for UTC, or an offset")
+        return (value - EPOCH) // timedelta(microseconds=1)
+
+
+def unit_of(number: Decimal) -> TimeUnit:
+    """The unit in which a number since 1970 is a time of our age."""
+    return next((unit for unit, limit in LIMITS.items() if abs(number) < limit), TimeUnit.NANOSECONDS)

@@ -1,0 +1,148 @@
+"""What a writer is given, cut into parts, and parts gathered for one batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from dynhull.arrays import as_points
+
+from ._batch import Batch, batch_rows, join_batches, keep_last_rows
+from ._keys import checked_keys, plain_keys
+from ._times import as_microseconds
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import numpy.typing as npt
+
+    from dynhull_proto.v1 import batch_pb2
+
+    from ._batch import Missing
+
+Key = str | int
+UNTIMED = 0
+
+
+@dataclass(slots=True)
+class Part:
+    """Changes for one batch.
+
+    Attributes:
+        message: the changes.
+        rows: their number.
+        latest: the last time of each key that is put, UNTIMED without times; None for a key that is removed.
+        timed: whether the rows to put or insert have times; None if there are none.
+    """
+
+    message: batch_pb2.Batch
+    rows: int
+    latest: dict[Key, int | None] = field(default_factory=dict)
+    timed: bool | None = None
+
+
+def put_parts(
+    insert: npt.ArrayLike | None,
+    delete: npt.ArrayLike | None,
+    move: tuple[npt.ArrayLike, npt.ArrayLike] | None,
+    keys: Any,
+    points: npt.ArrayLike | None,
+    times: Any,
+    missing: Missing | None,
+    *,
+    coalesce: bool,
+) -> list[Part]:
+    """Points to insert, delete and move as one part, or keys to put as `Batch` takes them.
+
+    A new part begins with a row that must not go into the same batch as the rows before it.
+    """
+    options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move}
+    if keys is None or points is None:
+        message = Batch(**options, keys=keys, points=points, times=times).message
+        return [Part(message, batch_rows(message), timed=None if insert is None else times is not None)]
+    checked, xy = checked_keys(keys), as_points(points, "points")
+    micros = None if times is None else as_microseconds(times, len(xy), "times")
+    whole = Batch(**options, keys=checked, points=xy, times=micros)
+    names = plain_keys(checked)
+    stamps = [UNTIMED] * len(names) if micros is None else micros.tolist()
+    parts = []
+    for rows in _runs(names, stamps, coalesce):
+        batch = whole
+        if rows.stop - rows.start < len(names):
+            batch = Batch(
+                **options, keys=checked[rows], points=xy[rows], times=None if micros is None else micros[rows]
+            )
+        latest: dict[Key, int | None] = dict(zip(names[rows], stamps[rows], strict=True))
+        parts.append(Part(batch.message, rows.stop - rows.start, latest, timed=micros is not None))
+    return parts
+
+
+def remove_parts(keys: Any, missing: Missing | None) -> list[Part]:
+    """Keys to remove; a new part begins where a key comes again."""
+    checked = checked_keys(keys)
+    names = plain_keys(checked)
+    return [
+        Part(Batch(remove=checked[rows], missing=missing).message, rows.stop - rows.start, dict.fromkeys(names[rows]))
+        for rows in _runs(names, [UNTIMED] * len(names), coalesce=False)
+    ]
+
+
+class Gathering:
+    """Parts gathered for one batch.
+
+    Attributes:
+        rows: the number of their rows.
+    """
+
+    def __init__(self, *, coalesce: bool) -> None:
+        self.rows = 0
+        self._coalesce = coalesce
+        self._messages: list[batch_pb2.Batch] = []
+        self._latest: dict[Key, int | None] = {}
+        self._timed: bool | None = None
+
+    def admits(self, part: Part) -> bool:
+        """Whether the part may go into the same batch."""
+        if self._timed is not None and part.timed is not None and self._timed != part.timed:
+            return False
+        return all(_coalesces(self._latest, key, part.latest[key], self._coalesce) for key in part.latest)
+
+    def add(self, part: Part) -> None:
+        """Add a part."""
+        self._messages.append(part.message)
+        self._latest.update(part.latest)
+        self.rows += part.rows
+        self._timed = part.timed if self._timed is None else self._timed
+
+    def joined(self) -> batch_pb2.Batch:
+        """The parts as one batch."""
+        joined = join_batches(self._messages)
+        if self._coalesce and joined.HasField("puts"):
+            keep_last_rows(joined)
+        return joined
+
+
+def _runs(names: Sequence[Key], stamps: Sequence[int], coalesce: bool) -> Iterator[slice]:
+    """The longest slices of rows that may go into the same batch."""
+    if len(set(names)) == len(names):
+        yield slice(0, len(names))
+        return
+    begin, latest = 0, dict[Key, int | None]()
+    for row, (name, stamp) in enumerate(zip(names, stamps, strict=True)):
+        if not _coalesces(latest, name, stamp, coalesce):
+            yield slice(begin, row)
+            begin, latest = row, {}
+        latest[name] = stamp
+    yield slice(begin, len(names))
+
+
+def _coalesces(latest: Mapping[Key, int | None], key: Key, stamp: int | None, coalesce: bool) -> bool:
+    """Whether the batch may hold the key at this time: alone or, if that is allowed, instead of an earlier position.
+
+    A position with an earlier time than the one before stays in a batch of its own: only the server knows whether the
+    hull is ordered by time or by arrival.
+    """
+    if key not in latest:
+        return True
+    before = latest[key]
+    return coalesce and before is not None and stamp is not None and before <= stamp

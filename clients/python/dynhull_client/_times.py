@@ -1,0 +1,113 @@
+"""Points in time as microseconds since 1970, and their messages."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from google.protobuf.duration_pb2 import Duration
+
+from dynhull_proto.v1 import points_pb2
+
+if TYPE_CHECKING:
+    from google.protobuf.timestamp_pb2 import Timestamp
+
+Times = npt.NDArray[np.datetime64]
+"""Type of an (n,) array of datetime64[us], in UTC."""
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+MICROSECOND = timedelta(microseconds=1)
+LARGEST_TIME = 2**53  # microseconds: the years 1685 to 2255
+A_TIME = "a datetime with a time zone, a numpy.datetime64, or an integer of microseconds since 1970"
+NO_ZONE = "has no time zone: write datetime.now(UTC), or value.replace(tzinfo=UTC) if it is in UTC"
+
+
+def as_microseconds(times: Any, rows: int, name: str) -> npt.NDArray[np.int64]:
+    """One time for each row, (rows,). Nanoseconds are cut off.
+
+    Args:
+        times: datetimes with a time zone; a numpy array of datetime64, which numpy defines to be in UTC; a column of
+            pandas, polars or pyarrow with a time zone; or integers of microseconds since 1970.
+        rows: their number.
+        name: what error messages call them.
+
+    Raises:
+        ValueError: a time has no time zone, is missing or not from the years 1685 to 2255, or their number differs.
+        TypeError: a value is no time.
+    """
+    micros = _microseconds(times, name)
+    if len(micros) != rows:
+        raise ValueError(f"{name} has {len(micros)} rows for {rows} points")
+    bad = np.flatnonzero((micros > LARGEST_TIME) | (micros < -LARGEST_TIME))
+    if bad.size:
+        raise ValueError(f"{name} row {bad[0]} is {micros[bad[0]]} microseconds: not from the years 1685 to 2255")
+    return micros
+
+
+def encode_times(times: Any, rows: int, name: str) -> points_pb2.Times:
+    """Times that `as_microseconds` takes, in the form of a message."""
+    return points_pb2.Times(packed=np.asarray(as_microseconds(times, rows, name), "<i8").tobytes())
+
+
+def decode_times(message: points_pb2.Times) -> Times:
+    """Times as received, packed."""
+    return np.frombuffer(message.packed, "<i8").astype("datetime64[us]")
+
+
+def decode_time(message: Timestamp) -> datetime:
+    """A time as received."""
+    return message.ToDatetime(UTC)
+
+
+def encode_duration(seconds: float | timedelta, name: str) -> Duration:
+    """A time span in the form of a message, rounded to microseconds; a number is seconds."""
+    try:
+        span = seconds if isinstance(seconds, timedelta) else timedelta(seconds=seconds)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} is {seconds!r}: must be a finite number of seconds or a timedelta") from None
+    message = Duration()
+    message.FromTimedelta(span)
+    return message
+
+
+def _microseconds(times: Any, name: str) -> npt.NDArray[np.int64]:
+    if isinstance(times, str) or not hasattr(times, "__iter__"):
+        raise TypeError(f"{name} is {times!r}: must be one time for each point, each {A_TIME}")
+    values = _values(times, name)
+    if isinstance(values, np.ndarray) and values.ndim != 1:
+        raise ValueError(f"{name} must have shape (n,), got {values.shape}")
+    if isinstance(values, np.ndarray) and values.dtype.kind in "Mi":
+        missing = np.flatnonzero(np.isnat(values)) if values.dtype.kind == "M" else np.empty(0, np.intp)
+        if missing.size:
+            raise ValueError(f"{name} row {missing[0]} is missing: must be {A_TIME}")
+        return (values.astype("datetime64[us]") if values.dtype.kind == "M" else values).astype(np.int64)
+    return np.array([_microsecond(value, f"{name} row {row}") for row, value in enumerate(values)], np.int64)
+
+
+def _values(times: Any, name: str) -> Any:
+    """An array of datetime64 or of integers for an array or a column of them; anything else as it is."""
+    kind = getattr(times, "dtype", None) or getattr(times, "type", None)  # of numpy, pandas and polars; of pyarrow
+    if kind is None or isinstance(times, np.ndarray):
+        return times
+    kind = getattr(kind, "pyarrow_dtype", kind)  # of pandas with columns of pyarrow
+    if "date" in str(kind).lower() or "timestamp" in str(kind).lower():
+        if getattr(kind, "tz", None) is None and getattr(kind, "time_zone", None) is None:
+            raise ValueError(f"{name} has no time zone: give it one, in pandas with .dt.tz_localize('UTC')")
+        return np.asarray(times, "datetime64[us]")
+    return np.asarray(times)
+
+
+def _microsecond(value: Any, name: str) -> int:
+    if isinstance(value, np.datetime64) and not np.isnat(value):
+        value = int(value.astype("datetime64[us]").astype(np.int64))
+    if isinstance(value, datetime) and value == value:  # pandas.NaT differs from itself
+        if value.tzinfo is None:
+            raise ValueError(f"{name} is {value.isoformat()}, which {NO_ZONE}")
+        return (value - EPOCH) // MICROSECOND
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
+        raise TypeError(f"{name} is {value!r}: must be {A_TIME}")
+    if abs(int(value)) > LARGEST_TIME:
+        raise ValueError(f"{name} is {value} microseconds: not from the years 1685 to 2255")
+    return int(value)

@@ -1,0 +1,124 @@
+"""The contents of a hull as a file: CSV, GeoJSON or Parquet."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull.keys import PackedKeys
+
+from .state.records import FOREVER, NO_TIME, Contents, Times
+from .storage.port import Progress
+
+ROWS_A_STEP = 100_000
+LARGEST_JSON_INTEGER = 2**53  # readers with doubles for numbers round larger ones
+
+
+def write_csv(file: Path, contents: Contents, progress: Progress) -> None:
+    """Write columns key, x, y, time and expires, those that the hull has; string keys in quotes."""
+    with file.open("w", encoding="utf-8", newline="") as out:
+        out.write(",".join(_names(contents)) + "\n")
+        for part in _parts(contents, progress):
+            columns: list[list[str]] = []
+            if part.keys is not None:
+                columns.append(list(map(_quoted if isinstance(part.keys, PackedKeys) else str, _listed(part.keys))))
+            columns += [list(map(repr, axis)) for axis in part.points.T.tolist()]
+            columns += [_texts(times) for times in (part.times, part.deadlines) if times is not None]
+            out.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+
+
+def write_geojson(file: Path, contents: Contents, progress: Progress) -> None:
+    """Write a feature for each point: its key as the id, its times as the properties time and expires.
+
+    Integer keys above 2**53 are written as strings, because some readers of JSON would round the numbers.
+    """
+    with file.open("w", encoding="utf-8") as out:
+        out.write('{"type": "FeatureCollection", "features": [\n')
+        between = ""
+        for part in _parts(contents, progress):
+            for feature in _features(part):
+                out.write(between + json.dumps(feature))
+                between = ",\n"
+        out.write("\n]}\n")
+
+
+def write_parquet(file: Path, contents: Contents, progress: Progress) -> None:
+    """Write columns key (string or uint64), x, y, time and expires (timestamps in UTC), those that the hull has."""
+    import pyarrow as pa  # slow to load, and only this format needs it
+    import pyarrow.parquet as pq
+
+    key = pa.string() if isinstance(contents.keys, PackedKeys) else pa.uint64()
+    types = {"key": key, "x": pa.float64(), "y": pa.float64()}
+    time = pa.timestamp("us", tz="UTC")
+    schema = pa.schema([(name, types.get(name, time)) for name in _names(contents)])
+    with pq.ParquetWriter(file, schema) as out:
+        for part in _parts(contents, progress):
+            columns = [] if part.keys is None else [_arrow_keys(part.keys)]
+            columns += [pa.array(np.ascontiguousarray(axis)) for axis in part.points.T]
+            columns += [pa.array(_dates(times), time) for times in (part.times, part.deadlines) if times is not None]
+            out.write_table(pa.table(columns, schema))
+
+
+WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".geojson": write_geojson}
+
+
+def _names(contents: Contents) -> list[str]:
+    columns = {"key": contents.keys, "x": True, "y": True, "time": contents.times, "expires": contents.deadlines}
+    return [name for name, column in columns.items() if column is not None]
+
+
+def _parts(contents: Contents, progress: Progress) -> Iterator[Contents]:
+    for first in range(0, len(contents), ROWS_A_STEP):
+        progress(first, len(contents))
+        rows = slice(first, first + ROWS_A_STEP)
+        times, deadlines = (None if each is None else each[rows] for each in (contents.times, contents.deadlines))
+        yield Contents(contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines)
+
+
+def _features(part: Contents) -> Iterator[dict[str, Any]]:
+    points = part.points.tolist()
+    ids = [{}] * len(points) if part.keys is None else [{"id": _json_key(key)} for key in _listed(part.keys)]
+    times, expires = ([""] * len(points) if each is None else _texts(each) for each in (part.times, part.deadlines))
+    for point, of_key, *dates in zip(points, ids, times, expires, strict=True):
+        properties = {name: text for name, text in zip(("time", "expires"), dates, strict=True) if text}
+        geometry = {"type": "Point", "coordinates": point}
+        yield {"type": "Feature", **of_key, "properties": properties, "geometry": geometry}
+
+
+def _quoted(text: str) -> str:
+    doubled = text.replace('"', '""')
+    return f'"{doubled}"'
+
+
+def _json_key(key: str | int) -> str | int:
+    """Integers as strings where some readers of JSON would round them."""
+    return str(key) if isinstance(key, int) and key > LARGEST_JSON_INTEGER else key
+
+
+def _listed(keys: PackedKeys | npt.NDArray[np.uint64]) -> list[Any]:
+    return list(keys) if isinstance(keys, PackedKeys) else keys.tolist()
+
+
+def _dates(times: Times) -> npt.NDArray[np.datetime64]:
+    """Times as dates; NaT where there is none."""
+    return np.where(times == FOREVER, NO_TIME, times).astype("datetime64[us]")
+
+
+def _texts(times: Times) -> list[str]:
+    """Times by ISO 8601 in UTC; empty where there is none."""
+    dates = _dates(times)
+    texts = np.datetime_as_string(dates, timezone="UTC")
+    return np.where(np.isnat(dates), "", texts).tolist()  # type: ignore[no-any-return]
+
+
+def _arrow_keys(keys: PackedKeys | npt.NDArray[np.uint64]) -> Any:
+    import pyarrow as pa
+
+    if not isinstance(keys, PackedKeys):
+        return pa.array(keys)
+    ends = np.cumsum(np.frombuffer(keys.lengths, np.uint8), dtype=np.int32)
+    offsets = np.concatenate([np.zeros(1, np.int32), ends])
+    return pa.StringArray.from_buffers(len(keys), pa.py_buffer(offsets), pa.py_buffer(keys.data))
