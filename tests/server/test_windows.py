@@ -190,11 +190,11 @@ def test_a_put_gives_a_new_deadline_or_none(stub: HullServiceStub, name: str) ->
 
 def test_a_kill_loses_no_key_no_time_and_no_clock(tmp_path: Path) -> None:
     options = ["--data", str(tmp_path / "data"), "--snapshot-points", "30"]
-    names = ("data", "deadlines", "evicting", "points")
     with server_process(*options, killed=True) as server, grpc.insecure_channel(server.address) as channel:
         stub = HullServiceStub(channel)
         create(stub, "data", window(10, clock=DATA))
         create(stub, "deadlines")
+        create(stub, "plain")
         create(stub, "evicting", window(max_points=5), identity=0)
         create(stub, "points", window(3600, max_points=20), identity=0)
         for i in range(60):
@@ -202,18 +202,21 @@ def test_a_kill_loses_no_key_no_time_and_no_clock(tmp_path: Path) -> None:
             request.batch.CopyFrom(puts({f"k{i % 7}": (i, i * i), f"l{i}": (-i, i)}, at=[T + i * SECOND] * 2))
             stub.Apply(request)
             apply(stub, "deadlines", puts({f"k{i % 9}": (i, -i)}, ttl=duration(0.3 if i % 2 else 3600)))
+            plain = puts({f"k{i % 5}": (i, i), f"m{i % 11}": (0, i)}, at=[T, i] if i % 20 < 15 else [])
+            plain.removes.CopyFrom(keys(f"k{(i + 2) % 5}", f"m{(3 * i + 1) % 11 if i % 11 != 5 else 0}"))
+            apply(stub, "plain", plain)
             apply(stub, "evicting", insert(i, i % 3, -i, i))
             apply(stub, "points", insert(i % 4, i % 5, i % 4, i % 5))
         apply(stub, "points", batch_pb2.Batch(deletes=points(3, 4, 50, 50), missing_points=2))
-        before = {each: hull_of(stub, each) for each in names}
-        entities = {each: everyone(stub, each) for each in ("data", "deadlines")}
+        before = {each: hull_of(stub, each) for each in ("data", "evicting", "plain", "points")}
+        entities = {each: everyone(stub, each) for each in ("data", "deadlines", "plain")}
         samples = {each: everything(stub, each) for each in ("evicting", "points")}
         server.process.send_signal(signal.SIGKILL)
     with server_process(*options) as server, grpc.insecure_channel(server.address) as channel:
         stub = HullServiceStub(channel)
-        for each in ("data", "evicting", "points"):
-            assert hull_of(stub, each) == before[each]
-        assert everyone(stub, "data") == entities["data"]
+        assert {each: hull_of(stub, each) for each in before} == before
+        for each in ("data", "plain"):
+            assert everyone(stub, each) == entities[each]
         assert {each: everything(stub, each) for each in samples} == samples
         staying = {key: place for key, place in entities["deadlines"].items() if place[0] % 2 == 0}
         wait_until(lambda: everyone(stub, "deadlines") == staying)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol, cast
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import KeyedHull
 from dynhull.arrays import Points
@@ -31,11 +32,11 @@ from dynhull_server.state.errors import (
 )
 from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.hull_state import HullState
-from dynhull_server.state.records import HullSettings, Identity, Window
+from dynhull_server.state.records import HullSettings, Identity, Times, Window
 
 from .entities import Key
 from .model import Asked, Content, Model, tag
-from .plan import KEYED, Operation
+from .plan import TIMED, Operation
 
 NO_POINTS = np.empty((0, 2))
 # The points of one batch have an x of their own each, in eighths.
@@ -187,7 +188,7 @@ class Client:
             self._batch_refused(op, asked, error, [attempt])
         else:
             self._applied(asked, attempt, applied, producer, sequence)
-            if name in KEYED:
+            if name in TIMED:
                 self._put(op, attempt, applied)
 
     async def together(self, op: Operation) -> None:
@@ -216,7 +217,7 @@ class Client:
             return
         for each, attempt, applied in zip(asked, attempts, results, strict=True):
             self.model.applied(each, attempt, applied, producer, sequence)
-            if each.name in KEYED:
+            if each.name in TIMED:
                 self._put(op, attempt, applied)
         if len({applied.duplicate for applied in results}) > 1:
             raise self.model.finds(f"batches {attempts} are a duplicate in one hull alone: {results}")
@@ -281,7 +282,14 @@ class Client:
 
     def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, WriteBatch]:
         attempt = self.model.attempt()
-        batch: Any = self._puts(op, attempt) if op["name"] in KEYED else self._points(op, attempt)
+        batch: Any
+        match TIMED.get(op["name"]):
+            case None:
+                batch = self._points(op, attempt)
+            case "multiset":
+                batch = self._timed_points(op, attempt)
+            case kind:
+                batch = self._puts(op, attempt, kind)
         if "torn" in op and isinstance(batch, Batch):
             self.model.faulty = True
             batch = TornBatch(batch, op["torn"])
@@ -298,14 +306,24 @@ class Client:
         x = float(attempt)
         return Batch(np.array([[x, x * x]]), deletes, 0, op.get("delete") == "lenient")
 
-    def _puts(self, op: Operation, attempt: int) -> KeyedBatch:
-        """A batch of keys; those that it puts are not among those that it removes."""
-        kind = KEYED[op["name"]]
-        now = self.server.time()
+    def _timed_points(self, op: Operation, attempt: int) -> Batch:
+        """A batch to a window. It deletes a point that nobody inserts, and perhaps one that was there."""
+        seen = self.seen.get(op["name"])
+        leaving = seen[-1][2][: len(op["removes"])] if seen else ()
+        deleted = np.array([-attempt, *leaving])
+        x, times = self._new(op, attempt)
+        return Batch(np.column_stack((x, x * x)), np.column_stack((deleted, deleted**2)), 0, True, times)
+
+    def _new(self, op: Operation, attempt: int) -> tuple[npt.NDArray[np.float64], Times | None]:
+        """The x of each row, and the times."""
         x = attempt + np.arange(len(op["keys"])) / EIGHT
+        return x, np.full(len(x), self.server.time() + op["time"], np.int64) if "time" in op else None
+
+    def _puts(self, op: Operation, attempt: int, kind: str) -> KeyedBatch:
+        """A batch of keys; those that it puts are not among those that it removes."""
+        x, times = self._new(op, attempt)
         named = (str, int)[kind == "int"]
         removes = [tag(attempt, kind), *(named(key) for key in op["removes"] if key not in op["keys"])]
-        times = np.full(len(x), now + op["time"], np.int64) if "time" in op else None
         return KeyedBatch(
             cast("Any", kind),
             as_keys(list(map(named, op["keys"])), kind),
@@ -314,7 +332,7 @@ class Client:
             times,
             op.get("only"),
             op.get("ttl"),
-            np.full(len(x), now + op["deadline"], np.int64) if "deadline" in op else None,
+            np.full(len(x), self.server.time() + op["deadline"], np.int64) if "deadline" in op else None,
             refuse_missing="refuse" in op,
         )
 
@@ -430,8 +448,10 @@ def content(vertices: Points) -> Content:
 
 
 def _settings(op: Operation) -> HullSettings:
-    identity = cast("Identity", KEYED.get(op["name"], "multiset"))
+    identity = cast("Identity", TIMED.get(op["name"], "multiset"))
     window = Window(**op["window"]) if "window" in op else None
+    if op["name"] == "w" and window is None:
+        window = Window(max_points=2)
     return HullSettings(identity, op.get("max_points", 0), window, op.get("by_event_time", False))
 
 
@@ -443,7 +463,7 @@ async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
     if name in model.alive:
         await client.read(name)
     write: Operation = {"do": "write", "name": name, "create": True, "numbered": False, "rows": 1}
-    if name in KEYED:
+    if name in TIMED:
         write |= {"do": "put", "keys": [0], "removes": [1], "time": 0}
     await client.write(write)
     if name not in model.alive:

@@ -46,12 +46,12 @@ from dynhull_server.state.events import (
 )
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import HullSettings, KeyRows
+from dynhull_server.state.records import HullSettings
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
 from .clients import Client, Outline, content, outline
-from .entities import Entities
+from .entities import loaded
 from .model import Model, Truth
 from .plan import Operation
 from .schedule import Schedule
@@ -202,10 +202,6 @@ class CoreServer:
         self._news.append(partial(self.dispatch, Computed(trip)))
 
     def _settle(self, effect: Examine) -> None:
-        if not effect.settle:
-            self._examining.append(effect)
-            return
-
         def settled(error: Exception | None, _: bool) -> None:
             if error is None:
                 self._news.append(partial(self._examining.append, effect))
@@ -392,7 +388,7 @@ def compare(core: Core, model: Model) -> None:
         held = (hull.counts.revision, state.counts.revision, content(state.hull.points()))
         if held != (truth.revision, truth.revision, truth.contents[-1]):
             raise model.finds(f"{name} is {held} in memory, kept is {truth.revision, truth.contents[-1]}")
-        if truth.keyed:
+        if truth.timed:
             _compare_entities(name, state, truth, model)
         if not model.days and state.kept().producers != truth.producers:
             raise model.finds(f"producers in memory: {state.kept().producers}, kept: {truth.producers}")
@@ -401,22 +397,10 @@ def compare(core: Core, model: Model) -> None:
 
 
 def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -> None:
-    kept = state.kept()
-    held = Entities(truth.row.settings)
-    if len(kept.contents):
-        held.apply(
-            KeyRows(
-                kept.contents.keys,
-                kept.contents.points,
-                kept.contents.keys[:0],
-                kept.contents.times,
-                kept.contents.deadlines,
-            )
-        )
-    if (held.held, kept.clock) != (truth.entities.held, truth.entities.clock):
-        raise model.finds(
-            f"{name} holds {held.held} at {kept.clock}, kept is {truth.entities.held} at {truth.entities.clock}"
-        )
+    kept, entities = state.kept(), truth.entities
+    held = loaded(kept.contents)
+    if (held, kept.clock) != (entities.held, entities.clock):
+        raise model.finds(f"{name} holds {held} at {kept.clock}, kept is {entities.held} at {entities.clock}")
 
 
 def _remember(failed: list[Exception | None], error: Exception | None, _: bool) -> None:

@@ -1,10 +1,13 @@
-"""What a keyed hull holds, worked out row by row: whom a batch puts, what is stale, and who leaves when."""
+"""What a hull with keys or with a window holds, worked out row by row: what is put, stale or evicted, and who leaves.
+
+A point without a key is named by its x: no two have the same.
+"""
 
 from dataclasses import dataclass
 
-from dynhull_server.state.records import FOREVER, NO_TIME, Expiry, HullSettings, KeyRows
+from dynhull_server.state.records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, PointRows
 
-Key = str | int
+Key = str | float
 
 # What a batch did: keys that are new, known keys written, stale and skipped puts, keys removed and keys evicted.
 Effect = tuple[int, int, int, int, int, int]
@@ -12,7 +15,7 @@ Effect = tuple[int, int, int, int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Entity:
-    """One key: its x, its time, and when it leaves."""
+    """One point: its x, its time, and when it leaves."""
 
     x: float
     time: int = NO_TIME
@@ -20,10 +23,10 @@ class Entity:
 
 
 class Entities:
-    """The keys of one hull.
+    """The points of one hull.
 
     Attributes:
-        held: the keys there are.
+        held: the points there are.
         clock: the hull's clock.
     """
 
@@ -48,6 +51,14 @@ class Entities:
             count[self._put(key, entity, rows.condition)] += 1
         return count["new"], count["moved"], count["stale"], count["skipped"], removed, self._evict()
 
+    def apply_points(self, rows: PointRows) -> Effect:
+        """Insert and delete points."""
+        assert rows.times is not None  # there is a window
+        removed = sum(self.held.pop(x, None) is not None for x in rows.deletes[:, 0].tolist())
+        for x, time in zip(rows.inserts[:, 0].tolist(), rows.times.tolist(), strict=True):
+            self.held[x] = Entity(x, time)
+        return len(rows.inserts), 0, 0, 0, removed, self._evict()
+
     def _put(self, key: Key, entity: Entity, condition: str | None) -> str:
         before = self.held.get(key)
         if condition == ("present" if before is None else "absent"):
@@ -59,7 +70,8 @@ class Entities:
 
     def _evict(self) -> int:
         most = self._window.max_points if self._window is not None else 0
-        oldest = sorted(self.held, key=lambda key: (self.held[key].time, key))  # type: ignore[arg-type, return-value]
+        keyed = self._settings.identity != "multiset"  # otherwise the first to come leave first
+        oldest = sorted(self.held, key=lambda key: (self.held[key].time, key if keyed else 0))  # type: ignore[arg-type, return-value]
         leaving = oldest[: len(oldest) - most] if most else []
         for key in leaving:
             del self.held[key]
@@ -81,6 +93,15 @@ class Entities:
             for key, entity in self.held.items()
             if (until is not None and NO_TIME < entity.time <= until) or entity.deadline <= clock
         ]
+
+
+def loaded(contents: Contents) -> dict[Key, Entity]:
+    """The points of a snapshot."""
+    xs, n = contents.points[:, 0].tolist(), len(contents)
+    keys = xs if contents.keys is None else _listed(contents.keys)
+    times = [NO_TIME] * n if contents.times is None else contents.times.tolist()
+    deadlines = [FOREVER] * n if contents.deadlines is None else contents.deadlines.tolist()
+    return dict(zip(keys, map(Entity, xs, times, deadlines), strict=True))
 
 
 def _listed(keys: object) -> list[Key]:

@@ -18,7 +18,7 @@ from typing import Any
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, PointRows, Record
+from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, KeyRows, PointRows, Record
 
 from .entities import Effect, Entities, Key
 
@@ -38,7 +38,8 @@ class Finding(BaseException):
 class Truth:
     """One hull as the storage has kept it: its content at each revision, and the last number of each producer.
 
-    `keys` are the keys at each revision, by their x, and `entities` those that there are; of hulls without keys none.
+    `keys` are the keys at each revision, by their x, and `entities` those that there are; of hulls without keys or
+    window none.
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
     """
 
@@ -54,8 +55,8 @@ class Truth:
         self.entities = Entities(self.row.settings)
 
     @property
-    def keyed(self) -> bool:
-        return self.row.settings.identity != "multiset"
+    def timed(self) -> bool:
+        return self.row.settings.identity != "multiset" or self.row.settings.window is not None
 
     @property
     def revision(self) -> int:
@@ -168,24 +169,23 @@ class Model:
         if record.revision != truth.revision + 1:
             raise self.finds(f"revision {record.revision} is kept after revision {truth.revision}")
         if isinstance(record.rows, Expiry):
-            self._expire(truth, record, record.rows)
+            self._revise(truth, record, record.rows)
             return None
         rows = record.rows
-        attempt = int(rows.inserts[0, 0]) if isinstance(rows, PointRows) else _attempt(rows.removes[0])
+        attempt = _attempt(rows, timed=truth.timed)
         if attempt in self._refused:
             raise self.finds(f"batch {attempt} is kept after it was refused")
         if attempt in self._places:
             raise self.finds(f"batch {attempt} is kept twice")
-        if isinstance(rows, PointRows):
+        if truth.timed:
+            self._revise(truth, record, rows)
+        elif isinstance(rows, PointRows):
             content = {*truth.contents[-1], attempt}
             for x in rows.deletes[:, 0].tolist():
                 if x not in content and not rows.lenient:
                     raise self.finds(f"batch {attempt} deletes a point that is not there")
                 content.discard(x)
             truth.contents.append(tuple(sorted(content)))
-        else:
-            self._effects[attempt] = truth.entities.apply(rows), len(rows.keys)
-            self._revise(truth, record)
         if record.producer:
             if record.sequence != truth.producers.get(record.producer, 0) + 1 and not self.days:
                 raise self.finds(f"batch {record.sequence} of {record.producer} is kept out of its turn")
@@ -194,19 +194,21 @@ class Model:
         self._places[attempt] = truth, record.revision
         return attempt
 
-    def _expire(self, truth: Truth, record: Record, rows: Expiry) -> None:
-        if record.clock is None or not truth.entities.expire(rows, record.clock):
-            raise self.finds(f"revision {record.revision} of {truth.row.name} lets others leave: {record}")
-        self._revise(truth, record)
-
-    def _revise(self, truth: Truth, record: Record) -> None:
-        """A hull with keys has a new revision."""
+    def _revise(self, truth: Truth, record: Record, rows: KeyRows | PointRows | Expiry) -> None:
+        """A hull with keys or a window has a new revision."""
         entities = truth.entities
+        match rows:
+            case Expiry():
+                if record.clock is None or not entities.expire(rows, record.clock):
+                    raise self.finds(f"revision {record.revision} of {truth.row.name} lets others leave: {record}")
+            case KeyRows():
+                self._effects[_attempt(rows, timed=True)] = entities.apply(rows), len(rows.keys)
+            case _:
+                self._effects[_attempt(rows, timed=True)] = entities.apply_points(rows), len(rows.inserts)
         if entities.clock is not None and (record.clock is None or record.clock < entities.clock):
             raise self.finds(f"the clock of {truth.row.name} goes back from {entities.clock} to {record.clock}")
         entities.clock = record.clock
-        if record.clock is not None and entities.overdue(record.clock):
-            overdue = entities.overdue(record.clock)
+        if record.clock is not None and (overdue := entities.overdue(record.clock)):
             raise self.finds(f"{overdue} are in {truth.row.name} at {record.clock}, and should have left")
         truth.keys.append({entity.x: key for key, entity in entities.held.items()})
         truth.contents.append(tuple(sorted(truth.keys[-1])))
@@ -216,7 +218,7 @@ class Model:
         return [
             name
             for name, truth in self.alive.items()
-            if truth.keyed and truth.entities.follows_server and truth.entities.overdue(time)
+            if truth.timed and truth.entities.follows_server and truth.entities.overdue(time)
         ]
 
     # What is asked
@@ -376,5 +378,8 @@ def tag(attempt: int, kind: str) -> Key:
     return f"{FIRST_TAG + attempt}" if kind == "str" else FIRST_TAG + attempt
 
 
-def _attempt(key: Key) -> int:
-    return int(key) - FIRST_TAG
+def _attempt(rows: PointRows | KeyRows, *, timed: bool) -> int:
+    """The number of a batch: in a hull with keys or a window it is in the first row to remove."""
+    if isinstance(rows, KeyRows):
+        return int(rows.removes[0]) - FIRST_TAG
+    return -int(rows.deletes[0, 0]) if timed else int(rows.inserts[0, 0])

@@ -17,8 +17,8 @@ Plan = dict[str, Any]
 Operation = dict[str, Any]
 
 NAMES = ("a", "b", "c")
-# Hulls with keys, and of which type these are.
-KEYED = {"k": "str", "l": "int"}
+# Hulls with keys, and of which type these are; and one of points in a window.
+TIMED = {"k": "str", "w": "multiset", "l": "int"}
 
 # What can be asked for, and how often. Each plan has some of it much more often, and some not at all: faults hide where
 # a few operations meet (swarm testing: Groce and others, 2012).
@@ -69,17 +69,18 @@ def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     draw = random.Random(seed)
     names = NAMES[: draw.randint(1, 3)]
-    keyed = tuple(KEYED)[: draw.randint(0, 2)]
+    timed = tuple(TIMED)[: draw.randint(0, 3)]
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
     weights["write"] += 1
-    if not keyed:
+    if not timed:
         weights["put"] = 0
         weights["together"] *= len(names) > 1
     immediate = layer != "sqlite" and draw.random() < 0.1
-    lives = [_life(draw, names, keyed, weights) for _ in range(draw.choice((1, 1, 2, 3)))]
-    for name in keyed:
+    lives = [_life(draw, names, timed, weights) for _ in range(draw.choice((1, 1, 2, 3)))]
+    for name in timed:
         if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window
-            lives[0]["clients"][0].insert(0, {"do": "create", "name": name, "max_points": 0} | _settings(draw))
+            create = {"do": "create", "name": name, "max_points": 0} | _settings(draw, name)
+            lives[0]["clients"][0].insert(0, create)
     return {
         "seed": seed,
         "layer": layer,
@@ -97,10 +98,10 @@ def random_plan(seed: int, layer: str) -> Plan:
 
 
 def _life(
-    draw: random.Random, names: tuple[str, ...], keyed: tuple[str, ...], weights: dict[str, int]
+    draw: random.Random, names: tuple[str, ...], timed: tuple[str, ...], weights: dict[str, int]
 ) -> dict[str, Any]:
     clients = [
-        [_operation(draw, names, keyed, weights) for _ in range(draw.randint(1, 4))]
+        [_operation(draw, names, timed, weights) for _ in range(draw.randint(1, 4))]
         for _ in range(draw.choice((1, 2, 2, 3, 4)))
     ]
     life: dict[str, Any] = {"clients": clients, "end": draw.choice(ENDS)}
@@ -110,13 +111,13 @@ def _life(
 
 
 def _operation(
-    draw: random.Random, names: tuple[str, ...], keyed: tuple[str, ...], weights: dict[str, int]
+    draw: random.Random, names: tuple[str, ...], timed: tuple[str, ...], weights: dict[str, int]
 ) -> Operation:
     do = draw.choices(list(weights), list(weights.values()))[0]
-    every = (*names, *keyed)
-    op: Operation = {"do": do, "name": draw.choice({"write": names, "stream": names, "put": keyed}.get(do, every))}
+    every = (*names, *timed)
+    op: Operation = {"do": do, "name": draw.choice({"write": names, "stream": names, "put": timed}.get(do, every))}
     if do == "put":
-        op["create"] = draw.random() < 0.5
+        op["create"] = op["name"] != "w" and draw.random() < 0.5  # a first batch makes no windows
         op["numbered"] = draw.random() < 0.5
         op["rows"] = draw.choice((1, 1, 1, 200))
         op |= _puts(draw)
@@ -147,8 +148,8 @@ def _operation(
             op["crowd"] = 400
     elif do == "create":
         op["max_points"] = draw.choice((0, 0, 2))
-        if op["name"] in keyed:
-            op |= _settings(draw)
+        if op["name"] in timed:
+            op |= _settings(draw, op["name"])
     elif do in ("rest", "tick"):
         op["seconds"] = 10 ** draw.uniform(-3, 0.8)
     elif do in ("recall", "watch"):
@@ -160,10 +161,11 @@ def _operation(
     return op
 
 
-def _settings(draw: random.Random) -> dict[str, Any]:
-    """Of a hull with keys; times in microseconds."""
-    settings: dict[str, Any] = {"by_event_time": draw.random() < 0.5}
-    if draw.random() < 0.8:
+def _settings(draw: random.Random, name: str) -> dict[str, Any]:
+    """Of a hull with keys or a window; times in microseconds."""
+    keyed = TIMED[name] != "multiset"
+    settings: dict[str, Any] = {"by_event_time": keyed and draw.random() < 0.5}
+    if draw.random() < 0.8 or not keyed:
         window = {"max_age": draw.choice((0, 300_000, 1_000_000)), "clock": draw.choice(("server", "data"))}
         window["max_points"] = draw.choice((0, 0, 2) if window["max_age"] else (1, 2))
         if draw.random() < 0.5:
@@ -173,7 +175,7 @@ def _settings(draw: random.Random) -> dict[str, Any]:
 
 
 def _puts(draw: random.Random) -> dict[str, Any]:
-    """What a batch does to keys; times in microseconds from now on."""
+    """What a batch does to keys, or to points with times; times in microseconds from now on."""
     puts: dict[str, Any] = {
         "keys": draw.sample(range(4), draw.randint(0, 3)),
         "removes": draw.sample(range(4), draw.choice((0, 0, 1, 2))),

@@ -18,7 +18,13 @@ PLANS = {"core": 500, "shell": 100, "sqlite": 10}
 # The first seed: other plans than those of the command line.
 FIRST = 5 * 10**6
 # Faults that are found in a second; `python -m simulation mutants` has all of them.
-QUICK = {"row02_discarded_while_creating", "row06_commit_thread_catches_one_kind", "row18_unknown_is_nothing"}
+QUICK = {
+    "clock_not_restored",
+    "row02_discarded_while_creating",
+    "row06_commit_thread_catches_one_kind",
+    "row18_unknown_is_nothing",
+    "together_in_two_commits",
+}
 
 
 @pytest.mark.parametrize("layer", PLANS)

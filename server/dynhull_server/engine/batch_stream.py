@@ -49,7 +49,8 @@ class BatchStream:
         request.to, request.name = self, stream.name
         if stream.hull is None:
             request.birth = self._birth()
-        request.arrived = self._engine.time()
+        if stream.hull is None or stream.hull.timed:
+            request.arrived = self._engine.time()
         self._engine.dispatch(request)
 
     def answer(self, request: Request) -> None:

@@ -75,7 +75,6 @@ class Expiries:
         """Report the outcome of a request; at a shutdown there is none."""
         if request.error is None:
             self.points += request.result
-            self._supervisor.succeeded("expiry")
         elif not isinstance(request.error, StoppingError):
             self._supervisor.failed("expiry", request.error)
 
@@ -363,10 +362,7 @@ class Engine:
         self._turns.submit(trip.run).add_done_callback(ran)
 
     def _examine(self, effect: Examine) -> None:
-        """Decide earlier commits in the committing thread if necessary, then read the hulls in another."""
-        if not effect.settle:
-            self._read_for(effect)
-            return
+        """Decide earlier commits in the committing thread, then read the hulls in another."""
 
         def settled(error: Exception | None, _: bool) -> None:
             if error is None:
@@ -411,7 +407,10 @@ class Engine:
 
     async def _tick(self) -> None:
         now = self._machine.clock.monotonic()
-        self.dispatch(Tick(now, self.time(), self._expiries))
+        time = self.time()
+        self.dispatch(Tick(now, time, self._expiries))
+        if self._supervisor.fails("expiry") and not self._core.expiring(time):  # `expiring` is O(hulls)
+            self._supervisor.succeeded("expiry")
         since = self._commits.since
         if since is not None and now - since > STUCK:
             self._supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))

@@ -171,7 +171,7 @@ class LiveHull:
         counts, (points, vertices, stored) = await self.read(
             lambda state: (state.hull.points(), state.vertices(), state.entities()), self.counts.points, min_revision
         )
-        return counts, await verify(points, vertices, stored, self._engine.aside)
+        return counts, await verify(points, vertices, self._engine.aside, stored)
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
         """A sample of at most `size` of the points. Writes continue meanwhile."""

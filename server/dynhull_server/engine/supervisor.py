@@ -10,7 +10,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from ..state.errors import RefusedError, StoppingError, words
+from ..state.errors import OutcomeUnknownError, RefusedError, StoppingError, words
 from ..storage.port import StorageError
 from .threads import Clock
 
@@ -140,4 +140,4 @@ class Supervisor:
         self._changed(reason)
 
 
-TRANSIENT = (OSError, StorageError, RefusedError, MemoryError)
+TRANSIENT = (OSError, StorageError, RefusedError, OutcomeUnknownError, MemoryError)

@@ -53,7 +53,7 @@ class Verification:
         return self.difference is None and self.keys_equal
 
 
-async def verify(points: Points, vertices: Points, entities: Contents | None, run: Run) -> Verification:
+async def verify(points: Points, vertices: Points, run: Run, entities: Contents | None = None) -> Verification:
     """Compare the vertices of a live hull with the hull of `points`, computed in a thread by `run`.
 
     With `entities`, the keys of a keyed hull, also compare their positions with `points`.

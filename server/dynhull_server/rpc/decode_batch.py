@@ -26,21 +26,13 @@ NO_STRINGS, NO_INTEGERS = PackedKeys(b"", b""), np.empty(0, np.uint64)
 
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch | KeyedBatch:
-    """A batch of points, or one of keys."""
+    """A batch of keys, or one of points, whose moves have equally many origins and destinations."""
+    if batch.HasField("puts") or batch.HasField("removes"):
+        keyed = _decode_keyed(batch)
+        if keyed is not None:
+            return keyed
     if batch.missing_points not in MISSING_POINT_POLICIES:
         raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy that this server supports")
-    if batch.missing_keys not in MISSING_KEY_POLICIES:
-        raise InvalidFieldError("batch.missing_keys", batch.missing_keys, "not a policy that this server supports")
-    keyed = _decode_keyed(batch) if batch.HasField("puts") or batch.HasField("removes") else None
-    if keyed is None:
-        return _decode_points(batch)
-    if batch.HasField("inserts") or batch.HasField("deletes") or batch.HasField("moves"):
-        raise InvalidFieldError("batch", "points and keys", "a batch has points without keys, or keys")
-    return keyed
-
-
-def _decode_points(batch: batch_pb2.Batch) -> Batch:
-    """A batch whose moves have equally many origins and destinations."""
     inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
     deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
     times = None
@@ -61,6 +53,8 @@ def _decode_points(batch: batch_pb2.Batch) -> Batch:
 
 def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
     """A batch of keys; None if it names no key."""
+    if batch.missing_keys not in MISSING_KEY_POLICIES:
+        raise InvalidFieldError("batch.missing_keys", batch.missing_keys, "not a policy that this server supports")
     puts = batch.puts
     keys = decode_keys(puts.keys, "batch.puts.keys")
     points = decode_points(puts.points, "batch.puts.points")
@@ -79,6 +73,8 @@ def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
     known = removes if keys is None else keys
     if known is None:
         return None
+    if batch.HasField("inserts") or batch.HasField("deletes") or batch.HasField("moves"):
+        raise InvalidFieldError("batch", "points and keys", "a batch has points without keys, or keys")
     strings = isinstance(known, PackedKeys)
     if removes is not None and isinstance(removes, PackedKeys) != strings:
         raise InvalidFieldError("batch.removes", "strings and integers", "all keys of a batch are of one kind")

@@ -195,6 +195,16 @@ class Core:
         queue = self._queues.get(name)
         return "absent" if queue is None else queue.state
 
+    def expiring(self, time: int) -> bool:
+        """Whether points are about to leave, or should have left by a time. O(hulls)."""
+        if self._due and self._due[0][0] <= time:
+            return True
+        for queue in self._queues.values():
+            requests = queue.waiting if queue.trip is None else [*queue.waiting, *queue.trip.requests]
+            if any(type(request) is Expire for request in requests):
+                return True
+        return False
+
     def restore(self, row: HullRow, state: HullState, unsaved: int) -> None:
         """Add a hull that the storage has kept. Call this before the first step."""
         hull = self._hulls[row.name] = Hull(row, state, unsaved)
@@ -205,7 +215,7 @@ class Core:
 
     def _asked(self, request: CreateHull | DeleteHull | Expire | ReadHull | WriteBatch, effects: list[Effect]) -> None:
         name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
-        queue = self._queue(name)
+        queue = self._queues.get(name) or self._queue(name)
         if queue.trip is None and not queue.waiting and not self._stopping and not request.abandoned:
             if request.rows <= SMALL and type(request) is ReadHull:
                 self._read(queue, request)
@@ -255,7 +265,8 @@ class Core:
                 effects.append(Commit(None, [Append(hull.row.number, records)]))
             hull.counts = hull.state.counts
             effects.append(Reply([request], () if applied.duplicate else (hull,)))
-            self._plan(hull)
+            if hull.timed:
+                self._plan(hull)
         elif hull.state.torn:
             trip = self._new_trip([queue], [request])
             trip.torn = True
@@ -450,7 +461,7 @@ class Core:
             assert hull is not None  # a trip without a hull changes nothing
             load = partial(HullState, self._limits, hull.row.settings, now=self._now)
             hulls.append((hull.row.number, load))
-        effects.append(Examine(trip, trip.unknown, hulls))
+        effects.append(Examine(trip, hulls))
 
     def _under_way(self, trip: Trip) -> bool:
         """Whether a trip is in progress; False where the server is stopping and did not wait for it."""

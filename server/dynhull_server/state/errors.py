@@ -139,6 +139,10 @@ class HullEmptyError(RefusedError):
         self.name = name
 
 
+class MisfitError(Exception):
+    """A batch is not of the kind that the hull takes; the message says what the hull has."""
+
+
 class HullUnsuitableError(RefusedError):
     """The request does not suit the hull: a batch of another kind, or a query undefined for its points.
 

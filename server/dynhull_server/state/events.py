@@ -250,16 +250,13 @@ class Commit:
 
 @dataclass(slots=True)
 class Examine:
-    """Read hulls from the storage; then send Examined, or NotExamined if one of them cannot be read.
-
-    With `settle`, decide a commit with an unknown outcome first.
+    """Decide commits with an unknown outcome, and read hulls; then send Examined, or NotExamined if that fails.
 
     Attributes:
         hulls: the number of each hull, and a function that makes its state of what is stored.
     """
 
     ticket: "Trip"
-    settle: bool
     hulls: "list[tuple[int, Callable[[Kept], HullState]]]"
 
 

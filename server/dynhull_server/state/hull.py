@@ -12,11 +12,12 @@ class Hull:
         state: its points; read and change them only in a trip of its queue.
         counts: the counts at the latest committed revision.
         unsaved: points in batches since the last snapshot.
+        timed: whether times matter: its points may leave by themselves.
         due: the time at which the core makes points leave, None where it has no such plan.
         ended: whether it has been deleted.
     """
 
-    __slots__ = ("counts", "due", "ended", "row", "state", "unsaved")
+    __slots__ = ("counts", "due", "ended", "row", "state", "timed", "unsaved")
 
     def __init__(self, row: HullRow, state: HullState, unsaved: int = 0) -> None:
         self.row = row
@@ -24,6 +25,7 @@ class Hull:
         self.counts: Counts = state.counts
         self.unsaved = unsaved
         self.ended = False
+        self.timed = row.settings.identity != "multiset" or row.settings.window is not None
         self.due: int | None = None
 
     @property

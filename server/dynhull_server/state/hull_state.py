@@ -12,7 +12,7 @@ from dynhull.arrays import Points
 
 from .batch import Applied
 from .contents import replayed
-from .errors import HullUnsuitableError, RefusedError
+from .errors import HullUnsuitableError, MisfitError, RefusedError
 from .history import History
 from .limits import Limits
 from .producers import Producers
@@ -87,7 +87,7 @@ class HullState:
         Raises:
             Exception: the batch is refused; nothing has changed.
         """
-        if not self.is_new(write, now):
+        if write.producer and not self.is_new(write, now):
             return self.duplicate()
         return self.apply_decoded(write, self.decoded(write), now, records)
 
@@ -107,11 +107,10 @@ class HullState:
 
     def decoded(self, write: "WriteBatch") -> Any:
         """The batch, admitted; raises the error that refuses it, unless that depends on the points of the hull."""
-        batch = write.make()
-        misfit = self.contents.misfit(batch)
-        if misfit:
-            raise HullUnsuitableError(write.name, misfit)
-        return self.contents.admit(batch, write.arrived)
+        try:
+            return self.contents.admit(write.make(), write.arrived)
+        except MisfitError as misfit:
+            raise HullUnsuitableError(write.name, str(misfit)) from None
 
     def checked(self, write: "WriteBatch") -> Any:
         """The batch, if it can be applied; raises the error that refuses it. O(k log n)."""
@@ -126,11 +125,12 @@ class HullState:
             Exception: the batch is refused; nothing has changed.
         """
         contents = self.contents
-        clock = contents.expires_before(batch)
         expired = 0
-        if clock is not None:
-            contents.check(batch)  # a refused batch makes no points leave
-            expired = self.expire(clock, records)
+        if contents.clock is not None:
+            clock = contents.expires_before(batch)
+            if clock is not None:
+                contents.check(batch)  # a refused batch makes no points leave
+                expired = self.expire(clock, records)
         self.torn = True
         try:
             applied, rows = contents.apply(batch, self.counts.revision + 1)
@@ -140,7 +140,7 @@ class HullState:
         if write.producer:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
         applied.expired = expired
-        self._applied("batch", hull_changed=applied.hull_changed)
+        self._applied(applied.points, "batch", hull_changed=applied.hull_changed)
         if records is not None:
             records.append(Record(applied.revision, rows, write.producer, write.sequence, contents.clock))
         self.torn = False
@@ -155,19 +155,19 @@ class HullState:
         self.torn = True
         rows = self.contents.expire(clock)
         if rows is not None:
-            self._applied("expiry", hull_changed=self.hull.changes != changes)
+            self._applied(len(self.hull), "expiry", hull_changed=self.hull.changes != changes)
             if records is not None:
                 records.append(Record(self.counts.revision, rows, clock=self.contents.clock))
         self.torn = False
         return 0 if rows is None else rows.points
 
-    def _applied(self, cause: Cause, *, hull_changed: bool) -> None:
+    def _applied(self, points: int, cause: Cause, *, hull_changed: bool) -> None:
         """Update the counts and the history after a change."""
         revision = self.counts.revision + 1
         if hull_changed:
             self._changed_at = revision
             self._history.changed(revision)
-        self.counts = Counts(revision, len(self.hull), self.hull.distinct, self.contents.clock, cause)
+        self.counts = Counts(revision, points, self.hull.distinct, self.contents.clock, cause)
 
     # Reads
 

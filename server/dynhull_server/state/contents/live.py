@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from dynhull import DynamicHull, KeyedHull, WindowHull
 
-from ..batch import Applied, Batch, KeyedBatch
+from ..batch import Applied
 from ..records import Contents, Expiry, Record, Rows
 
 AnyHull = DynamicHull | KeyedHull | WindowHull
@@ -30,17 +30,15 @@ class LiveContents(Protocol):
     def due(self) -> int | None:
         """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
 
-    def misfit(self, batch: Batch | KeyedBatch) -> str:
-        """Why a hull of this kind takes no such batch; empty if it does."""
-
     def admit(self, batch: Any, arrived: int) -> Any:
         """The batch with the times of its rows, without those that are too old. Changes nothing.
 
         Args:
-            batch: a batch that is no misfit.
+            batch: a Batch or a KeyedBatch.
             arrived: the time of its arrival by the server's clock, in microseconds since 1970.
 
         Raises:
+            MisfitError: a hull of this kind takes no such batch.
             RefusedError: the times are invalid, or the hull would have too many points.
         """
 
@@ -48,7 +46,7 @@ class LiveContents(Protocol):
         """Raise the error with which `apply` would refuse the batch."""
 
     def expires_before(self, admitted: Any) -> int | None:
-        """The clock that the batch leads to, if points leave at that time; None if none do."""
+        """The clock that the batch leads to, if points leave at that time; None if none do. The hull has a clock."""
 
     def apply(self, admitted: Any, revision: int) -> tuple[Applied, Rows]:
         """Apply the batch as `revision`. Returns its effect, and the rows that `replay` needs.

@@ -8,11 +8,13 @@ import numpy as np
 from dynhull import DynamicHull, MissingPointError
 
 from ..batch import Applied, Batch, KeyedBatch
-from ..errors import LimitExceededError, PointMissingError
+from ..errors import LimitExceededError, MisfitError, PointMissingError
 from ..records import Contents, Expiry, PointRows, Record
 
 # Batches are replayed as one set of up to this many points, which is many times faster.
 REPLAYED_TOGETHER = 65_536
+
+NO_KEYS = "has points without keys, which a batch inserts and deletes"
 
 
 class Multiset:
@@ -30,14 +32,15 @@ class Multiset:
     def __init__(self, stored: Contents, most_points: int) -> None:
         self.hull = DynamicHull(stored.points)
         self._most_points = most_points
+        self._points = len(self.hull)
 
-    def misfit(self, batch: Batch | KeyedBatch) -> str:
-        """Why a hull of this kind takes no such batch; empty if it does."""
-        return points_misfit(batch) or ("" if batch.times is None else NO_TIMES)
-
-    def admit(self, batch: Batch, _: int) -> Batch:
-        """The batch, or raise LimitExceededError."""
-        if len(self.hull) + batch.growth > self._most_points:
+    def admit(self, batch: Batch | KeyedBatch, _: int) -> Batch:
+        """The batch, or raise MisfitError or LimitExceededError."""
+        if isinstance(batch, KeyedBatch):
+            raise MisfitError(NO_KEYS)
+        if batch.times is not None:
+            raise MisfitError("has no window, so its points have no times")
+        if self._points + batch.growth > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
         return batch
 
@@ -59,7 +62,8 @@ class Multiset:
         to_delete, changes = len(batch.deletes), hull.changes
         deleted = apply_points(hull, batch)
         missing = to_delete - deleted
-        applied = Applied(revision, len(batch.inserts), deleted, missing, hull.changes != changes, len(hull))
+        self._points = points = len(hull)
+        applied = Applied(revision, len(batch.inserts), deleted, missing, hull.changes != changes, points)
         return applied, PointRows(batch.inserts, batch.deletes, missing > 0)
 
     def expire(self, _: int) -> Expiry | None:
@@ -74,18 +78,11 @@ class Multiset:
             ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
             missing: Literal["raise", "ignore"] = "ignore" if group[0].lenient else "raise"
             self.hull.apply(ops, np.concatenate([inserts, deletes]), missing)
+        self._points = len(self.hull)
 
     def stored(self) -> Contents:
         """The points. O(n)."""
         return Contents(self.hull.points())
-
-
-NO_TIMES = "has no window, so its points have no times"
-
-
-def points_misfit(batch: Batch | KeyedBatch) -> str:
-    """Why a hull without keys takes no such batch; empty if it does."""
-    return "has points without keys, which a batch inserts and deletes" if type(batch) is KeyedBatch else ""
 
 
 def apply_points(hull: DynamicHull, batch: Batch) -> int:

@@ -13,13 +13,13 @@ from dynhull.arrays import Points
 
 from ..admission import GREATEST_TIME, admit, too_old
 from ..batch import Applied, Batch, KeyedBatch
-from ..errors import InvalidBatchError, LimitExceededError
-from ..records import Contents, Expiry, HullSettings, PointRows, Record, Times
-from .multiset import apply_points, missing_point, points_misfit
+from ..errors import InvalidBatchError, LimitExceededError, MisfitError
+from ..records import Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
+from .multiset import NO_KEYS, REPLAYED_TOGETHER, apply_points, missing_point
 
 UNLIMITED = 2**63 - 1
 
-Rows = npt.NDArray[np.intp]
+RowNumbers = npt.NDArray[np.intp]
 
 
 @dataclass(slots=True)
@@ -69,12 +69,10 @@ class Windowed:
         oldest = self.hull.oldest if self.follows_server and self._window.max_age else None
         return None if oldest is None else int(oldest) + self._window.max_age
 
-    def misfit(self, batch: Batch | KeyedBatch) -> str:
-        """Why a hull of this kind takes no such batch; empty if it does."""
-        return points_misfit(batch)
-
-    def admit(self, batch: Batch, arrived: int) -> Admitted:
+    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
         """The batch with the times of its inserts, without those that are too old."""
+        if isinstance(batch, KeyedBatch):
+            raise MisfitError(NO_KEYS)
         rows, moves = len(batch.inserts), batch.moves
         if moves and not self.follows_server:
             problem = "event times drive the clock of this hull, and moves have none: delete and insert instead"
@@ -139,17 +137,33 @@ class Windowed:
         return Expiry(until, leaving)
 
     def replay(self, records: Iterable[Record]) -> None:
-        """Apply recorded changes."""
+        """Apply recorded changes, many at a time: inserts in succession have the effect of one batch."""
+        inserts: list[PointRows] = []
+        size = 0
         for record in records:
             rows = record.rows
-            if isinstance(rows, Expiry):
-                assert rows.until is not None  # only keys have deadlines
-                self.hull.expire(rows.until)
+            if isinstance(rows, PointRows) and not len(rows.deletes) and size < REPLAYED_TOGETHER:
+                inserts.append(rows)
+                size += len(rows)
             else:
-                assert isinstance(rows, PointRows)
-                assert rows.times is not None  # a hull with a window has times
-                self._carry_out(Batch(rows.inserts, rows.deletes, 0, rows.lenient), rows.times)
+                self._insert(inserts)
+                inserts, size = [], 0
+                self._replay_alone(rows)
             self.clock = record.clock
+        self._insert(inserts)
+
+    def _insert(self, rows: list[PointRows]) -> None:
+        if rows:
+            times = np.concatenate([_times(each) for each in rows])
+            self.hull.add(np.concatenate([each.inserts for each in rows]), times.astype(np.float64))
+
+    def _replay_alone(self, rows: Rows) -> None:
+        if isinstance(rows, Expiry):
+            assert rows.until is not None  # only keys have deadlines
+            self.hull.expire(rows.until)
+        else:
+            assert isinstance(rows, PointRows)
+            self._carry_out(Batch(rows.inserts, rows.deletes, 0, rows.lenient), _times(rows))
 
     def stored(self) -> Contents:
         """The points in the order in which they leave. O(n log n)."""
@@ -196,7 +210,12 @@ class Windowed:
             raise LimitExceededError("max_points", self._most_points)
 
 
-def _without_pairs(inserts: Points, deletes: Points) -> tuple[Rows, Rows]:
+def _times(rows: PointRows) -> Times:
+    assert rows.times is not None  # a hull with a window has times
+    return rows.times
+
+
+def _without_pairs(inserts: Points, deletes: Points) -> tuple[RowNumbers, RowNumbers]:
     """The rows of both without pairs of equal points: what a batch both inserts and deletes leaves no trace."""
     wanted = Counter(map(tuple, deletes.tolist()))
     entering = []
