@@ -10,10 +10,12 @@ import numpy as np
 
 from ._base import Hull
 from ._entities import Entities
+from ._implementation import kernel
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from . import _kernel
     from ._entities import Only
     from .arrays import Points
     from .keys import Keys, KeyType
@@ -69,9 +71,9 @@ class KeyedHull(Hull):
     """
 
     __slots__ = ()
-    _tree_type: ClassVar[type[Entities]] = Entities
+    _tree_type: ClassVar[type[Entities | _kernel.Entities]] = Entities if kernel is None else kernel.Entities
 
-    _tree: Entities
+    _tree: Entities | _kernel.Entities
 
     def __init__(self, key_type: KeyType = "str", *, ordered: bool = False) -> None:
         if key_type not in ("str", "int"):
@@ -186,7 +188,7 @@ class KeyedHull(Hull):
         most = operator.index(count)
         if most < 0:
             raise ValueError(f"count is {most}: must not be negative")
-        return self._tree.evict(most)
+        return self._tree.evict(min(most, len(self)))
 
     def clear(self) -> None:
         """Remove every entity."""

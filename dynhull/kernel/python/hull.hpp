@@ -20,6 +20,14 @@ inline HullTree tree_of(const nb::object& xy) {
   return tree_of(as_points(xy));
 }
 
+// Counter-clockwise from the least.
+inline std::vector<Point> vertices_of(const HullTree& tree) {
+  std::vector<Point> vertices = tree.chain(LOWER);
+  const std::vector<Point> upper = tree.chain(UPPER);
+  if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
+  return vertices;
+}
+
 class Hull {
  public:
   Hull() = default;
@@ -83,9 +91,7 @@ class Hull {
     std::vector<Point> vertices;
     {
       const ReadLock lock(lock_);
-      vertices = tree_.chain(LOWER);
-      const std::vector<Point> upper = tree_.chain(UPPER);
-      if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
+      vertices = vertices_of(tree_);
     }
     return array_of(std::move(vertices));
   }
@@ -183,7 +189,7 @@ class Hull {
     return {tree.used_bytes(), tree.reserved_bytes()};
   }
 
- private:
+ protected:
   static constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
   static constexpr Edge NO_EDGE = {{NOTHING, NOTHING}, {NOTHING, NOTHING}};
 
