@@ -1,6 +1,6 @@
 """The hull tree in C++, with the same results as the one in Python."""
 
-from typing import Annotated, overload
+from typing import Annotated, Any, overload
 
 import numpy
 from numpy.typing import NDArray
@@ -218,10 +218,10 @@ class Entities:
     def oldest(self) -> float | None:
         """The least time; None if no entity has one. O(n)."""
 
-    def keys_at(self, xy: object) -> list:
+    def keys_at(self, xy: object) -> list[Any]:
         """The least key at each place, None where there is none."""
 
-    def vertex_keys(self) -> list:
+    def vertex_keys(self) -> list[Any]:
         """The least key at each vertex, in the order of `vertices`."""
 
 def orientation(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> int:

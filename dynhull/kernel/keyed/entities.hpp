@@ -196,12 +196,15 @@ class Entities {
       if (!holds) throw std::logic_error(message);
     };
     std::vector<Point> places;
+    std::size_t bytes = 0;
     slots_.for_each([&](std::uint32_t slot) {
+      if (slots_.strings()) bytes += Arena::length(slots_[slot].key);
       places.push_back(slots_[slot].place);
       require(entry_of(slot) != NONE, "a key that is not found");
       require(!is_marked(slots_[slot].time), "a mark that was not taken away");
     });
     require(places.size() == slots_.size() && table_.size() == slots_.size(), "a lost slot or key");
+    require(bytes == slots_.arena().living(), "garbage miscounted");
     std::sort(places.begin(), places.end());
     auto place = places.begin();
     tree.for_each([&](Point p, std::uint64_t copies) {

@@ -80,11 +80,15 @@ class Hash {
 
   static std::uint32_t shortened(std::uint64_t hash) { return static_cast<std::uint32_t>(hash ^ (hash >> 32)); }
 
+#ifdef DYNHULL_HASH_SEED
+  static constexpr std::uint64_t seed_ = DYNHULL_HASH_SEED;  // the fuzzer's, so that a life can be lived again
+#else
   static std::uint64_t random_seed() {
     std::random_device entropy;
     return std::uint64_t{entropy()} << 32 | entropy();
   }
   static inline const std::uint64_t seed_ = random_seed();
+#endif
 };
 
 }  // namespace dynhull

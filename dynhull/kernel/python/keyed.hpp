@@ -19,11 +19,15 @@ using IntegerArray = Output<std::uint64_t>::Array;
 inline nb::object keys_module(const char* name) { return nb::module_::import_("dynhull.keys").attr(name); }
 inline nb::object entities_module(const char* name) { return nb::module_::import_("dynhull._entities").attr(name); }
 
-inline nb::object text_of(std::string_view key) { return nb::str(key.data(), key.size()); }
+inline std::string_view ascii_of(PyObject* text) {
+  return {static_cast<const char*>(PyUnicode_DATA(text)), static_cast<std::size_t>(PyUnicode_GET_LENGTH(text))};
+}
 
 // The keys of a batch, as far as they come in a plain form: an array of uint64, PackedKeys, or a list of strings.
 class GivenKeys {
  public:
+  static constexpr std::size_t MOST_KEY_BYTES = 255;
+
   static std::optional<GivenKeys> plain(const nb::object& keys, bool strings) {
     GivenKeys given;
     if (!strings) {
@@ -81,9 +85,7 @@ class GivenKeys {
       PyObject* const item = PyList_GET_ITEM(list.ptr(), static_cast<Py_ssize_t>(i));
       if (!PyUnicode_CheckExact(item)) return false;
       if (PyUnicode_IS_COMPACT_ASCII(item)) {
-        if (!append(
-                {static_cast<const char*>(PyUnicode_DATA(item)), static_cast<std::size_t>(PyUnicode_GET_LENGTH(item))}))
-          return false;
+        if (!append(ascii_of(item))) return false;
         continue;
       }
       const nb::object bytes = nb::steal(PyUnicode_AsUTF8String(item));
@@ -118,7 +120,6 @@ class GivenKeys {
     return type;
   }
 
-  static constexpr std::size_t MOST_KEY_BYTES = 255;
   static constexpr std::size_t LOOKAHEAD = 16;  // strings that are being prefetched
 
   std::size_t count_ = 0;
@@ -133,6 +134,15 @@ class KeyedHull : public Hull {
   // Calls `work` with one key, as given and as a Python object, both checked.
   template <class Work>
   auto with_key(const nb::object& key, Work work) {
+    if (strings() && PyUnicode_CheckExact(key.ptr()) && PyUnicode_IS_COMPACT_ASCII(key.ptr())) {
+      const std::string_view ascii = ascii_of(key.ptr());
+      if (0 < ascii.size() && ascii.size() <= GivenKeys::MOST_KEY_BYTES) return work(GivenKeys::of_string(ascii), key);
+    }
+    if (!strings() && PyLong_CheckExact(key.ptr())) {
+      const std::uint64_t number = PyLong_AsUnsignedLongLong(key.ptr());
+      if (!PyErr_Occurred()) return work(GivenKeys::of_integer(number), key);
+      PyErr_Clear();
+    }
     const nb::object checked = keys_module("as_key")(key, key_type());
     if (!strings()) {
       const auto number = nb::cast<std::uint64_t>(checked);
@@ -314,7 +324,7 @@ class KeyedHull : public Hull {
           list.append(nb::none());
         } else if (strings_) {
           const auto length = static_cast<std::uint8_t>(lengths_[next++]);
-          list.append(text_of({data_.data() + start, length}));
+          list.append(nb::str(data_.data() + start, length));
           start += length;
         } else {
           list.append(nb::int_(integers_[next++]));
@@ -346,6 +356,8 @@ class KeyedHull : public Hull {
   }
 
   double time_of(const nb::object& time) const {
+    if (PyFloat_CheckExact(time.ptr()) && std::isfinite(PyFloat_AS_DOUBLE(time.ptr())))
+      return PyFloat_AS_DOUBLE(time.ptr());
     if (!time.is_none()) return nb::cast<double>(nb::module_::import_("dynhull._times").attr("as_time")(time));
     if (ordered()) throw nb::value_error("time is None: a hull with ordered=True needs a time with every put");
     return NO_TIME;
