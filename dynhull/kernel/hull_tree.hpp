@@ -2,7 +2,8 @@
 // algorithm.
 //
 // Reading order: predicates/ (exact signs), tree/ (leaves, bridges, single updates), batch/ (many updates at once),
-// this file, query/. sort/ and memory/ serve them, static/ has the hulls of fixed points, python/ the bindings.
+// this file, query/. keyed/ names points by keys. sort/ and memory/ serve them, static/ has the hulls of fixed points,
+// python/ the bindings.
 #pragma once
 
 #include <optional>

@@ -11,45 +11,16 @@
 
 #include "keys.hpp"
 #include "names.hpp"
+#include "puts.hpp"
 
 namespace dynhull {
 
 enum class Only { ALL, ABSENT, PRESENT };
 
-// The numbers of rows of each kind.
-struct Counts {
-  std::int64_t fresh = 0, moved = 0, unmoved = 0, stale = 0, skipped = 0;
-};
-
 struct DuplicateKey {};  // thrown if a batch holds a key twice
 
 struct MissingKey {  // thrown if a batch removes a key that is not there
   std::size_t row;
-};
-
-// The places and times of a batch, checked and copied. Throws NotFinite.
-class Puts {
- public:
-  Puts(const Point* points, const double* times, bool or_none, std::size_t count)
-      : places_(count), times_(times != nullptr ? count : 0), timed_(times != nullptr) {
-    Plain plain;
-    for (std::size_t i = 0; i < count; ++i) places_[i] = plain(points[i]);
-    double strange = 0;
-    for (std::size_t i = 0; timed_ && i < count; ++i) {
-      const double time = times[i] + 0.0;  // turns -0.0 into 0.0
-      times_[i] = std::isnan(time) ? NO_TIME : time;
-      strange += or_none && std::isnan(time) ? 0 : time - time;
-    }
-    if (!plain.finite() || strange != 0) throw NotFinite();
-  }
-
-  Point& place(std::size_t row) { return places_[row]; }
-  double time(std::size_t row) const { return timed_ ? times_[row] : NO_TIME; }
-
- private:
-  Scratch<Point> places_;
-  Scratch<double> times_;
-  bool timed_;
 };
 
 class Entities {
@@ -62,7 +33,7 @@ class Entities {
   const Slots& slots() const { return slots_; }
   std::size_t size() const { return slots_.size(); }
 
-  // Visits the rows of a batch in order, with the tag and the slot of their key, or NONE, until `visit` returns false.
+  // Visits the rows of a batch in order, with the tag and the slot of their key, or NONE.
   template <class Keys, class Visit>
   void find(const Keys& keys, Visit visit) const {
     std::uint32_t tags[TOGETHER], entries[TOGETHER];
@@ -79,7 +50,7 @@ class Entities {
         const auto same = [&](std::uint32_t slot) { return keys.same(slots_.arena(), from + i, slots_[slot].key); };
         std::uint32_t entry = entries[i];
         while (entry != NONE && !same(table_.slot(entry))) entry = table_.next(entry, tags[i]);
-        if (!visit(from + i, tags[i], entry != NONE ? table_.slot(entry) : NONE)) return;
+        visit(from + i, tags[i], entry != NONE ? table_.slot(entry) : NONE);
       }
     }
   }
@@ -119,16 +90,7 @@ class Entities {
       throw;
     }
     batch.commit();
-    rename([&] {
-      for (std::size_t i = 0; i < count; ++i)
-        if (batch[i].moved && !batch[i].entered) names_->remove(batch[i].slot, puts.place(i));
-      std::size_t change = 0;
-      for (std::size_t i = 0; i < count; ++i) {
-        if (!batch[i].moved) continue;
-        change += !batch[i].entered;
-        names_->add(slots_, batch[i].slot, changes.place(change++));
-      }
-    });
+    rename([&] { rename_moved(batch, puts, changes, count); });
     return counts;
   }
 
@@ -168,27 +130,14 @@ class Entities {
     names_.reset();
   }
 
-  // Whether the names are known of all these places that are vertices. If not, `name` makes them known.
+  // Whether the names of all these places that are vertices are known. If not, `name` makes them known.
   bool named(const HullTree& tree, std::span<const Point> places) const {
-    if (!names_ || names_->outgrown()) return false;
-    return std::none_of(places.begin(), places.end(),
-                        [&](Point place) { return names_->inside(place) && is_vertex(tree, place); });
+    return names_ && names_->current(tree, places);
   }
   void name(const HullTree& tree) { names_ = std::make_unique<Names>(tree, slots_); }
 
-  // The slot of the least key at each place, or NONE, once these are named. Places that are inside cost a scan.
-  std::vector<std::uint32_t> least_at(std::span<const Point> places) const {
-    std::vector<std::uint32_t> least(places.size(), NONE);
-    bool scan = false;
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (names_->inside(places[i]))
-        scan = true;
-      else
-        least[i] = names_->at(slots_, places[i]);
-    }
-    if (scan) scan_for(places, least);
-    return least;
-  }
+  // The slot of the least key at each place, or NONE, once they are named.
+  std::vector<std::uint32_t> least_at(std::span<const Point> places) const { return names_->least_at(slots_, places); }
 
   // Throws std::logic_error unless the tree has the entities' points, and every key and name is found.
   void check(const HullTree& tree) const {
@@ -264,23 +213,18 @@ class Entities {
 
    private:
     void find(const Keys& keys) {
-      bool twice = false;
       entities_.find(keys, [&](std::size_t row, std::uint32_t tag, std::uint32_t slot) {
-        rows_[row] = {NO_TIME, slot, tag, false, false};
-        found_ = row + 1;
+        double time = NO_TIME;
         if (slot == NONE) {
           ++absent_;
           bytes_ += keys.bytes(row);
-          return true;
+        } else {
+          time = std::exchange(entities_.slots_[slot].time, std::bit_cast<double>(MARK));
+          if (is_marked(time)) throw DuplicateKey();
         }
-        twice = is_marked(entities_.slots_[slot].time);
-        if (twice)
-          --found_;
-        else
-          rows_[row].time = std::exchange(entities_.slots_[slot].time, std::bit_cast<double>(MARK));
-        return !twice;
+        rows_[row] = {time, slot, tag, false, false};
+        found_ = row + 1;
       });
-      if (twice) throw DuplicateKey();
     }
 
     void enter(const Keys& keys) {
@@ -308,45 +252,6 @@ class Entities {
     std::size_t found_ = 0, absent_ = 0, bytes_ = 0;
   };
 
-  // Rows for a batch of the tree.
-  class Changes {
-   public:
-    explicit Changes(std::size_t most) : ops_(most), places_(most) {}
-    void set(std::size_t row, std::int8_t op, Point place) const {
-      ops_[row] = op;
-      places_[row] = place;
-    }
-    Point place(std::size_t row) const { return places_[row]; }
-    void apply(HullTree& tree, std::size_t count, bool all_insert) const {
-      if (count > 0) tree.apply({ops_.data(), all_insert ? 0u : 1u}, places_.data(), count, false);
-    }
-
-   private:
-    Scratch<std::int8_t> ops_;
-    Scratch<Point> places_;
-  };
-
-  static bool is_vertex(const HullTree& tree, Point place) {
-    const Ref root = tree.nodes().root;
-    return root != NONE && (on_chain(tree.nodes(), root, UPPER, place) || on_chain(tree.nodes(), root, LOWER, place));
-  }
-
-  void scan_for(std::span<const Point> places, std::vector<std::uint32_t>& least) const {
-    SlotTable rows;  // of different places
-    rows.reserve(places.size());
-    const auto row_of = [&](Point place) {
-      const std::uint32_t entry = rows.find(Hash::of(place), [&](std::uint32_t row) { return places[row] == place; });
-      return entry == NONE ? NONE : rows.slot(entry);
-    };
-    for (std::uint32_t row = 0; row < places.size(); ++row)
-      if (row_of(places[row]) == NONE) rows.insert(Hash::of(places[row]), row);
-    slots_.for_each([&](std::uint32_t slot) {
-      const std::uint32_t row = row_of(slots_[slot].place);
-      if (row != NONE && (least[row] == NONE || slots_.less(slot, least[row]))) least[row] = slot;
-    });
-    for (std::uint32_t row = 0; row < places.size(); ++row) least[row] = least[row_of(places[row])];
-  }
-
   std::uint32_t entry_of(std::uint32_t slot) const {
     return table_.find(slots_.tag(slot), [slot](std::uint32_t other) { return other == slot; });
   }
@@ -363,6 +268,18 @@ class Entities {
     });
     for (std::size_t i = 0; i < count; ++i)
       if (slot(i) != NONE) forget(slot(i), slots_.tag(slot(i)));
+  }
+
+  template <class Rows>
+  void rename_moved(Rows& batch, Puts& puts, const Changes& changes, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      if (batch[i].moved && !batch[i].entered) names_->remove(batch[i].slot, puts.place(i));
+    std::size_t change = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!batch[i].moved) continue;
+      change += !batch[i].entered;
+      names_->add(slots_, batch[i].slot, changes.place(change++));
+    }
   }
 
   // Updates the names. If memory does not suffice they are dropped, and made anew by who asks for them.

@@ -21,14 +21,25 @@ class Names {
     laid_ = outside_;
   }
 
-  // Whether a place is inside the boxes, where nothing is known.
-  bool inside(Point place) const { return boxes_.holds(place); }
-  bool outgrown() const { return outside_ > 2 * laid_ + FEW; }
+  // Whether the names of all these places that are vertices are known.
+  bool current(const HullTree& tree, std::span<const Point> places) const {
+    if (outside_ > 2 * laid_ + FEW) return false;
+    return std::none_of(places.begin(), places.end(),
+                        [&](Point place) { return inside(place) && is_vertex(tree, place); });
+  }
 
-  // The slot of the least key at a place outside of the boxes, or NONE.
-  std::uint32_t at(const Slots& slots, Point place) const {
-    const std::uint32_t entry = find(slots, place);
-    return entry == NONE ? NONE : table_.slot(entry);
+  // The slot of the least key at each place, or NONE. A place inside the boxes costs a scan of all entities.
+  std::vector<std::uint32_t> least_at(const Slots& slots, std::span<const Point> places) const {
+    std::vector<std::uint32_t> least(places.size(), NONE);
+    bool complete = true;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (inside(places[i]))
+        complete = false;
+      else
+        least[i] = at(slots, places[i]);
+    }
+    if (!complete) scan(slots, places, least);
+    return least;
   }
 
   // An entity has come to its present place. All slots have theirs.
@@ -93,6 +104,35 @@ class Names {
       return slots->less(a.slot, b.slot);
     }
   };
+
+  bool inside(Point place) const { return boxes_.holds(place); }
+
+  static bool is_vertex(const HullTree& tree, Point place) {
+    const Ref root = tree.nodes().root;
+    return root != NONE && (on_chain(tree.nodes(), root, UPPER, place) || on_chain(tree.nodes(), root, LOWER, place));
+  }
+
+  std::uint32_t at(const Slots& slots, Point place) const {
+    const std::uint32_t entry = find(slots, place);
+    return entry == NONE ? NONE : table_.slot(entry);
+  }
+
+  // Finds the least key at each place without the table of names.
+  static void scan(const Slots& slots, std::span<const Point> places, std::vector<std::uint32_t>& least) {
+    SlotTable rows;  // of different places
+    rows.reserve(places.size());
+    const auto row_of = [&](Point place) {
+      const std::uint32_t entry = rows.find(Hash::of(place), [&](std::uint32_t row) { return places[row] == place; });
+      return entry == NONE ? NONE : rows.slot(entry);
+    };
+    for (std::uint32_t row = 0; row < places.size(); ++row)
+      if (row_of(places[row]) == NONE) rows.insert(Hash::of(places[row]), row);
+    slots.for_each([&](std::uint32_t slot) {
+      const std::uint32_t row = row_of(slots[slot].place);
+      if (row != NONE && (least[row] == NONE || slots.less(slot, least[row]))) least[row] = slot;
+    });
+    for (std::uint32_t row = 0; row < places.size(); ++row) least[row] = least[row_of(places[row])];
+  }
 
   std::uint32_t find(const Slots& slots, Point place) const {
     return table_.find(Hash::of(place), [&](std::uint32_t slot) { return slots[slot].place == place; });
