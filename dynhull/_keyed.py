@@ -236,11 +236,18 @@ class KeyedHull(Hull):
         return self._tree.oldest()
 
     def vertex_keys(self) -> list[str] | list[int]:
-        """The key at each vertex, in the order of `vertices`; the least one where several are. O(n)."""
+        """The key at each vertex, in the order of `vertices`; the least one where several are. O(h log n).
+
+        The first call takes O(n). From then on updates keep the names of places near the boundary, and O(n) comes
+        again only after the hull has changed much. The implementation in Python keeps no names: O(n) each time.
+        """
         return self._tree.vertex_keys()
 
     def keys_at(self, xy: npt.ArrayLike) -> list[str | None] | list[int | None]:
-        """The key at each of (k, 2) places: the least one where several are, None where there is none. O(n + k)."""
+        """The key at each of (k, 2) places: the least one where several are, None where there is none.
+
+        O(k) for vertices and other places near the boundary, like `vertex_keys`; O(n + k) if one place is far inside.
+        """
         return self._tree.keys_at(xy)
 
     # As a value
