@@ -175,12 +175,12 @@ class Entities:
     def ordered(self) -> bool:
         """Whether a put that is older than the entity changes nothing."""
 
-    def update(self, keys: object, xy: object, times: object | None, only: object | None) -> tuple[int, int, int, int, int]:
+    def update(self, keys: object | None, xy: object | None, times: object | None, only: object | None) -> tuple[int, int, int, int, int]:
         """
         Insert or move the entity of each row, as one batch. Returns the numbers of rows that were new, moved, unmoved, stale and skipped.
         """
 
-    def load(self, keys: object, xy: object, times: object | None) -> None:
+    def load(self, keys: object | None, xy: object | None, times: object | None) -> None:
         """Put all rows; a time that is NaN means none."""
 
     def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool:
@@ -191,7 +191,7 @@ class Entities:
         Remove one entity. True if the hull changed; MissingKeyError if there is none. O(log² n).
         """
 
-    def remove_many(self, keys: object, ignore_missing: bool) -> int:
+    def remove_many(self, keys: object | None, ignore_missing: bool) -> int:
         """Remove entities as one batch. Returns their number."""
 
     def expire(self, until: object | None) -> int:
@@ -206,10 +206,10 @@ class Entities:
     def position(self, key: object | None) -> tuple[float, float]:
         """The place of an entity. O(1)."""
 
-    def positions(self, keys: object) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+    def positions(self, keys: object | None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The place of each key, NaN where it is missing. O(1) a row."""
 
-    def times(self, keys: object) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+    def times(self, keys: object | None) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
         """The time of each key, NaN where there is none. O(1) a row."""
 
     def entities(self) -> tuple[dynhull.keys.Keys, dynhull.arrays.Points, dynhull.arrays.Points]:

@@ -118,29 +118,31 @@ void add_entities(nb::module_& module) {
       .def_prop_ro("key_type", &KeyedHull::key_type, nb::sig("def key_type(self) -> dynhull.keys.KeyType"),
                    "The kind of the keys, \"str\" or \"int\".")
       .def_prop_ro("ordered", &KeyedHull::ordered, "Whether a put that is older than the entity changes nothing.")
-      .def("update", &KeyedHull::update, "keys"_a, "xy"_a, "times"_a.none(), "only"_a.none(),
+      .def("update", &KeyedHull::update, "keys"_a.none(), "xy"_a.none(), "times"_a.none(), "only"_a.none(),
            "Insert or move the entity of each row, as one batch. Returns the numbers of rows that were new, moved, "
            "unmoved, stale and skipped.")
-      .def("load", &KeyedHull::load, "keys"_a, "xy"_a, "times"_a.none(), "Put all rows; a time that is NaN means none.")
+      .def("load", &KeyedHull::load, "keys"_a.none(), "xy"_a.none(), "times"_a.none(),
+           "Put all rows; a time that is NaN means none.")
       .def("put", &KeyedHull::put,
            nb::sig("def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool"),
            "key"_a.none(), "x"_a.none(), "y"_a.none(), "time"_a.none(), "only"_a.none(),
            "Insert or move one entity. True if the hull changed. O(log² n).")
       .def("remove", &KeyedHull::remove, "key"_a.none(),
            "Remove one entity. True if the hull changed; MissingKeyError if there is none. O(log² n).")
-      .def("remove_many", &KeyedHull::remove_many, "keys"_a, "ignore_missing"_a,
+      .def("remove_many", &KeyedHull::remove_many, "keys"_a.none(), "ignore_missing"_a,
            "Remove entities as one batch. Returns their number.")
       .def("expire", &KeyedHull::expire, "until"_a.none(), "Remove every entity with a time of at most `until`. O(n).")
       .def("evict", &KeyedHull::evict, "count"_a, "Remove the oldest entities, those without a time first. O(n).")
       .def("has", &KeyedHull::has, "key"_a.none(), "Whether there is an entity of the key. O(1).")
       .def("position", &KeyedHull::position, "key"_a.none(), "The place of an entity. O(1).")
-      .def("positions", &KeyedHull::positions, "keys"_a, "The place of each key, NaN where it is missing. O(1) a row.")
-      .def("times", &KeyedHull::times, "keys"_a, "The time of each key, NaN where there is none. O(1) a row.")
+      .def("positions", &KeyedHull::positions, "keys"_a.none(),
+           "The place of each key, NaN where it is missing. O(1) a row.")
+      .def("times", &KeyedHull::times, "keys"_a.none(), "The time of each key, NaN where there is none. O(1) a row.")
       .def("entities", &KeyedHull::entities,
            nb::sig("def entities(self) -> tuple[dynhull.keys.Keys, dynhull.arrays.Points, dynhull.arrays.Points]"),
            "Keys in order, places and times. O(n log n).")
       .def("oldest", &KeyedHull::oldest_of_all, "The least time; None if no entity has one. O(n).")
-      .def("keys_at", &KeyedHull::keys_at, nb::sig("def keys_at(self, xy: object) -> list[typing.Any]"), "xy"_a,
+      .def("keys_at", &KeyedHull::keys_at, nb::sig("def keys_at(self, xy: object) -> list[typing.Any]"), "xy"_a.none(),
            "The least key at each place, None where there is none.")
       .def("vertex_keys", &KeyedHull::vertex_keys, nb::sig("def vertex_keys(self) -> list[typing.Any]"),
            "The least key at each vertex, in the order of `vertices`.");
