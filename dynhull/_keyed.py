@@ -131,7 +131,7 @@ class KeyedHull(Hull):
         return self.update(keys, xy, times, only=only).new
 
     def update(
-        self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None, *, only: Only | None = None
+        self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None, only: Only | None = None
     ) -> Put:
         """Insert or move k entities as one batch. Returns how many rows did what. O(log² n) each.
 
