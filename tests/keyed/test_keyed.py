@@ -241,3 +241,26 @@ def test_pickles_pass_between_implementations(hull):
         assert again == hull
         assert again.changes == hull.changes
         again.check()
+
+
+def test_keys_of_unusual_memory(make):
+    """Unaligned, read-only, of the other byte order, of a class of the caller's own."""
+    unaligned = np.frombuffer(b"x" + np.arange(3, dtype=np.uint64).tobytes(), np.uint8)[1:].view(np.uint64)
+    assert not unaligned.flags.aligned
+
+    class Ids(np.ndarray):
+        pass
+
+    hull = make("int")
+    for keys in (unaligned, np.arange(3, dtype=">u8"), np.arange(3, dtype=np.uint64).view(Ids)):
+        hull.put_many(keys, [[0, 0], [1, 0], [0, 1]])
+        assert hull.positions(keys).tolist() == [[0, 0], [1, 0], [0, 1]]
+        assert hull.remove_many(keys) == 3
+
+    class Names(PackedKeys):
+        pass
+
+    named = make()
+    names = Names(b"\1\1", b"ab")
+    named.put_many(names, [[0, 0], [1, 0]])
+    assert named.remove_many(names) == 2

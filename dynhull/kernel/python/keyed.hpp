@@ -195,7 +195,7 @@ class KeyedHull : public Hull {
   std::pair<nb::object, GivenKeys> given_keys(const nb::object& keys) const {
     if (auto given = GivenKeys::plain(keys, strings())) return {keys, std::move(*given)};
     nb::object checked = keys_module("as_keys")(keys, key_type());
-    return {checked, *GivenKeys::plain(checked, strings())};
+    return {checked, GivenKeys::plain(checked, strings()).value()};
   }
 
   double time_of(const nb::object& time) const {
@@ -207,24 +207,32 @@ class KeyedHull : public Hull {
   }
 
   Counts put_all(const nb::object& keys, const nb::object& xy, const nb::object& times, Only only, bool or_none) {
+    if (const auto counts = put_plain(keys, xy, times, only, or_none)) return *counts;
+    const nb::object checked =
+        entities_module("checked_puts")(keys, xy, times, key_type(), ordered(), nb::arg("or_none") = or_none);
+    return put_plain(checked[0], checked[1], checked[2], only, or_none).value();
+  }
+
+  // Nothing unless all arguments are in a plain form, and the places and times are finite.
+  std::optional<Counts> put_plain(const nb::object& keys, const nb::object& xy, const nb::object& times, Only only,
+                                  bool or_none) {
     const std::optional<GivenKeys> given = GivenKeys::plain(keys, strings());
     Rows rows;
     Doubles moments;
-    const bool plain = given && is_plain_array(xy) && nb::try_cast(xy, rows, false) && given->size() == rows.shape(0) &&
-                       (times.is_none() ? !ordered()
-                                        : is_plain_array(times) && nb::try_cast(times, moments, false) &&
-                                              given->size() == moments.shape(0));
-    if (plain) try {
-        const WriteLock lock(lock_, given->size());
-        Puts puts(points_of(rows), times.is_none() ? nullptr : moments.data(), or_none, given->size());
-        return given->with(strings(), [&](const auto& batch) { return entities_.put(tree_, batch, puts, only); });
-      } catch (const NotFinite&) {  // checked below
-      } catch (const DuplicateKey&) {
-        duplicate(keys);
-      }
-    const nb::object checked =
-        entities_module("checked_puts")(keys, xy, times, key_type(), ordered(), nb::arg("or_none") = or_none);
-    return put_all(checked[0], checked[1], checked[2], only, or_none);
+    if (!given || !is_plain_array(xy) || !nb::try_cast(xy, rows, false) || given->size() != rows.shape(0)) return {};
+    if (times.is_none()
+            ? ordered()
+            : !is_plain_array(times) || !nb::try_cast(times, moments, false) || given->size() != moments.shape(0))
+      return {};
+    try {
+      const WriteLock lock(lock_, given->size());
+      Puts puts(points_of(rows), times.is_none() ? nullptr : moments.data(), or_none, given->size());
+      return given->with(strings(), [&](const auto& batch) { return entities_.put(tree_, batch, puts, only); });
+    } catch (const NotFinite&) {
+      return {};
+    } catch (const DuplicateKey&) {
+      duplicate(keys);
+    }
   }
 
   // Called with the lock held.
