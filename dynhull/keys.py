@@ -158,8 +158,8 @@ def as_keys(keys: Any, key_type: KeyType, name: str = "keys") -> Keys:
         key_type: "str" or "int".
         name: what error messages call the keys.
 
-    `PackedKeys` and contiguous, aligned uint64 arrays are returned as they are; neither these, nor pyarrow's strings, nor arrays
-    of integers need a Python object for each key. O(size of the keys).
+    `PackedKeys` and contiguous, aligned uint64 arrays are returned as they are. Neither these, nor pyarrow's strings,
+    nor arrays of integers need a Python object for each key. O(size of the keys).
 
     Raises:
         ValueError: a string is empty, longer than 255 bytes, or not UTF-8; an integer is negative or above 2**64 - 1;
