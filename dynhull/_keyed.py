@@ -130,9 +130,7 @@ class KeyedHull(Hull):
         """Insert or move k entities as one batch, like `update`. Returns the number of new keys."""
         return self.update(keys, xy, times, only=only).new
 
-    def update(
-        self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None, only: Only | None = None
-    ) -> Put:
+    def update(self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None, only: Only | None = None) -> Put:
         """Insert or move k entities as one batch. Returns how many rows did what. O(log² n) each.
 
         Args:
