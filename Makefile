@@ -37,6 +37,8 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 	for leaf in 4 62; do \
 		$(FUZZ) -DDYNHULL_LEAF=$$leaf tests/kernel/fuzz.cpp -o build/fuzz$$leaf \
 		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
+		$(FUZZ) -DDYNHULL_HASH_SEED=1 -DDYNHULL_LEAF=$$leaf tests/kernel/fuzz_keyed.cpp -o build/fuzz_keyed$$leaf \
+		&& build/fuzz_keyed$$leaf --seconds $(SECONDS) || exit 1; \
 	done
 	$(FUZZ) -DDYNHULL_LEAF=4 tests/kernel/fuzz_window.cpp -o build/fuzz_window && build/fuzz_window --seconds $(SECONDS)
 
@@ -55,7 +57,7 @@ format: .venv/.check  ## format the Python, C++ and proto files
 check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) tests/kernel/fuzz.cpp tests/kernel/fuzz_static.cpp tests/kernel/fuzz_window.cpp
+	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp)
 	$(BIN)/mypy
 	$(STUB) -o build/_kernel.pyi
 	diff build/_kernel.pyi dynhull/_kernel.pyi || (echo 'run `make stub`'; exit 1)

@@ -8,16 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from . import measure
-from ._implementation import kernel
 from ._nodes import LOWER, UPPER
 from ._shown import geometry, svg
-from ._tree import HullTree
 from .arrays import Points, as_directions, as_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from . import _kernel
+    from ._tree import HullTree
 
 T = TypeVar("T")
 
@@ -33,9 +32,9 @@ class Hull:
     __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
     dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
-    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
+    _tree_type: ClassVar[type[HullTree | _kernel.HullTree | _kernel.Entities]]
 
-    _tree: HullTree | _kernel.HullTree
+    _tree: HullTree | _kernel.HullTree | _kernel.Entities
     _measured: tuple[int, dict[str, Any]]
 
     # Contents

@@ -139,8 +139,7 @@ class Entities(HullTree):
             MissingKeyError: a key is missing and that is not ignored; nothing has changed.
             DuplicateKeyError: a key comes twice; nothing has changed.
         """
-        rows = _listed(as_keys(keys, self.key_type))
-        refuse_duplicates(rows)
+        rows = distinct(as_keys(keys, self.key_type))
         if not ignore_missing:
             for row, key in enumerate(rows):
                 if key not in self._held:
@@ -162,8 +161,7 @@ class Entities(HullTree):
         return self._remove_all(heapq.nsmallest(count, self._held, key=age))
 
     def _put_rows(self, keys: Keys, points: Points, times: npt.NDArray[np.float64] | None, only: Only | None) -> Counts:
-        rows = _listed(keys)
-        refuse_duplicates(rows)
+        rows = distinct(keys)
         return self._put(rows, as_tuples(points), [NO_TIME] * len(rows) if times is None else times.tolist(), only)
 
     def _put(self, keys: Sequence[Key], points: list[Point], times: list[float], only: Only | None) -> Counts:
@@ -288,15 +286,16 @@ def checked_puts(
     return checked, points, moments
 
 
-def refuse_duplicates(keys: Sequence[Key]) -> None:
-    """Raise DuplicateKeyError for the first row whose key came before. O(k)."""
-    if len(set(keys)) == len(keys):
-        return
-    rows: dict[Key, int] = {}
-    for row, key in enumerate(keys):
-        first = rows.setdefault(key, row)
-        if first != row:
-            raise DuplicateKeyError(key, (first, row))
+def distinct(keys: Keys) -> list[Any]:
+    """The keys of a batch as a list. Raises DuplicateKeyError for the first row whose key came before. O(k)."""
+    listed = _listed(keys)
+    if len(set(listed)) < len(listed):
+        rows: dict[Key, int] = {}
+        for row, key in enumerate(listed):
+            first = rows.setdefault(key, row)
+            if first != row:
+                raise DuplicateKeyError(key, (first, row))
+    return listed
 
 
 def _listed(keys: Keys) -> list[Any]:

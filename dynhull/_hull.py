@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
 from ._base import Hull
+from ._implementation import kernel
+from ._tree import HullTree
 from .arrays import Points, as_coordinate, as_operations, as_pairs
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from . import _kernel
 
 
 class MissingPointError(KeyError):
@@ -56,6 +60,9 @@ class DynamicHull(Hull):
     """
 
     __slots__ = ()
+    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
+
+    _tree: HullTree | _kernel.HullTree
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
         self._tree = self._tree_type(points)

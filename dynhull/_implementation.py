@@ -18,6 +18,7 @@ class _Kernel(Protocol):
     """What the package uses of the module `dynhull._kernel`. mypy compares it with the module's stub."""
 
     HullTree: "type[_kernel.HullTree]"
+    Entities: "type[_kernel.Entities]"
     WindowTree: "type[_kernel.WindowTree]"
 
     def plain_points(self, xy: object) -> "Points | None": ...

@@ -1,9 +1,12 @@
 """The hull tree in C++, with the same results as the one in Python."""
 
-from typing import Annotated, overload
+from typing import Annotated, Any, overload
 
 import numpy
 from numpy.typing import NDArray
+
+import dynhull.arrays
+import dynhull.keys
 
 
 class HullTree:
@@ -32,26 +35,8 @@ class HullTree:
     def count_many(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
         """The number of copies of each point. O(log n) a row."""
 
-    def insert(self, x: float, y: float) -> bool:
-        """Add a point. True if the hull changed. O(log² n)."""
-
-    def delete(self, x: float, y: float) -> bool:
-        """
-        Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).
-        """
-
     def clear(self) -> None:
         """Remove every point."""
-
-    @overload
-    def apply(self, op: int, xy: object, ignore_missing: bool, together: bool | None = None) -> int:
-        """Insert all rows (+1) or delete all rows (-1)."""
-
-    @overload
-    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], xy: object, ignore_missing: bool, together: bool | None = None) -> int:
-        """
-        Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and conquer (True) or one change after the other (False); by default the batch decides.
-        """
 
     def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """All points in lexicographic order, with multiplicity. O(n)."""
@@ -94,6 +79,150 @@ class HullTree:
     @property
     def memory(self) -> tuple[int, int]:
         """The bytes that the tree uses, and the bytes that it reserves."""
+
+    def insert(self, x: float, y: float) -> bool:
+        """Add a point. True if the hull changed. O(log² n)."""
+
+    def delete(self, x: float, y: float) -> bool:
+        """
+        Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).
+        """
+
+    @overload
+    def apply(self, op: int, xy: object, ignore_missing: bool, together: bool | None = None) -> int:
+        """Insert all rows (+1) or delete all rows (-1)."""
+
+    @overload
+    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], xy: object, ignore_missing: bool, together: bool | None = None) -> int:
+        """
+        Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and conquer (True) or one change after the other (False); by default the batch decides.
+        """
+
+class Entities:
+    """Entities and their convex hull: see dynhull's class in Python."""
+
+    def __init__(self, key_type: dynhull.keys.KeyType = 'str', ordered: bool = False) -> None: ...
+
+    def __len__(self) -> int: ...
+
+    @property
+    def distinct(self) -> int:
+        """The number of different points."""
+
+    @property
+    def changes(self) -> int:
+        """The number of updates that changed the hull."""
+
+    @changes.setter
+    def changes(self, arg: int, /) -> None: ...
+
+    def count(self, x: float, y: float) -> int:
+        """The number of copies of the point. O(log n)."""
+
+    def count_many(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
+        """The number of copies of each point. O(log n) a row."""
+
+    def clear(self) -> None:
+        """Remove every point."""
+
+    def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """All points in lexicographic order, with multiplicity. O(n)."""
+
+    def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The hull's vertices, counter-clockwise from the least. O(h log n)."""
+
+    def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The upper (0) or lower (1) chain from left to right. O(h log n)."""
+
+    def locate(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
+        """For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row."""
+
+    def support(self, directions: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """
+        The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row.
+        """
+
+    def tangents(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2, 2))]:
+        """
+        The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row.
+        """
+
+    def distance(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        The distance of each row to the hull, rounded once; infinite without points. O(log n) a row.
+        """
+
+    def intersect_lines(self, p: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], q: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2, 2))]:
+        """
+        Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. O(log n) a row.
+        """
+
+    def copy(self) -> Entities:
+        """An independent tree of the same points. O(n)."""
+
+    def check(self) -> None:
+        """Raise AssertionError if an invariant is broken. O(n log n)."""
+
+    @property
+    def memory(self) -> tuple[int, int]:
+        """The bytes that the tree uses, and the bytes that it reserves."""
+
+    @property
+    def key_type(self) -> dynhull.keys.KeyType:
+        """The kind of the keys, "str" or "int"."""
+
+    @property
+    def ordered(self) -> bool:
+        """Whether a put that is older than the entity changes nothing."""
+
+    def update(self, keys: object | None, xy: object | None, times: object | None, only: object | None) -> tuple[int, int, int, int, int]:
+        """
+        Insert or move the entity of each row, as one batch. Returns the numbers of rows that were new, moved, unmoved, stale and skipped.
+        """
+
+    def load(self, keys: object | None, xy: object | None, times: object | None) -> None:
+        """Put all rows; a time that is NaN means none."""
+
+    def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool:
+        """Insert or move one entity. True if the hull changed. O(log² n)."""
+
+    def remove(self, key: object | None) -> bool:
+        """
+        Remove one entity. True if the hull changed; MissingKeyError if there is none. O(log² n).
+        """
+
+    def remove_many(self, keys: object | None, ignore_missing: bool) -> int:
+        """Remove entities as one batch. Returns their number."""
+
+    def expire(self, until: object | None) -> int:
+        """Remove every entity with a time of at most `until`. O(n)."""
+
+    def evict(self, count: int) -> int:
+        """Remove the oldest entities, those without a time first. O(n)."""
+
+    def has(self, key: object | None) -> bool:
+        """Whether there is an entity of the key. O(1)."""
+
+    def position(self, key: object | None) -> tuple[float, float]:
+        """The place of an entity. O(1)."""
+
+    def positions(self, keys: object | None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The place of each key, NaN where it is missing. O(1) a row."""
+
+    def times(self, keys: object | None) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """The time of each key, NaN where there is none. O(1) a row."""
+
+    def entities(self) -> tuple[dynhull.keys.Keys, dynhull.arrays.Points, dynhull.arrays.Points]:
+        """Keys in order, places and times. O(n log n)."""
+
+    def oldest(self) -> float | None:
+        """The least time; None if no entity has one. O(n)."""
+
+    def keys_at(self, xy: object) -> list[Any]:
+        """The least key at each place, None where there is none."""
+
+    def vertex_keys(self) -> list[Any]:
+        """The least key at each vertex, in the order of `vertices`."""
 
 class WindowTree(HullTree):
     """

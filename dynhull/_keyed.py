@@ -10,10 +10,12 @@ import numpy as np
 
 from ._base import Hull
 from ._entities import Entities
+from ._implementation import kernel
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from . import _kernel
     from ._entities import Only
     from .arrays import Points
     from .keys import Keys, KeyType
@@ -69,9 +71,9 @@ class KeyedHull(Hull):
     """
 
     __slots__ = ()
-    _tree_type: ClassVar[type[Entities]] = Entities
+    _tree_type: ClassVar[type[Entities | _kernel.Entities]] = Entities if kernel is None else kernel.Entities
 
-    _tree: Entities
+    _tree: Entities | _kernel.Entities
 
     def __init__(self, key_type: KeyType = "str", *, ordered: bool = False) -> None:
         if key_type not in ("str", "int"):
@@ -128,9 +130,7 @@ class KeyedHull(Hull):
         """Insert or move k entities as one batch, like `update`. Returns the number of new keys."""
         return self.update(keys, xy, times, only=only).new
 
-    def update(
-        self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None, *, only: Only | None = None
-    ) -> Put:
+    def update(self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None, only: Only | None = None) -> Put:
         """Insert or move k entities as one batch. Returns how many rows did what. O(log² n) each.
 
         Args:
@@ -186,7 +186,7 @@ class KeyedHull(Hull):
         most = operator.index(count)
         if most < 0:
             raise ValueError(f"count is {most}: must not be negative")
-        return self._tree.evict(most)
+        return self._tree.evict(min(most, len(self)))
 
     def clear(self) -> None:
         """Remove every entity."""
@@ -234,11 +234,18 @@ class KeyedHull(Hull):
         return self._tree.oldest()
 
     def vertex_keys(self) -> list[str] | list[int]:
-        """The key at each vertex, in the order of `vertices`; the least one where several are. O(n)."""
+        """The key at each vertex, in the order of `vertices`; the least one where several are. O(h log n).
+
+        The first call takes O(n). From then on updates keep the names of places near the boundary, and O(n) comes
+        again only after the hull has changed much. The implementation in Python keeps no names: O(n) each time.
+        """
         return self._tree.vertex_keys()
 
     def keys_at(self, xy: npt.ArrayLike) -> list[str | None] | list[int | None]:
-        """The key at each of (k, 2) places: the least one where several are, None where there is none. O(n + k)."""
+        """The key at each of (k, 2) places: the least one where several are, None where there is none.
+
+        O(k) for vertices and other places near the boundary, like `vertex_keys`; O(n + k) if one place is far inside.
+        """
         return self._tree.keys_at(xy)
 
     # As a value

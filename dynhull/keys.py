@@ -166,8 +166,8 @@ def as_keys(keys: Any, key_type: KeyType, name: str = "keys") -> Keys:
         key_type: "str" or "int".
         name: what error messages call the keys.
 
-    `PackedKeys` and contiguous uint64 arrays are returned as they are; neither these, nor pyarrow's strings, nor arrays
-    of integers need a Python object for each key. O(size of the keys).
+    `PackedKeys` and contiguous, aligned uint64 arrays are returned as they are. Neither these, nor pyarrow's strings,
+    nor arrays of integers need a Python object for each key. O(size of the keys).
 
     Raises:
         ValueError: a string is empty, longer than 255 bytes, or not UTF-8; an integer is negative or above 2**64 - 1;
@@ -242,7 +242,7 @@ def _listed(keys: Any, name: str) -> list[Any] | tuple[Any, ...]:
 
 def _as_strings(keys: Any, name: str) -> PackedKeys:
     if isinstance(keys, PackedKeys):
-        return keys
+        return keys if type(keys) is PackedKeys else PackedKeys(keys.lengths, keys.data, name)
     if type(keys).__module__.split(".")[0] == "pyarrow":
         return _of_arrow(keys, name)
     return _packed(_listed(keys, name), name)
@@ -304,7 +304,7 @@ def _as_integers(keys: Any, name: str) -> npt.NDArray[np.uint64]:
             if negative.size:
                 raise ValueError(f"{name} row {negative[0]} is {array[negative[0]]}: {_a_key('int')}")
         if array.dtype.kind in "iu":
-            return np.ascontiguousarray(array, np.uint64)
+            return np.require(array, np.uint64, ("C", "A"))
     integers = _listed(keys, name)
     if set(map(type, integers)) <= {int} and (not integers or (min(integers) >= 0 and max(integers) <= LARGEST_KEY)):
         return np.array(integers, np.uint64)

@@ -2,8 +2,8 @@
 // algorithm.
 //
 // Reading order: predicates/ (exact signs), tree/ (leaves, bridges, single updates), batch/ (many updates at once),
-// this file, query/. sort/ and memory/ serve them, static/ has the hulls of fixed points,
-// window/ the order in which points expire, python/ the bindings.
+// this file, query/. keyed/ names points by keys, window/ has the order in which points expire. sort/ and memory/ serve
+// them, static/ has the hulls of fixed points, python/ the bindings.
 #pragma once
 
 #include <optional>

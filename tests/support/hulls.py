@@ -50,6 +50,12 @@ if kernel is not None:
 
     HULLS["cpp"] = KernelHull
 
+    class KernelKeyedHull(KeyedHull):
+        __slots__ = ()
+        _tree_type = kernel.Entities
+
+    KEYED_HULLS["cpp"] = KernelKeyedHull
+
 
 def chan_step_by_step(xy, collinear="drop"):
     """In Python, whether there is a kernel or not."""

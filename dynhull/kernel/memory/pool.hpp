@@ -59,6 +59,7 @@ class Pool {
   }
 
   std::size_t used() const { return used_ - freed_; }
+  std::uint32_t end() const { return used_; }  // greater than the number of every slot in use
   std::size_t reserved_bytes() const { return bytes(); }
 
   void swap(Pool& other) noexcept {

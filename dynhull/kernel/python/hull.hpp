@@ -20,6 +20,14 @@ inline HullTree tree_of(const nb::object& xy) {
   return tree_of(as_points(xy));
 }
 
+// Counter-clockwise from the least.
+inline std::vector<Point> vertices_of(const HullTree& tree) {
+  std::vector<Point> vertices = tree.chain(LOWER);
+  const std::vector<Point> upper = tree.chain(UPPER);
+  if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
+  return vertices;
+}
+
 class Hull {
  public:
   Hull() = default;
@@ -83,9 +91,7 @@ class Hull {
     std::vector<Point> vertices;
     {
       const ReadLock lock(lock_);
-      vertices = tree_.chain(LOWER);
-      const std::vector<Point> upper = tree_.chain(UPPER);
-      if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
+      vertices = vertices_of(tree_);
     }
     return array_of(std::move(vertices));
   }
@@ -184,28 +190,6 @@ class Hull {
   }
 
  protected:
-  // The tree, to read or to write while the caller holds the GIL.
-  const HullTree& settled() {
-    lock_.await_readable();
-    return tree_;
-  }
-  HullTree& writable() {
-    lock_.await_writable();
-    return tree_;
-  }
-
-  // The number of rows, or KeyError with the first row that deletes a missing point.
-  static std::int64_t rows_applied(const Applied& applied, const Rows& rows, bool ignore_missing) {
-    if (applied.first_missing < 0 || ignore_missing) return applied.rows;
-    const Point p = Plain()(points_of(rows)[applied.first_missing]);
-    PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y, applied.first_missing).ptr());
-    throw nb::python_error();
-  }
-
-  HullTree tree_;
-  ReadWriteLock lock_;
-
- private:
   static constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
   static constexpr Edge NO_EDGE = {{NOTHING, NOTHING}, {NOTHING, NOTHING}};
 
@@ -226,6 +210,24 @@ class Hull {
     return rows_applied(*applied, rows, ignore_missing);
   }
 
+  // The number of rows, or KeyError with the first row that deletes a missing point.
+  static std::int64_t rows_applied(const Applied& applied, const Rows& rows, bool ignore_missing) {
+    if (applied.first_missing < 0 || ignore_missing) return applied.rows;
+    const Point p = Plain()(points_of(rows)[applied.first_missing]);
+    PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y, applied.first_missing).ptr());
+    throw nb::python_error();
+  }
+
+  // The tree, to read or to write while the caller holds the GIL.
+  const HullTree& settled() {
+    lock_.await_readable();
+    return tree_;
+  }
+  HullTree& writable() {
+    lock_.await_writable();
+    return tree_;
+  }
+
   // Refreshes the index if that pays for the queries since the hull last changed.
   void refresh_index_for(std::size_t queries) {
     if (settled().version() != asked_version_) queries_ = 0;
@@ -236,6 +238,10 @@ class Hull {
     if (index_.stale(tree_, queries_)) index_.refresh(tree_, queries_);
   }
 
+  HullTree tree_;
+  ReadWriteLock lock_;
+
+ private:
   LocateIndex index_;
   std::uint64_t asked_version_ = 0, queries_ = 0;
 };

@@ -2,12 +2,13 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string_view.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
-#include "hull.hpp"
+#include "keyed.hpp"
 #include "window.hpp"
 
 using namespace nanobind::literals;
@@ -63,44 +64,89 @@ void translate_broken_invariant(const std::exception_ptr& error, void*) {
   }
 }
 
+// What hulls of points and of entities have in common.
+template <class Tree>
+nb::class_<Tree>& add_reads(nb::class_<Tree>& type) {
+  return type.def("__len__", &Tree::size)
+      .def_prop_ro("distinct", &Tree::distinct, "The number of different points.")
+      .def_prop_rw("changes", &Tree::changes, &Tree::set_changes, "The number of updates that changed the hull.")
+      .def("count", &Tree::count, nb::sig("def count(self, x: float, y: float) -> int"), "x"_a.none(), "y"_a.none(),
+           "The number of copies of the point. O(log n).")
+      .def("count_many", &Tree::count_many, "xy"_a, "The number of copies of each point. O(log n) a row.")
+      .def("clear", &Tree::clear, "Remove every point.")
+      .def("points", &Tree::points, "All points in lexicographic order, with multiplicity. O(n).")
+      .def("vertices", &Tree::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
+      .def("chain", &Tree::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
+      .def("locate", &Tree::locate, "xy"_a, "For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row.")
+      .def("support", &Tree::support, "directions"_a,
+           "The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row.")
+      .def("tangents", &Tree::tangents, "xy"_a,
+           "The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row.")
+      .def("distance", &Tree::distance, "xy"_a,
+           "The distance of each row to the hull, rounded once; infinite without points. O(log n) a row.")
+      .def("intersect_lines", &Tree::intersect_lines, "p"_a, "q"_a,
+           "Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. "
+           "O(log n) a row.")
+      .def("copy", &Tree::copy, "An independent tree of the same points. O(n).")
+      .def("check", &Tree::check, "Raise AssertionError if an invariant is broken. O(n log n).")
+      .def_prop_ro("memory", &Tree::memory, "The bytes that the tree uses, and the bytes that it reserves.");
+}
+
 void add_hull_tree(nb::module_& module) {
-  nb::class_<Hull>(module, "HullTree", "A multiset of points and its convex hull: see dynhull's tree in Python.")
+  nb::class_<Hull> type(module, "HullTree", "A multiset of points and its convex hull: see dynhull's tree in Python.");
+  add_reads(type)
       .def(
           "__init__", [](Hull* hull, nb::object xy) { new (hull) Hull(xy.is_none() ? HullTree() : tree_of(xy)); },
           "xy"_a = nb::none())
-      .def("__len__", &Hull::size)
-      .def_prop_ro("distinct", &Hull::distinct, "The number of different points.")
-      .def_prop_rw("changes", &Hull::changes, &Hull::set_changes, "The number of updates that changed the hull.")
-      .def("count", &Hull::count, nb::sig("def count(self, x: float, y: float) -> int"), "x"_a.none(), "y"_a.none(),
-           "The number of copies of the point. O(log n).")
-      .def("count_many", &Hull::count_many, "xy"_a, "The number of copies of each point. O(log n) a row.")
       .def("insert", &Hull::insert, nb::sig("def insert(self, x: float, y: float) -> bool"), "x"_a.none(), "y"_a.none(),
            "Add a point. True if the hull changed. O(log² n).")
       .def("delete", &Hull::remove, nb::sig("def delete(self, x: float, y: float) -> bool"), "x"_a.none(), "y"_a.none(),
            "Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).")
-      .def("clear", &Hull::clear, "Remove every point.")
       .def("apply", &Hull::apply_all, "op"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
            "Insert all rows (+1) or delete all rows (-1).")
       .def("apply", &Hull::apply_each, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
            "Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that "
            "deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and "
-           "conquer (True) or one change after the other (False); by default the batch decides.")
-      .def("points", &Hull::points, "All points in lexicographic order, with multiplicity. O(n).")
-      .def("vertices", &Hull::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
-      .def("chain", &Hull::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
-      .def("locate", &Hull::locate, "xy"_a, "For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row.")
-      .def("support", &Hull::support, "directions"_a,
-           "The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row.")
-      .def("tangents", &Hull::tangents, "xy"_a,
-           "The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row.")
-      .def("distance", &Hull::distance, "xy"_a,
-           "The distance of each row to the hull, rounded once; infinite without points. O(log n) a row.")
-      .def("intersect_lines", &Hull::intersect_lines, "p"_a, "q"_a,
-           "Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. "
-           "O(log n) a row.")
-      .def("copy", &Hull::copy, "An independent tree of the same points. O(n).")
-      .def("check", &Hull::check, "Raise AssertionError if an invariant is broken. O(n log n).")
-      .def_prop_ro("memory", &Hull::memory, "The bytes that the tree uses, and the bytes that it reserves.");
+           "conquer (True) or one change after the other (False); by default the batch decides.");
+}
+
+void add_entities(nb::module_& module) {
+  nb::class_<KeyedHull> type(module, "Entities", "Entities and their convex hull: see dynhull's class in Python.");
+  add_reads(type)
+      .def(nb::init<std::string_view, bool>(),
+           nb::sig("def __init__(self, key_type: dynhull.keys.KeyType = 'str', ordered: bool = False) -> None"),
+           "key_type"_a = "str", "ordered"_a = false)
+      .def_prop_ro("key_type", &KeyedHull::key_type, nb::sig("def key_type(self) -> dynhull.keys.KeyType"),
+                   "The kind of the keys, \"str\" or \"int\".")
+      .def_prop_ro("ordered", &KeyedHull::ordered, "Whether a put that is older than the entity changes nothing.")
+      .def("update", &KeyedHull::update, "keys"_a.none(), "xy"_a.none(), "times"_a.none(), "only"_a.none(),
+           "Insert or move the entity of each row, as one batch. Returns the numbers of rows that were new, moved, "
+           "unmoved, stale and skipped.")
+      .def("load", &KeyedHull::load, "keys"_a.none(), "xy"_a.none(), "times"_a.none(),
+           "Put all rows; a time that is NaN means none.")
+      .def("put", &KeyedHull::put,
+           nb::sig("def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool"),
+           "key"_a.none(), "x"_a.none(), "y"_a.none(), "time"_a.none(), "only"_a.none(),
+           "Insert or move one entity. True if the hull changed. O(log² n).")
+      .def("remove", &KeyedHull::remove, "key"_a.none(),
+           "Remove one entity. True if the hull changed; MissingKeyError if there is none. O(log² n).")
+      .def("remove_many", &KeyedHull::remove_many, "keys"_a.none(), "ignore_missing"_a,
+           "Remove entities as one batch. Returns their number.")
+      .def("expire", &KeyedHull::expire, "until"_a.none(), "Remove every entity with a time of at most `until`. O(n).")
+      .def("evict", &KeyedHull::evict, "count"_a, "Remove the oldest entities, those without a time first. O(n).")
+      .def("has", &KeyedHull::has, "key"_a.none(), "Whether there is an entity of the key. O(1).")
+      .def("position", &KeyedHull::position, "key"_a.none(), "The place of an entity. O(1).")
+      .def("positions", &KeyedHull::positions, "keys"_a.none(),
+           "The place of each key, NaN where it is missing. O(1) a row.")
+      .def("times", &KeyedHull::times, "keys"_a.none(), "The time of each key, NaN where there is none. O(1) a row.")
+      .def("entities", &KeyedHull::entities,
+           nb::sig("def entities(self) -> tuple[dynhull.keys.Keys, dynhull.arrays.Points, dynhull.arrays.Points]"),
+           "Keys in order, places and times. O(n log n).")
+      .def("oldest", &KeyedHull::oldest_of_all, "The least time; None if no entity has one. O(n).")
+      .def("keys_at", &KeyedHull::keys_at, nb::sig("def keys_at(self, xy: object) -> list[typing.Any]"), "xy"_a.none(),
+           "The least key at each place, None where there is none.")
+      .def("vertex_keys", &KeyedHull::vertex_keys, nb::sig("def vertex_keys(self) -> list[typing.Any]"),
+           "The least key at each vertex, in the order of `vertices`.");
 }
 
 void add_window_tree(nb::module_& module) {
@@ -195,6 +241,7 @@ NB_MODULE(_kernel, module) {
   module.doc() = "The hull tree in C++, with the same results as the one in Python.";
   nanobind::register_exception_translator(dynhull::translate_broken_invariant);
   dynhull::add_hull_tree(module);
+  dynhull::add_entities(module);
   dynhull::add_window_tree(module);
   dynhull::add_predicates(module);
   dynhull::add_arrays_and_static_hulls(module);

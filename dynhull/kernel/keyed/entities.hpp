@@ -1,0 +1,301 @@
+// Entities: points with a key and a time each. The reference in Python is dynhull/_entities.py.
+//
+// A batch of puts is one batch of the hull tree: the old places go, the new ones come. It runs in this order: find the
+// keys, make room, enter the new keys, exchange places and times with the batch's rows, apply the tree's batch, and
+// then what cannot fail. Whatever is refused or fails before that end is undone. A slot whose key the batch has found
+// bears a mark instead of its time, which finds a key that comes twice.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "keys.hpp"
+#include "names.hpp"
+#include "puts.hpp"
+
+namespace dynhull {
+
+enum class Only { ALL, ABSENT, PRESENT };
+
+struct DuplicateKey {};  // thrown if a batch holds a key twice
+
+struct MissingKey {  // thrown if a batch removes a key that is not there
+  std::size_t row;
+};
+
+class Entities {
+ public:
+  const bool ordered;
+
+  Entities(bool strings, bool ordered) : ordered(ordered), slots_(strings) {}
+  Entities(const Entities& other) : ordered(other.ordered), slots_(other.slots_), table_(other.table_) {}
+
+  const Slots& slots() const { return slots_; }
+  std::size_t size() const { return slots_.size(); }
+
+  // Visits the rows of a batch in order, with the tag and the slot of their key, or NONE.
+  template <class Keys, class Visit>
+  void find(const Keys& keys, Visit visit) const {
+    std::uint32_t tags[TOGETHER], entries[TOGETHER];
+    for (std::size_t from = 0; from < keys.size(); from += TOGETHER) {
+      const std::size_t count = std::min(TOGETHER, keys.size() - from);
+      for (std::size_t i = 0; i < count; ++i) table_.fetch(tags[i] = keys.tag(from + i));
+      for (std::size_t i = 0; i < count; ++i) {
+        entries[i] = table_.first(tags[i]);
+        if (entries[i] != NONE) prefetch(&slots_[table_.slot(entries[i])]);
+      }
+      for (std::size_t i = 0; i < count; ++i)
+        if (entries[i] != NONE) keys.fetch(slots_.arena(), slots_[table_.slot(entries[i])].key);
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto same = [&](std::uint32_t slot) { return keys.same(slots_.arena(), from + i, slots_[slot].key); };
+        std::uint32_t entry = entries[i];
+        while (entry != NONE && !same(table_.slot(entry))) entry = table_.next(entry, tags[i]);
+        visit(from + i, tags[i], entry != NONE ? table_.slot(entry) : NONE);
+      }
+    }
+  }
+
+  // Throws DuplicateKey; then, and after every other exception, nothing has changed.
+  template <class Keys>
+  Counts put(HullTree& tree, const Keys& keys, Puts& puts, Only only) {
+    const std::size_t count = keys.size();
+    Counts counts;
+    const Changes changes(2 * count);
+    Batch<Keys> batch(*this, keys);
+    std::size_t change = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      Found& row = batch[i];
+      if (i + LOOKAHEAD < count) prefetch(&slots_[batch[i + LOOKAHEAD].slot]);
+      if (row.entered ? only == Only::PRESENT : only == Only::ABSENT) {
+        ++counts.skipped;
+        batch.leave(row);
+      } else if (ordered && !row.entered && puts.time(i) < row.time) {
+        ++counts.stale;
+        batch.leave(row);
+      } else {
+        Slot& slot = slots_[row.slot];
+        slot.time = puts.time(i);
+        std::swap(slot.place, puts.place(i));
+        row.moved = row.entered || !(slot.place == puts.place(i));
+        ++(row.entered ? counts.fresh : row.moved ? counts.moved : counts.unmoved);
+        if (row.moved && !row.entered) changes.set(change++, -1, puts.place(i));
+        if (row.moved) changes.set(change++, +1, slot.place);
+      }
+    }
+    try {
+      changes.apply(tree, change, counts.moved == 0);
+    } catch (...) {
+      for (std::size_t i = 0; i < count; ++i)
+        if (batch[i].slot != NONE) slots_[batch[i].slot].place = puts.place(i);
+      throw;
+    }
+    batch.commit();
+    rename([&] { rename_moved(batch, puts, changes, count); });
+    return counts;
+  }
+
+  // Returns the number of entities removed. Throws DuplicateKey, and MissingKey unless missing keys are ignored.
+  template <class Keys>
+  std::int64_t remove(HullTree& tree, const Keys& keys, bool ignore_missing) {
+    const Changes changes(keys.size());
+    Batch<Keys> batch(*this, keys);
+    std::size_t change = 0;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      if (!batch[i].entered) {
+        changes.set(change++, -1, slots_[batch[i].slot].place);
+        continue;
+      }
+      if (!ignore_missing) throw MissingKey{i};
+      batch.leave(batch[i]);
+    }
+    changes.apply(tree, change, false);
+    batch.commit();
+    forget(keys.size(), [&](std::size_t i) { return batch[i].slot; });
+    return static_cast<std::int64_t>(change);
+  }
+
+  // Removes the entities of these slots.
+  void remove(HullTree& tree, std::span<const std::uint32_t> slots) {
+    const Changes changes(slots.size());
+    for (std::size_t i = 0; i < slots.size(); ++i) changes.set(i, -1, slots_[slots[i]].place);
+    changes.apply(tree, slots.size(), false);
+    forget(slots.size(), [&](std::size_t i) { return slots[i]; });
+  }
+
+  void clear(HullTree& tree) {
+    Entities empty(slots_.strings(), ordered);
+    tree.clear();
+    std::swap(slots_, empty.slots_);
+    table_.swap(empty.table_);
+    names_.reset();
+  }
+
+  // Whether the names of all these places that are vertices are known. If not, `name` makes them known.
+  bool named(const HullTree& tree, std::span<const Point> places) const {
+    return names_ && names_->current(tree, places);
+  }
+  void name(const HullTree& tree) { names_ = std::make_unique<Names>(tree, slots_); }
+
+  // The slot of the least key at each place, or NONE, once they are named.
+  std::vector<std::uint32_t> least_at(std::span<const Point> places) const { return names_->least_at(slots_, places); }
+
+  // Throws std::logic_error unless the tree has the entities' points, and every key and name is found.
+  void check(const HullTree& tree) const {
+    const auto require = [](bool holds, const char* message) {
+      if (!holds) throw std::logic_error(message);
+    };
+    std::vector<Point> places;
+    std::size_t bytes = 0;
+    slots_.for_each([&](std::uint32_t slot) {
+      if (slots_.strings()) bytes += Arena::length(slots_[slot].key);
+      places.push_back(slots_[slot].place);
+      require(entry_of(slot) != NONE, "a key that is not found");
+      require(!is_marked(slots_[slot].time), "a mark that was not taken away");
+    });
+    require(places.size() == slots_.size() && table_.size() == slots_.size(), "a lost slot or key");
+    require(bytes == slots_.arena().living(), "garbage miscounted");
+    std::sort(places.begin(), places.end());
+    auto place = places.begin();
+    tree.for_each([&](Point p, std::uint64_t copies) {
+      for (; copies > 0; --copies) require(place != places.end() && *place++ == p, "a point without its entity");
+    });
+    require(place == places.end(), "an entity without its point");
+    if (names_) names_->check(slots_);
+  }
+
+  std::size_t bytes() const { return slots_.bytes() + table_.bytes() + (names_ ? names_->bytes() : 0); }
+
+ private:
+  static constexpr std::size_t TOGETHER = 16;   // keys whose cache misses overlap
+  static constexpr std::size_t LOOKAHEAD = 16;  // rows whose slot is being prefetched
+
+  // A NaN that is the time of no entity.
+  static constexpr std::uint64_t MARK = 0x7ff8000000000001;
+  static bool is_marked(double time) { return std::bit_cast<std::uint64_t>(time) == MARK; }
+
+  // A row of a batch: the slot of its key, NONE if the row changes nothing, and the slot's time before.
+  struct Found {
+    double time;
+    std::uint32_t slot, tag;
+    bool entered;  // by this batch
+    bool moved;
+  };
+
+  // Finds all keys of a batch, and enters those that are not there. Undoes that in the end, unless it was committed.
+  template <class Keys>
+  class Batch {
+   public:
+    Batch(Entities& entities, const Keys& keys) : entities_(entities), rows_(keys.size()) {
+      try {
+        find(keys);
+        enter(keys);
+      } catch (...) {
+        undo();
+        throw;
+      }
+    }
+    Batch(const Batch&) = delete;
+    ~Batch() { undo(); }
+
+    Found& operator[](std::size_t row) { return rows_[row]; }
+
+    // Leaves the entity of a row as it was before.
+    void leave(Found& row) {
+      if (row.slot == NONE) return;
+      if (row.entered)
+        entities_.forget(row.slot, row.tag);
+      else
+        entities_.slots_[row.slot].time = row.time;
+      row = {NO_TIME, NONE, 0, false, false};
+    }
+
+    void commit() { found_ = 0; }
+
+   private:
+    void find(const Keys& keys) {
+      entities_.find(keys, [&](std::size_t row, std::uint32_t tag, std::uint32_t slot) {
+        double time = NO_TIME;
+        if (slot == NONE) {
+          ++absent_;
+          bytes_ += keys.bytes(row);
+        } else {
+          time = std::exchange(entities_.slots_[slot].time, std::bit_cast<double>(MARK));
+          if (is_marked(time)) throw DuplicateKey();
+        }
+        rows_[row] = {time, slot, tag, false, false};
+        found_ = row + 1;
+      });
+    }
+
+    void enter(const Keys& keys) {
+      if (absent_ == 0) return;
+      entities_.slots_.reserve(absent_, bytes_);
+      entities_.table_.reserve(absent_);
+      for (std::size_t i = 0; i < keys.size(); ++i) {
+        if (rows_[i].slot != NONE) continue;
+        const auto same = [&](std::uint32_t slot) {
+          return keys.same(entities_.slots_.arena(), i, entities_.slots_[slot].key);
+        };
+        if (entities_.table_.find(rows_[i].tag, same) != NONE) throw DuplicateKey();
+        rows_[i].slot = entities_.slots_.take(keys, i);
+        rows_[i].entered = true;
+        entities_.table_.insert(rows_[i].tag, rows_[i].slot);
+      }
+    }
+
+    void undo() {
+      for (std::size_t i = 0; i < found_; ++i) leave(rows_[i]);
+    }
+
+    Entities& entities_;
+    Scratch<Found> rows_;
+    std::size_t found_ = 0, absent_ = 0, bytes_ = 0;
+  };
+
+  std::uint32_t entry_of(std::uint32_t slot) const {
+    return table_.find(slots_.tag(slot), [slot](std::uint32_t other) { return other == slot; });
+  }
+  void forget(std::uint32_t slot, std::uint32_t tag) {
+    table_.erase(table_.find(tag, [slot](std::uint32_t other) { return other == slot; }));
+    slots_.give_back(slot);
+  }
+  // Forgets entities that the tree does not hold any more; `slot` may return NONE.
+  template <class SlotOf>
+  void forget(std::size_t count, SlotOf slot) {
+    rename([&] {
+      for (std::size_t i = 0; i < count; ++i)
+        if (slot(i) != NONE) names_->remove(slot(i), slots_[slot(i)].place);
+    });
+    for (std::size_t i = 0; i < count; ++i)
+      if (slot(i) != NONE) forget(slot(i), slots_.tag(slot(i)));
+  }
+
+  template <class Rows>
+  void rename_moved(Rows& batch, Puts& puts, const Changes& changes, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      if (batch[i].moved && !batch[i].entered) names_->remove(batch[i].slot, puts.place(i));
+    std::size_t change = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!batch[i].moved) continue;
+      change += !batch[i].entered;
+      names_->add(slots_, batch[i].slot, changes.place(change++));
+    }
+  }
+
+  // Updates the names. If memory does not suffice they are dropped, and made anew by who asks for them.
+  template <class Update>
+  void rename(Update update) {
+    if (!names_) return;
+    try {
+      update();
+    } catch (const std::bad_alloc&) {
+      names_.reset();
+    }
+  }
+
+  Slots slots_;
+  SlotTable table_;
+  std::unique_ptr<Names> names_;
+};
+
+}  // namespace dynhull
