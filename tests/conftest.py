@@ -15,7 +15,7 @@ settings.load_profile("dynhull")
 
 @pytest.fixture(scope="session")
 def address() -> Iterator[str]:
-    """A server that tests share: each uses hulls of its own."""
+    """A server that tests share; each test uses hulls of its own."""
     with server_process() as server:
         yield server.address
 

@@ -1,4 +1,4 @@
-"""The commands that ask: query, watch, verify, top, bench. What they print, for people and pipes, and how they end."""
+"""The reading commands: query, watch, verify, top, bench. Their output, for people and pipes, and their exit codes."""
 
 import hashlib
 import json

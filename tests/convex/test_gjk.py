@@ -130,7 +130,7 @@ def bodies():
 
 
 def test_cylinders_and_cones_against_their_sections():
-    """A point lies to a solid of revolution as it lies to the section in one plane with it."""
+    """A solid of revolution is as far from a point as its section in the plane through the point and the axis."""
     random = np.random.default_rng(4)
     for _ in range(40):
         base, top = random.normal(size=(2, 3))
@@ -244,7 +244,7 @@ def test_bad_input(ask, message):
 
 
 def test_a_sliver_beside_the_origin():
-    """Ends so far away that their weighted sums are off by more than the distance."""
+    """Ends so far away that the error of their weighted sums exceeds the distance."""
     sliver = [(1166548778139278.0, 0.0), (1.0, 0.0), (-1.4295695843808416e16, 256955.0)]
     distance = float(root(oracle.polygons([(0.0, 0.0)], sliver)))
     assert contact(point([0, 0]), polygon(sliver)).distance == pytest.approx(distance, rel=1e-9)

@@ -1,4 +1,4 @@
-"""The kernel and the reference live the same lives and answer the same, to the last bit."""
+"""The kernel and the reference give the same answers after the same operations, to the last bit."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ def outcome(action, *arguments):
 
 @dataclass
 class Both:
-    """Two trees that are asked the same."""
+    """Two trees that run the same operations."""
 
     reference: tree.HullTree
     kernel: _kernel.HullTree

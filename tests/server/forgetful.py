@@ -1,4 +1,4 @@
-"""Runs the command that follows, with hulls that forget their first vertex: for the tests of what notices that."""
+"""Runs the command in its arguments with hulls that omit their first vertex, to test what detects a wrong hull."""
 
 import runpy
 import sys

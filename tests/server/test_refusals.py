@@ -175,7 +175,7 @@ def test_invalid_arguments_are_named(stub: HullServiceStub, hull: str, case: str
 
 
 def finish(response: object) -> object:
-    """A unary response as it is; all of a stream."""
+    """A unary response, or the list of a stream's responses."""
     return list(response) if isinstance(response, Iterator) else response
 
 

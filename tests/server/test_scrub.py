@@ -1,4 +1,4 @@
-"""The background scrub finds a hull that is wrong, and leaves alone what it has seen."""
+"""The background scrub finds a wrong hull, and does not compare a revision twice."""
 
 import asyncio
 import sys
@@ -28,7 +28,7 @@ class Liar(DynamicHull):
 
 
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:
-    """What so many rounds of a scrub compare."""
+    """The comparisons that `number` rounds of a scrub make."""
     seen: list[tuple[str, Verification]] = []
     scrub = Scrub(engine, Machine().clock, 1.0, lambda hull, outcome: seen.append((hull.name, outcome)))
     for _ in range(number):

@@ -1,4 +1,4 @@
-"""The test of the test: each patch in mutants/ puts back in a fault that was there once. Is it found, and how soon?"""
+"""Tests of the simulation: each patch in mutants/ restores a fault of the past. Is it found, after how many lives?"""
 
 import re
 import shutil
@@ -21,7 +21,7 @@ SEED = 1
 
 @dataclass(frozen=True, slots=True)
 class Hunt:
-    """How a fault was looked for: after how many lives it was found, None where it was not, and as what."""
+    """The search for a fault: the number of lives until it was found, or None, and the finding."""
 
     name: str
     lives: int | None
@@ -30,7 +30,7 @@ class Hunt:
 
 
 def fits(patch: Path) -> None:
-    """Raise RuntimeError where a patch does not fit the code any more."""
+    """Raise RuntimeError if a patch no longer applies to the code."""
     with tempfile.TemporaryDirectory() as folder:
         _put_in(patch, Path(folder))
 
@@ -70,7 +70,7 @@ def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
 
 
 def report(names: list[str]) -> int:
-    """Look for each, and say after how many lives it was found. Exit code 1 where one was not."""
+    """Search for each fault, and print after how many lives it was found. Exit code 1 if one was not."""
     missed = 0
     for patch in PATCHES:
         if names and patch.stem not in names:

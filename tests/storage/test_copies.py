@@ -40,7 +40,7 @@ def run(*command, **more):
 
 
 def done(*command, says):
-    """A command that ends well, with these last words."""
+    """Run a command that must succeed; `says` is its last line."""
     finished = run(*command)
     assert finished.returncode == 0, finished.stderr
     assert finished.stdout.splitlines()[-1] == says
@@ -48,7 +48,7 @@ def done(*command, says):
 
 
 def refused(*command, says):
-    """A command that ends with a line that says why."""
+    """Run a command that must fail; `says` is in its error message."""
     finished = run(*command)
     assert finished.returncode == 1
     assert says in finished.stderr
@@ -56,7 +56,7 @@ def refused(*command, says):
 
 
 def served(folder, last, number=1):
-    """What a server makes of a folder."""
+    """Open a folder as a server does, and check what it holds."""
     storage, contents = opened(folder)
     same(storage.read(number).records, records(1, last))
     storage.close()
