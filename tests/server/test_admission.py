@@ -359,11 +359,33 @@ def test_metrics_for_other_machines_only_with_tls_and_tokens_or_when_told(
         assert server.process.stdout.readline().startswith("metrics on http://0.0.0.0:")
 
 
+def test_metrics_for_other_machines_need_the_client_certificate_that_calls_need(
+    tmp_path: Path, tokens: Tokens, certificate: list[str], authority: trustme.CA
+) -> None:
+    authority.cert_pem.write_to_path(tmp_path / "ca.pem")
+    tokens.write(all=([""], []))
+    options = ("--tokens", str(tokens.path), *certificate, "--tls-client-ca", str(tmp_path / "ca.pem"))
+    with server_process(*options, "--metrics-host", "0.0.0.0", "--metrics-port", "0") as server:
+        port = server.process.stdout.readline().rsplit(":", 1)[1].split("/")[0]
+        asked = urllib.request.Request(f"https://127.0.0.1:{port}/metrics", headers={"Authorization": "Bearer all"})
+        with pytest.raises(OSError, match="certificate required"):
+            urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting(authority)).close()
+        with urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting(authority, authority)) as response:
+            assert response.status == 200
+
+
+def trusting(authority: trustme.CA, issuer: trustme.CA | None = None) -> ssl.SSLContext:
+    """Trusts servers with a certificate of the authority; presents one of the issuer, if any."""
+    context = ssl.create_default_context(cadata=authority.cert_pem.bytes().decode())
+    if issuer is not None:
+        issuer.issue_cert("client@example.org").configure_cert(context)
+    return context
+
+
 def test_metrics_for_other_machines_are_for_who_may_read_everything(
     tokens: Tokens, certificate: list[str], authority: trustme.CA
 ) -> None:
     tokens.write(all=([""], []), some=(["a"], [""]))
-    trusting = ssl.create_default_context(cadata=authority.cert_pem.bytes().decode())
     options = ("--tokens", str(tokens.path), *certificate, "--metrics-host", "0.0.0.0", "--metrics-port", "0")
     with server_process(*options, complaints="UNAUTHENTICATED") as server:
         port = re.fullmatch(r"metrics on https://0.0.0.0:(\d+)/metrics\n", server.process.stdout.readline()).group(1)
@@ -371,7 +393,7 @@ def test_metrics_for_other_machines_are_for_who_may_read_everything(
         def page(token: str | None) -> str:
             headers = {} if token is None else {"Authorization": f"Bearer {token}"}
             asked = urllib.request.Request(f"https://127.0.0.1:{port}/metrics", headers=headers)
-            with urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting) as response:
+            with urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting(authority)) as response:
                 return response.read().decode()
 
         # A connection that sends nothing delays no other caller.

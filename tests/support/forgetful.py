@@ -5,6 +5,8 @@ import sys
 
 from dynhull import DynamicHull
 
+FORGETFUL = [sys.executable, __file__]
+
 if __name__ == "__main__":
     right = DynamicHull.vertices
     DynamicHull.vertices = lambda self: right(self)[1:]
