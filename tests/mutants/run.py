@@ -32,7 +32,10 @@ MODULES = [
     *(f"dynhull/_{name}.py" for name in ("predicates", "nodes", "tree")),
     *(f"dynhull/static/_{name}.py" for name in ("boundary", "graham", "jarvis", "monotone_chain", "chan")),
 ]
-TESTS = ["static/test_static.py", "core/test_predicates.py", "core/test_stateful.py", "core/test_hull.py"]
+TESTS = [
+    *(f"core/test_{name}.py" for name in ("hull", "predicates", "check", "stateful")),
+    "static/test_static.py",
+]
 SLOW = "100000 or splits_and_merges or perturbation"
 COMPARISON = "(Gt|GtE|Lt|LtE|Eq|NotEq)"
 OPERATORS = re.compile(
@@ -46,19 +49,20 @@ MEMORY = 4_000_000  # KiB
 FAILED = re.compile(r"\d+ (failed|error)")
 
 
-def test_command(seconds: int) -> str:
-    """Stops at the first failure; the same examples for every mutant."""
+def test_command(seconds: int, mutations: Sequence[MutationSpec]) -> str:
+    """Stops at the first failure; the same examples for every mutant, in the order that finds it soonest."""
+    static = any(mutation.module_path.parent.name == "static" for mutation in mutations)
     limited = ["sh", "-c", f'ulimit -t {seconds} && ulimit -v {MEMORY} && exec "$@"', "sh"]
     environment = ["env", "DYNHULL_KERNEL=python", "PYTHONPATH=."]
     pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout=0"]
     hypothesis = ["--hypothesis-profile=mutants", "--hypothesis-seed=0"]
-    tests = [f"tests/{path}" for path in TESTS]
+    tests = [f"tests/{path}" for path in (reversed(TESTS) if static else TESTS)]
     return shlex.join([*limited, *environment, *pytest, *hypothesis, "-k", f"not ({SLOW})", *tests])
 
 
 def run(mutations: Sequence[MutationSpec], seconds: int) -> WorkResult:
     """Run the tests with these mutations. Raises RuntimeError if they cannot be made."""
-    result = mutate_and_test(mutations, test_command(seconds), timeout=None)
+    result = mutate_and_test(mutations, test_command(seconds, mutations), timeout=None)
     if result.worker_outcome != WorkerOutcome.NORMAL or result.test_outcome == TestOutcome.INCOMPETENT:
         raise RuntimeError(f"{mutations}: {result.worker_outcome} {result.output}")
     return result
