@@ -1,5 +1,6 @@
 """Tests of the simulation: each patch in mutants/ restores a fault of the past. Is it found, after how many lives?"""
 
+import os
 import re
 import shutil
 import subprocess
@@ -52,10 +53,13 @@ def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
     with tempfile.TemporaryDirectory() as folder:
         _put_in(patch, Path(folder))
         begun = time.monotonic()
+        # coverage would look for the lines of the copy when it is gone.
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")}
         command = ["--package", folder, "run", "--layer", layer[1], "--lives", str(lives), "--seconds", "600"]
         run = subprocess.run(
             [sys.executable, "-m", "simulation", *command, "--seed", str(SEED)],
             cwd=HERE.parent,
+            env=environment,
             capture_output=True,
             text=True,
             check=False,

@@ -281,6 +281,8 @@ def run(folder: Path, count: int, seed: int, processes: int, every: int = 1) -> 
             counts[what] += 1
             if what in FAULTS:
                 faults.append(f"{what}: {flip}: {words}")
+        pool.close()
+        pool.join()  # a worker that ends by itself reports the lines that it ran
     return counts, faults
 
 
