@@ -127,6 +127,7 @@ def test_what_may_surprise_is_said(tmp_path, name, content, options, points, sai
         ("a.csv.gz", gzip.compress(COMMA.encode())[:-9], [], "the compressed data is damaged"),
         ("a.csv.gz", gzip.compress(b"x,y\n" + bytes(99))[:20] + bytes(99), [], "the compressed data is damaged"),
         ("a.csv", "x,y\n1,2\n", ["--x", "3", "--y", "1"], "has no column '3' (--x); it has x, y"),
+        ("a.csv", f"x,y\n1,2\n{'3' * 200_000},4\n", [], "a.csv, line 3: field larger than field limit"),
     ],
     ids=count(),
 )
