@@ -43,7 +43,7 @@ OPERATORS = re.compile(
     r"|ReplaceBreakWithContinue|ReplaceContinueWithBreak|ZeroIterationForLoop|ReplaceUnaryOperator_Delete_(USub|Not)"
     rf"|ReplaceBinaryOperator_(Add_Sub|Sub_Add|Mul_Add)|ReplaceComparisonOperator_{COMPARISON}_{COMPARISON})$"
 )
-FACTOR = 3  # times the processor time that the tests use without a fault
+FACTOR = 2  # times the processor time that the tests use without a fault
 LONGEST = 600  # seconds of processor time that they may use without a fault
 MEMORY = 4_000_000  # KiB
 FAILED = re.compile(r"\d+ (failed|error)")
