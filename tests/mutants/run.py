@@ -36,7 +36,7 @@ TESTS = [
     *(f"core/test_{name}.py" for name in ("hull", "predicates", "check", "stateful")),
     "static/test_static.py",
 ]
-SLOW = "100000 or splits_and_merges or perturbation"
+SLOW = "20000 or splits_and_merges or perturbation"
 COMPARISON = "(Gt|GtE|Lt|LtE|Eq|NotEq)"
 OPERATORS = re.compile(
     r"core/(NumberReplacer|AddNot|ReplaceAndWithOr|ReplaceOrWithAnd|ReplaceTrueWithFalse|ReplaceFalseWithTrue"
