@@ -2,7 +2,7 @@
 
 import random
 from fractions import Fraction
-from itertools import permutations, product
+from itertools import combinations_with_replacement, permutations, product
 from math import inf
 from pathlib import Path
 
@@ -136,6 +136,14 @@ def test_any_crossing(crossing, points):
     a, b, z, c, d = sorted((x + 0.0, y + 0.0) for x, y in points)
     assume(a < b < z and c < d and (a[0] < b[0] or c[0] < d[0]))
     assert crossing(a, b, c, d, z) == exact_crossing(a, b, c, d, z)
+
+
+def test_every_crossing_on_a_small_grid(crossing):
+    """Vertical edges on both sides, and z above, below and at the ends of them."""
+    grid = list(product((0.0, 1.0, 2.0), repeat=2))
+    for a, b, z, c, d in combinations_with_replacement(grid, 5):
+        if a < b < z and c < d and (a[0] < b[0] or c[0] < d[0]):
+            assert crossing(a, b, c, d, z) == exact_crossing(a, b, c, d, z)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-150, 1e120])
