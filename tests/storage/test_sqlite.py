@@ -2,6 +2,7 @@
 
 import shutil
 import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -66,6 +67,19 @@ def test_a_start_that_is_refused_lets_others_in(folder):
             opened(folder)
     (folder / DATABASE).write_bytes(whole)
     opened(folder)[0].close()
+
+
+def test_a_server_that_was_killed_before_it_made_the_tables(folder):
+    folder.mkdir()
+    with closing(sqlite3.connect(folder / DATABASE)) as connection:
+        connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+        connection.execute("PRAGMA journal_mode = WAL")
+    assert (folder / DATABASE).stat().st_size > 0
+    storage, contents = opened(folder)
+    assert (contents.notes, contents.hulls) == ([], [])
+    fill(storage, 3)
+    storage.close()
+    assert notes(folder) == []
 
 
 def test_a_newer_format_is_refused(folder):
