@@ -59,8 +59,8 @@ DAMAGE = {
     "copies that are not counted": (lambda tree: tree._copies.update({LINE[0]: 3}), "4 points, 4 and 2 copies"),
     "copies of no point": (lambda tree: tree._copies.update({(9.0, 9.0): 2}), "a count without its point"),
     "one copy": (lambda tree: tree._copies.update({LINE[0]: 1}), "a count below two"),
-    "a full leaf": (put("LEAF", 2), "a leaf of 3 points"),
-    "an empty leaf": (empty, "a leaf of 0 points"),
+    "a full leaf": (put("LEAF", 2), r"a leaf of \d points"),
+    "an empty leaf": (empty, r"a leaf of \d points"),
     "a chain without its first point": (lambda tree: leaf(tree).chains[UPPER].pop(0), "a chain without its ends"),
     "a chain without its last point": (lambda tree: leaf(tree).chains[LOWER].pop(), "a chain without its ends"),
     "a vertex on an edge": (
