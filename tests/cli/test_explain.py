@@ -57,7 +57,7 @@ def test_sheet(example, tmp_path):
 
 
 def test_vector_sheet(example, tmp_path):
-    """Its text is text, and the same points make the same file."""
+    """The SVG holds text as text, and equal points give equal files."""
     assert explain("graham_scan", example, "--out", tmp_path / "a.svg").returncode == 0
     drawing = ET.fromstring((tmp_path / "a.svg").read_text(encoding="utf-8"))
     words = {element.text for element in drawing.iter("{http://www.w3.org/2000/svg}text")}
@@ -107,7 +107,7 @@ def test_the_tree_of_the_example(tmp_path):
 
 
 def test_the_page_in_a_browser(tmp_path):
-    """Keys go through the steps; a point says its coordinates; nothing goes to the console."""
+    """Keys move through the steps; a point shows its coordinates; the console stays empty."""
     chromium = shutil.which("chromium")
     assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
     assert explain("tree", "--out", tmp_path / "page.html").returncode == 0
@@ -142,7 +142,7 @@ def test_the_tree_of_own_points(example, tmp_path):
 
 @pytest.mark.parametrize("count", [1, 2, 5, 30])
 def test_the_tree_shows_the_hull_of_its_points(count):
-    """Points that repeat, among them."""
+    """Some of the points are equal."""
     points = [(float(i * i % 11), float(i * 7 % 13)) for i in range(count)] + [(1.0, 1.0)] * 3
     story = tree_story("points", points)
     position = {name: place for place, name in story.names.items()}

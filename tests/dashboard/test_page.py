@@ -81,7 +81,7 @@ def pick(page: Page, name: str) -> None:
 
 
 def wait_for_hulls(page: Page, *names: str) -> None:
-    """Until the page knows of these hulls."""
+    """Wait until the page lists these hulls."""
     page.wait_for_function(
         """names => {
             const known = Bokeh.documents[0]?.get_model_by_name("page").offered ?? []

@@ -1,4 +1,4 @@
-"""Pages hold where they are read: on a code host, beside the files, and in the built site."""
+"""Links and markup of the pages work on a code host and in the built site."""
 
 import importlib
 import inspect

@@ -1,4 +1,4 @@
-"""What survives the end of a server, sudden or not: seen by clients of real processes."""
+"""What survives a stop or a kill of the server, as clients of real processes see it."""
 
 import os
 import signal
@@ -117,7 +117,7 @@ FULL_DISK = 'mount -t tmpfs -o size=3m none "$0" && exec "$@"'
 
 
 def test_a_full_disk_refuses_writes_and_recovers(tmp_path):
-    """The folder lies on a file system of three megabytes, in a mount namespace of the server's own."""
+    """The folder is on a file system of three megabytes, in a mount namespace of the server's own."""
     folder = tmp_path / "small"
     folder.mkdir()
     wrap = ["unshare", "--map-root-user", "--mount", "sh", "-c", FULL_DISK, str(folder)]

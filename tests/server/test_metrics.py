@@ -1,4 +1,4 @@
-"""What Prometheus sees, and whether it is happy with it."""
+"""The metrics of a server: their values, and that Prometheus scrapes and accepts them."""
 
 import json
 import re

@@ -59,7 +59,7 @@ def test_a_large_batch_keeps_nobody_waiting(channel: grpc.Channel, stub: HullSer
 
 
 def test_drain() -> None:
-    """At SIGTERM what waits is cut off with UNAVAILABLE, and what was acknowledged had been applied."""
+    """SIGTERM ends waiting calls with UNAVAILABLE; every acknowledged batch has been applied."""
     with server_process() as server, grpc.insecure_channel(server.address) as channel:
         stub = HullServiceStub(channel)
         stub.CreateHull(pb.CreateHullRequest(name="a"))

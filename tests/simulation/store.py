@@ -121,14 +121,14 @@ class FaultyStorage:
         return self._inner.oldest(number)
 
     def snapshot(self, number: int, revision: int, points: Points, producers: Mapping[str, int]) -> Iterator[Step]:
-        """Steps, each of which may fail."""
+        """Steps; each may fail."""
         for step in self._inner.snapshot(number, revision, points, producers):
             self.give_way()
             self._fail("snapshot")
             yield step
 
     def sweep(self) -> Iterator[Step]:
-        """Steps, each of which may fail."""
+        """Steps; each may fail."""
         self._fail("sweep")
         for step in self._inner.sweep():
             self.give_way()

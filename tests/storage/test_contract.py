@@ -1,4 +1,4 @@
-"""What every storage promises, whatever is behind it."""
+"""What every implementation of the storage promises."""
 
 import io
 import itertools

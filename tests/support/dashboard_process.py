@@ -49,6 +49,6 @@ def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[
 
 
 def wait_for_vertices(page: Page, name: str, vertices: list[list[float]]) -> None:
-    """Until the polygon on the page is this one."""
+    """Wait until the page shows this polygon."""
     same = f"([name, vertices]) => JSON.stringify(({VERTICES})(name)) == JSON.stringify(vertices)"
     page.wait_for_function(same, arg=[name, vertices])

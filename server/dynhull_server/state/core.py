@@ -85,15 +85,6 @@ class _Queue:
         self.ill: Exception | None = None
         self.pause = FIRST_PAUSE
 
-    @property
-    def state(self) -> str:
-        """One of absent, there, creating, deleting and unknown."""
-        if self.ill is not None or (self.trip is not None and self.trip.failure is not None):
-            return "unknown"
-        if self.trip is None or self.trip.after is self.hull:
-            return "absent" if self.hull is None else "there"
-        return "deleting" if self.trip.after is None else "creating"
-
 
 class Core:
     """All names of a server.
@@ -170,11 +161,6 @@ class Core:
     def ill(self) -> bool:
         """Whether the state of any name is unknown, because the storage cannot be read."""
         return any(queue.ill is not None for queue in self._queues.values())
-
-    def state_of(self, name: str) -> str:
-        """The state of a name: one of absent, there, creating, deleting and unknown."""
-        queue = self._queues.get(name)
-        return "absent" if queue is None else queue.state
 
     def restore(self, row: HullRow, state: HullState, unsaved: int) -> None:
         """Add a hull that the storage has kept. Call this before the first step."""

@@ -89,13 +89,13 @@ class Builder:
             self.acknowledged[change.number] += change.records
 
     def snapshot(self, number: int, points: int) -> None:
-        """As of now."""
+        """Store a snapshot of the current revision."""
         revision = len(self.acknowledged[number])
         for step in self.storage.snapshot(number, revision, snapshot_points(number, revision, points), {"a": revision}):
             self.storage.commit([step])
 
     def delete(self, number: int, *, sweep: bool = True) -> None:
-        """A hull, and what it leaves."""
+        """Delete a hull; with `sweep`, also remove the rows that it leaves."""
         self.storage.commit([Delete(number)])
         del self.acknowledged[number]
         for step in self.storage.sweep() if sweep else ():
@@ -111,7 +111,7 @@ def snapshot_points(number: int, revision: int, count: int = 0) -> np.ndarray:
 
 
 def fill(builder: Builder) -> None:
-    """A bit of everything."""
+    """A folder with hulls of every kind."""
     for number in range(1, 6):
         builder.create(number)
     for turn in range(5):
@@ -281,6 +281,8 @@ def run(folder: Path, count: int, seed: int, processes: int, every: int = 1) -> 
             counts[what] += 1
             if what in FAULTS:
                 faults.append(f"{what}: {flip}: {words}")
+        pool.close()
+        pool.join()  # a worker that ends by itself reports the lines that it ran
     return counts, faults
 
 
@@ -289,7 +291,7 @@ def main() -> None:
     parser.add_argument("--flips", type=int, default=20_000, help="at random, beside those of the headers")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--every", type=int, default=1, help="of the headers' bits, try one in so many")
+    parser.add_argument("--every", type=int, default=1, help="of the headers' bits, flip every Nth")
     parser.add_argument("--folder", type=Path, default=None, help="where to work; in memory is quickest")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
