@@ -43,7 +43,7 @@ def check(
     All batches and snapshots are compared with their checksums, also those that the next start would not need. While a
     server uses the folder, the data committed at one moment is examined, but not the log.
 
-    The exit code is 0 if everything is intact, and 1 if anything is damaged or cannot be read:
+    The exit code is 0 if everything is intact, 1 if anything is damaged, and 2 if there is no data folder:
 
         dynhull check backups/monday && echo "can be restored"
     """

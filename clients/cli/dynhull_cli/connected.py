@@ -3,7 +3,6 @@
 import inspect
 import sys
 from collections.abc import Callable
-from enum import IntEnum
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
 import typer
 
 from .address import target
+from .exits import Exit
 
 if TYPE_CHECKING:
     import grpc
@@ -26,15 +26,6 @@ class Connect(Protocol):
     def __call__(self, kind: type[Client], /, **more: Any) -> Client:
         """The client."""
         ...
-
-
-class Exit(IntEnum):
-    """Exit codes for scripts; 0 is success, 130 an interruption."""
-
-    FAILED = 1
-    UNUSABLE = 2
-    UNAVAILABLE = 3
-    FORBIDDEN = 4
 
 
 def _option(variable: str, text: str, **more: Any) -> Any:
@@ -105,6 +96,8 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
             fail(Exit.FORBIDDEN, str(error))
         except sdk.HullNotFoundError as error:
             fail(Exit.FAILED, f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one.")
+        except sdk.InvalidRequestError as error:
+            fail(Exit.UNUSABLE, str(error))
         except sdk.DynhullError as error:
             fail(Exit.FAILED, str(error))
         except OSError as error:
