@@ -160,7 +160,7 @@ def test_what_is_left_is_restored_where_loss_is_accepted(paths, tmp_path):
     storage.close()
     (crash / LOG).unlink()
     refused("restore", crash, "--data", new, says="dynhull restore --accept-loss", code=1)
-    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hulls")
+    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hull")
     assert "copied without what is lost" in finished.stderr
     assert served(new, 5).notes == []
 
