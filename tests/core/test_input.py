@@ -37,7 +37,7 @@ BAD = [
     (
         [[0, Fraction(1, 10**5000)]],
         ValueError,
-        r"points row 0 is a Fraction with too many digits to show: no double has",
+        r"row 0 is a Fraction with too many digits to show: no double has",
     ),
     ([[Fraction(1, 2), Fraction(1, 3)]], ValueError, r"row 0 is Fraction\(1, 3\): no double has this value"),
     ([[Decimal("0.1"), 0]], ValueError, r"row 0 is Decimal\('0\.1'\)"),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import timedelta
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Generic, Literal, Never, TypeVar
 from uuid import uuid4
 
@@ -70,6 +71,13 @@ class Call(Generic[Answer]):
     repeatable: bool = True
     instead: Callable[[DynhullError], Call[Answer] | None] = _nothing
     awaits_hull: bool = False
+
+
+def require_not_negative(**numbers: float | None) -> None:
+    """Raise ValueError if one of the arguments is negative or not a number."""
+    for argument, value in numbers.items():
+        if isinstance(value, Real) and not value >= 0:
+            raise ValueError(f"{argument} must be at least 0, got {value}")
 
 
 def create_hull(name: str, *, exist_ok: bool = False, timeout: float | None = None) -> Call[HullInfo]:

@@ -10,7 +10,7 @@ import grpc
 
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-from ._calls import Call
+from ._calls import Call, require_not_negative
 from ._errors import DynhullError, error_of
 from ._retry import Attempts
 
@@ -52,6 +52,9 @@ class Connection:
         tls: grpc.ChannelCredentials | None,
         retries: int,
     ) -> None:
+        require_not_negative(timeout=timeout, retries=retries)
+        if token is not None and not (token.isascii() and token.isprintable() and " " not in token):
+            raise ValueError("token must consist of printable ASCII characters without spaces")
         self.address = address
         self.blocking = partial(
             BlockingConnection,
