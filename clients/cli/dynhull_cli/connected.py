@@ -1,6 +1,7 @@
 """Shared by the commands that connect to a server: the options of the connection, the client, and exit codes."""
 
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -13,8 +14,6 @@ from .address import target
 from .exits import Exit
 
 if TYPE_CHECKING:
-    import grpc
-
     from dynhull_client import AsyncHullClient, HullClient
 
 Client = TypeVar("Client", "HullClient", "AsyncHullClient")
@@ -79,16 +78,20 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         client_key: ClientKey = None,
         **given: Any,
     ) -> None:
+        os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what gRPC would log, the message of the error says
+
         import dynhull_client as sdk
+
+        from .certificates import credentials
 
         try:
             address, encrypted = target(address)
             tls = tls or encrypted
-            credentials = _credentials(tls, tls_ca, client_cert, client_key)
-            command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
+            encryption = credentials(tls, tls_ca, client_cert, client_key)
+            command(lambda kind, **more: kind(address, token=token, tls=encryption, **more), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
-            encryption = "does it serve TLS" if tls or tls_ca or client_cert else "does it require TLS (--tls)"
-            advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
+            about_tls = "does it serve TLS" if tls or tls_ca or client_cert else "does it require TLS (--tls)"
+            advice = f"Is it running (dynhull serve), is the address right (--address), {about_tls}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
         except sdk.UnauthenticatedError as error:
             fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
@@ -118,17 +121,3 @@ def fail(code: Exit, message: str) -> NoReturn:
     """Print an error and end the command."""
     typer.echo(f"error: {message}", err=True)
     sys.exit(code)
-
-
-def _credentials(
-    tls: bool, ca: Path | None, certificate: Path | None, key: Path | None
-) -> "grpc.ChannelCredentials | None":
-    if (certificate is None) != (key is None):
-        raise ValueError("--client-cert and --client-key must be given together")
-    if not (tls or ca or certificate):
-        return None
-    import grpc
-
-    return grpc.ssl_channel_credentials(
-        *(None if path is None else path.read_bytes() for path in (ca, key, certificate))
-    )
