@@ -44,6 +44,11 @@ def test_links_hold_beside_the_files(page: Path) -> None:
     assert [str(target) for target in targets if not target.exists() and target not in GENERATED] == []
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if "docs" in page.parts], ids=lambda page: page.name)
+def test_the_text_of_a_link_is_not_the_name_of_a_page(page: Path) -> None:
+    assert re.findall(r"\[[\w/-]+\.md\]\(", page.read_text()) == []
+
+
 def test_links_hold_in_the_site(site: Path) -> None:
     broken = []
     for page in site.rglob("*.html"):
