@@ -75,7 +75,8 @@ def documented(method: Function, describe: Function, returns: str) -> None:
 
 def described(describe: Callable[P, Description], *arguments: P.args, **options: P.kwargs) -> Description:
     """What the function describes; ValueError for a number that is not allowed in any call."""
-    require_not_negative(**{name: options.get(name) for name in NOT_NEGATIVE})
+    given: dict[str, Any] = options
+    require_not_negative(**{name: given.get(name) for name in NOT_NEGATIVE})
     return describe(*arguments, **options)
 
 
