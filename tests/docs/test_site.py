@@ -61,6 +61,12 @@ def test_links_hold_in_the_site(site: Path) -> None:
     assert broken == []
 
 
+def test_pictures_are_described(site: Path) -> None:
+    undescribed = re.compile(r'<img alt="(?:No description[^"]*)?"')
+    assert [page.parent.name for page in site.rglob("index.html") if undescribed.search(page.read_text())] == []
+    assert "<img alt=\"&lt;DynamicHull of 10 points" in (site / "notebooks/frames/index.html").read_text()
+
+
 def test_the_site_needs_no_other_host(site: Path) -> None:
     loaded = re.compile(r'(?:<script[^>]*\bsrc|<link[^>]*\brel="stylesheet"[^>]*\bhref)="https?:[^"]*"')
     assert [found for page in site.rglob("*.html") for found in loaded.findall(page.read_text())] == []
