@@ -301,6 +301,8 @@ class Ingesting:
 def ingest(name: str, *, missing: Literal["raise", "count"] = "raise", timeout: float | None = None) -> Ingesting:
     """A stream of batches in one call, for use in a with statement. `missing` as for `apply`.
 
+    >>> from dynhull_client import HullClient
+    >>> client = HullClient()  # doctest: +SKIP
     >>> with client.ingest("fleet") as stream:  # doctest: +SKIP
     ...     for minute in minutes:
     ...         stream.apply(move=(before, after))
@@ -337,6 +339,8 @@ def writer(
 ) -> Writing:
     """A writer that gathers points into batches, each applied exactly once.
 
+    >>> from dynhull_client import HullClient
+    >>> client = HullClient()  # doctest: +SKIP
     >>> with client.writer("fleet") as writer:  # doctest: +SKIP
     ...     for before, after in moves:
     ...         writer.put(move=(before, after))
@@ -390,7 +394,8 @@ def watch(
 ) -> Watching:
     """Follow a hull: an iterator of events, from which a `HullCopy` maintains a copy of the hull.
 
-    >>> copy = HullCopy()
+    >>> from dynhull_client import HullClient, HullCopy
+    >>> client, copy = HullClient(), HullCopy()  # doctest: +SKIP
     >>> for event in client.watch("fleet", copy=copy):  # doctest: +SKIP
     ...     print(event.revision, len(copy.vertices))
 
