@@ -64,7 +64,7 @@ def test_links_hold_in_the_site(site: Path) -> None:
 def test_pictures_are_described(site: Path) -> None:
     undescribed = re.compile(r'<img alt="(?:No description[^"]*)?"')
     assert [page.parent.name for page in site.rglob("index.html") if undescribed.search(page.read_text())] == []
-    assert "<img alt=\"&lt;DynamicHull of 10 points" in (site / "notebooks/frames/index.html").read_text()
+    assert '<img alt="&lt;DynamicHull of 10 points' in (site / "notebooks/frames/index.html").read_text()
 
 
 def test_the_site_needs_no_other_host(site: Path) -> None:
