@@ -1,7 +1,6 @@
 """What the commands for data folders do: copy, check and export, with a progress bar and errors as messages."""
 
 import json
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,7 @@ import typer
 
 from dynhull.arrays import Points
 
+from .failure import code_of, fail, text_of
 from .progress import progress_bar
 from .state.hull_state import replayed
 from .storage.port import Progress, StorageError
@@ -25,7 +25,7 @@ def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> Non
         report = copies.copy(source, target, progress, accept_loss=accept_loss)
     for note in report.notes:
         typer.echo(note, err=True)
-    typer.echo(f"{target}: {len(report.hulls)} hulls")
+    typer.echo(f"{target}: {_hulls(report)}")
 
 
 def check_folder(data: Path) -> bool:
@@ -41,16 +41,20 @@ def check_folder(data: Path) -> bool:
     elif report.notes:
         typer.echo(f"{data}: damaged; it can be served without the parts named above")
     else:
-        typer.echo(f"{data}: {len(report.hulls)} hulls, all whole")
+        typer.echo(f"{data}: {_hulls(report)}, all whole")
     return not report.fatal and not report.notes
+
+
+def _hulls(report: copies.Report) -> str:
+    return "1 hull" if len(report.hulls) == 1 else f"{len(report.hulls):,} hulls"
 
 
 def export_hull(data: Path, name: str, file: Path) -> None:
     """Write the points of a hull to a file, in the format of its suffix."""
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".geojson": _write_geojson}
+    if file.suffix not in writers:
+        fail(f"{file}: the name must end in {', '.join(writers)}")
     with _errors_reported():
-        if file.suffix not in writers:
-            raise StorageError(f"{file}: the name must end in {', '.join(writers)}")
         kept, notes = copies.read(data, name)
         for note in notes:
             typer.echo(note, err=True)
@@ -101,4 +105,4 @@ def _errors_reported() -> Iterator[None]:
     try:
         yield
     except (StorageError, OSError) as error:
-        sys.exit(f"error: {error}")
+        fail(text_of(error), code_of(error))

@@ -70,7 +70,7 @@ def test_vertices_are_asked_for_without_points(hull):
 
 def test_watch(hull):
     done = dynhull("watch", hull, "--events", 1)
-    assert (done.exit_code, done.stdout) == (0, "1  6  4  +4 -0  16  16\n")
+    assert (done.exit_code, done.stdout) == (0, "1\t6\t4\t4\t0\t16.0\t16.0\n")
     done = dynhull("watch", hull, "--events", 1, "--json")
     event = json.loads(done.stdout)
     assert (event["revision"], event["points"], event["snapshot"]) == (1, 6, True)
@@ -191,7 +191,7 @@ def test_top(hull, served):
         (hull, 6, 5),
     ]
     done = dynhull("top", hull, "--interval", 0.05)
-    assert done.stdout.splitlines()[1] == f"{hull}\t1\t6\t5\t0.0\t+0"
+    assert done.stdout.splitlines()[1] == f"{hull}\t1\t6\t5\t0.0\t0.0"
 
 
 def test_watch_and_top_on_a_terminal_show_tables(served):
@@ -294,6 +294,43 @@ def test_a_reader_that_has_enough(hull, served):
     command = f"{COMMAND} query {hull} --address {served} | head -1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert (done.stdout.count("\n"), done.stderr) == (1, "")
+
+
+def test_a_reader_of_a_quiet_hull_that_has_enough(hull, served):
+    for options in ("", "--json"):
+        command = f"{COMMAND} watch {hull} {options} --address {served} | head -1"
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        assert (done.stdout.count("\n"), done.stderr) == (1, "")
+
+
+def test_columns_are_named():
+    for command, names in (
+        ("watch", "revision, points, vertices, vertices added, vertices removed, area, perimeter"),
+        ("top", "name, revision, points, distinct points, batches per second, and points gained per second"),
+    ):
+        assert names in " ".join(dynhull(command, "--help").stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--tls-ca points.csv", "--tls-ca points.csv: the file has no certificates in PEM format"),
+        ("--client-cert key --client-key cert", "not a certificate and its private key in PEM format"),
+        ("--token a\nb", "token must consist of printable ASCII characters"),
+    ],
+)
+def test_what_gRPC_would_not_explain(tmp_path, monkeypatch, options, words):  # noqa: N802
+    issued = trustme.CA().issue_cert("127.0.0.1")
+    issued.private_key_pem.write_to_path(tmp_path / "key")
+    issued.cert_chain_pems[0].write_to_path(tmp_path / "cert")
+    (tmp_path / "points.csv").write_text("x,y\n1,2\n")
+    monkeypatch.chdir(tmp_path)
+    done = subprocess.run(
+        [COMMAND, "list", "--address", "127.0.0.1:1", *options.split(" ")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_completion_knows_the_commands(tmp_path):

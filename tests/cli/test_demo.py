@@ -70,6 +70,20 @@ def test_unusable_input_says_what_to_do(tmp_path, text, options, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--day", "x"], "--day 'x' is not a day such as 2013-03-08"),
+        (["--out", "d.txt"], "--out d.txt: the name must end in .png"),
+        (["--out", "nowhere/d.png"], "--out nowhere/d.png: there is no folder nowhere"),
+    ],
+)
+def test_unusable_options_are_refused_at_once(options, message):
+    done = demo(*options)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+
+
 def test_a_day_of_another_year():
     done = demo("--day", "2014-01-01")
     assert done.returncode == 2

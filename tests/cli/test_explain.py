@@ -181,13 +181,17 @@ def test_long_traces_are_thinned_out_and_say_so(tmp_path):
         (["graham_scan", "FILE", "--x", "east"], "FILE has no column 'east' (--x); it has x, y"),
         (["quickhull", "FILE"], "quickhull: not an algorithm; choose graham_scan, jarvis_march,"),
         (["tree", "FILE", "--collinear", "keep"], "--collinear keep: the tree keeps vertices only"),
+        (["graham_scan", "MORE"], "has 2,001 points: a picture of a static algorithm has room for 2,000; draw a part"),
+        (["graham_scan", "FILE", "--out", "nowhere/a.svg"], "nowhere/a.svg: there is no folder nowhere"),
         (["tree", "MANY"], "has 201 points: a picture of the tree has room for 200"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(example, tmp_path, arguments, message):
     many = tmp_path / "many.csv"
     many.write_text("x,y\n" + "".join(f"{i},{i * i}\n" for i in range(201)))
-    files = {"FILE": str(example), "MANY": str(many)}
+    more = tmp_path / "more.csv"
+    more.write_text("x,y\n" + "".join(f"{i},{i * i}\n" for i in range(2001)))
+    files = {"FILE": str(example), "MANY": str(many), "MORE": str(more)}
     done = explain(*[files.get(argument, argument) for argument in arguments])
     assert done.returncode == 2
     assert message.replace("FILE", str(example)) in done.stderr

@@ -353,7 +353,7 @@ def test_metrics_for_other_machines_only_with_tls_and_tokens_or_when_told(
     metrics = ("--metrics-host", "0.0.0.0", "--metrics-port", "0")
     for options in ([], certificate, ["--tokens", str(tokens.path)]):
         refused = run("serve", "--port", "0", "--in-memory", *metrics, *options)
-        assert refused.returncode == 1
+        assert refused.returncode == 2
         assert "0.0.0.0 can be reached by other machines" in refused.stderr
     with server_process(*metrics, "--insecure") as server:
         assert server.process.stdout.readline().startswith("metrics on http://0.0.0.0:")

@@ -108,7 +108,7 @@ def test_a_second_server_on_the_folder_is_refused(tmp_path):
     with server_process(*options):
         command = [COMMAND, "serve", "--port", "0", *options]
         second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert second.returncode == 1
+    assert second.returncode == 2
     assert "another server" in second.stderr
     assert "Traceback" not in second.stderr
 

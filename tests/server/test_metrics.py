@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from metrics import fetch, measured, scrape
 from peers import program
-from server_process import PATIENCE, run
+from server_process import PATIENCE
 
 from dynhull_client import HullClient, PointMissingError
 
@@ -101,12 +101,3 @@ def test_the_scrub_compares_every_hull() -> None:
         while (samples := scrape(address))[equal] < 2:
             assert samples[different] == 0
         assert samples["dynhull_scrub_cpu_seconds_total"] > 0
-
-
-def test_metrics_on_a_port_in_use() -> None:
-    with measured() as (_, address):
-        port = address.rpartition(":")[2]
-        refused = run("serve", "--port", "0", "--metrics-port", port)
-        assert refused.returncode == 1
-        assert f"127.0.0.1:{port}" in refused.stderr
-        assert "Traceback" not in refused.stderr

@@ -49,10 +49,10 @@ def done(*command, says):
     return finished
 
 
-def refused(*command, says):
+def refused(*command, says, code=2):
     """Run a command that must fail; `says` is in its error message."""
     finished = run(*command)
-    assert finished.returncode == 1
+    assert finished.returncode == code
     assert says in finished.stderr
     assert "Traceback" not in finished.stderr
 
@@ -143,9 +143,11 @@ def test_a_backup_of_format_1_is_checked_restored_and_exported(tmp_path, name):
 def test_a_damaged_backup_is_not_restored(paths):
     data, copy, new = paths
     stopped(data)
-    done("backup", copy, "--data", data, says=f"{copy}: 1 hulls")
+    done("backup", copy, "--data", data, says=f"{copy}: 1 hull")
     flip(copy / DATABASE, record(4).inserts.tobytes())
-    refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones exist")
+    refused(
+        "restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones exist", code=1
+    )
     assert not new.exists()
 
 
@@ -159,8 +161,8 @@ def test_what_is_left_is_restored_where_loss_is_accepted(paths, tmp_path):
     crash = killed(data, tmp_path / "crash")
     storage.close()
     (crash / LOG).unlink()
-    refused("restore", crash, "--data", new, says="dynhull restore --accept-loss")
-    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hulls")
+    refused("restore", crash, "--data", new, says="dynhull restore --accept-loss", code=1)
+    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hull")
     assert "copied without what is lost" in finished.stderr
     assert served(new, 5).notes == []
 
@@ -230,7 +232,7 @@ def test_a_copy_that_fails_leaves_nothing(paths):
     stopped(data, 300)
     limited = ["sh", "-c", 'ulimit -f 64; exec "$0" "$@"', COMMAND, "backup", copy, "--data", data]
     finished = subprocess.run(limited, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert finished.returncode == 1
+    assert finished.returncode == 2
     assert f"error: {data} cannot be copied to {copy}" in finished.stderr
     assert not copy.exists()
 
@@ -274,7 +276,7 @@ def test_check_beside_a_server(paths):
     data, *_ = paths
     storage, _ = opened(data)
     fill(storage, 5)
-    done("check", data, says=f"{data}: 1 hulls, all whole")
+    done("check", data, says=f"{data}: 1 hull, all whole")
     append(storage, 6, 9)
     storage.close()
     assert served(data, 9).notes == []

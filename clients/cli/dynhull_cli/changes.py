@@ -13,7 +13,9 @@ from rich.text import Text
 
 from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Snapshot, Watch
 
+from .closed_pipe import when_pipe_closes
 from .json_lines import json_line
+from .tab_lines import tab_line
 
 SHOWN_EVENTS = 12
 NOTHING = np.empty((0, 2))
@@ -27,6 +29,8 @@ def follow(client: HullClient, name: str, *, max_rate: float, events: int | None
     copy = HullCopy()
     console = Console(highlight=False)
     with client.watch(name, max_rate=max_rate, measures=True, copy=copy) as stream:
+        if not console.is_terminal:
+            when_pipe_closes(stream.close)
         if as_json:
             for event in islice(stream, events):
                 typer.echo(_json(event))
@@ -34,7 +38,7 @@ def follow(client: HullClient, name: str, *, max_rate: float, events: int | None
             _show(console, name, stream, copy, events)
         else:
             for event in islice(stream, events):
-                typer.echo("  ".join(_cells(event, copy)))
+                typer.echo(_line(event, copy))
 
 
 def _show(console: Console, name: str, stream: Watch, copy: HullCopy, events: int | None) -> None:
@@ -64,6 +68,13 @@ def _cells(event: Event, copy: HullCopy) -> list[str]:
         f"+{len(added):,} -{len(removed):,}",
         *([f"{measures.area:.6g}", f"{measures.perimeter:.6g}"] if measures else []),
     ]
+
+
+def _line(event: Event, copy: HullCopy) -> str:
+    added, removed = _difference(event)
+    measures = _measures(event)
+    sizes = ("", "") if measures is None else (measures.area, measures.perimeter)
+    return tab_line(event.revision, event.points, len(copy.vertices), len(added), len(removed), *sizes)
 
 
 def _json(event: Event) -> str:

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .connected import AsJson, Exit, connected, fail
+from .connected import AsJson, connected, fail
+from .exits import Exit
 from .json_lines import json_line
 from .plural import plural
 
