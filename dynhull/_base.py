@@ -10,7 +10,7 @@ import numpy.typing as npt
 from . import measure
 from ._nodes import LOWER, UPPER
 from ._shown import geometry, svg
-from .arrays import Points, as_directions, as_points
+from .arrays import Points, as_directions, as_points, repr_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,7 +63,10 @@ class Hull:
 
     def __contains__(self, point: tuple[float, float]) -> bool:
         """Whether (x, y) is one of the points. O(log n)."""
-        x, y = point
+        try:
+            x, y = point
+        except (TypeError, ValueError):
+            raise ValueError(f"a point is (x, y), got {repr_of(point)}") from None
         return self.count(x, y) > 0
 
     def points(self) -> Points:

@@ -50,6 +50,7 @@ class DynamicHull(Hull):
     Points may also come as geometries (shapely, geopandas, GeoJSON), which give every vertex once, and as frames
     (pandas, polars, pyarrow) with columns such as x and y, or lon and lat.
 
+    >>> from dynhull import DynamicHull
     >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
     >>> hull.insert(5, 2)
     True

@@ -158,6 +158,7 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike) -> int | npt.
     O(1) a triple. A floating-point filter after Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust
     Geometric Predicates" (1997), and exact arithmetic if it does not decide.
 
+    >>> from dynhull.decompose import orient2d
     >>> orient2d((0, 0), (1, 0), (0, 1))
     1
     >>> orient2d((0, 0), [(1, 0), (2, 2)], (1, 1))

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from numbers import Number
 from typing import Any
@@ -19,6 +19,7 @@ Points = npt.NDArray[np.float64]
 """Type of an (n, 2) array of finite doubles, a point in each row."""
 
 MOST_AXES = 64  # of an array: no list is nested deeper
+MOST_SHOWN = 80  # characters of a value in a message
 
 
 class Checked:
@@ -77,7 +78,7 @@ def as_rows(points: npt.ArrayLike, name: str = "points") -> Points:
     if array.ndim == 1 and array.size == 0:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] < 2:
-        raise ValueError(f"{name} must have shape (n, d), d at least 2, got {array.shape}")
+        raise ValueError(f"{name} must have shape (n, d), d at least 2, got {_shape(array)}")
     return _finite(_as_double(array, name), name)
 
 
@@ -137,7 +138,7 @@ def finite_pairs(xy: npt.ArrayLike, name: str) -> Points:
     """Return `xy` as a float64 array of shape (..., 2), checked like `as_points`."""
     array = _as_array(xy, name)
     if array.ndim == 0 or array.shape[-1] != 2:
-        raise ValueError(f"{name} must have shape (..., 2), got {array.shape}")
+        raise ValueError(f"{name} must have shape (..., 2), got {_shape(array)}")
     flat = array.reshape(-1, 2)
     return _finite(_as_double(flat, name), name).reshape(array.shape)
 
@@ -212,7 +213,7 @@ def _as_pairs(xy: npt.ArrayLike, name: str) -> Points:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] != 2:
         hint = f"; one point is [[{array[0]}, {array[1]}]]" if array.shape == (2,) else ""
-        raise ValueError(f"{name} must have shape (n, 2), got {array.shape}{hint}")
+        raise ValueError(f"{name} must have shape (n, 2), got {_shape(array)}{hint}")
     return _as_double(array, name)
 
 
@@ -227,11 +228,22 @@ def _as_array(xy: Any, name: str) -> npt.NDArray[Any]:
     except ValueError:
         for row, entry in enumerate(xy):
             if not hasattr(entry, "__len__") or len(entry) != 2:
-                raise ValueError(f"{name} row {row} is {entry!r}: must be two numbers") from None
+                raise ValueError(f"{name} row {row} is {repr_of(entry)}: must be two numbers") from None
         raise
     if array.dtype.kind in "USVMm":
         raise TypeError(f"{name} row {_first_not_a_number(xy)}: coordinates must be real numbers, got {array.dtype}")
     return array
+
+
+def _shape(array: npt.NDArray[Any]) -> str:
+    """The shape of an array; for an object that is none, what it is."""
+    if array.ndim:
+        return str(array.shape)
+    value = array.item()
+    if not isinstance(value, Iterable):
+        return repr_of(value)
+    advice = "" if isinstance(value, Mapping) else ": use list(points)"
+    return f"a {type(value).__name__}{advice}"
 
 
 def _first_not_a_number(xy: Any) -> int:
@@ -269,17 +281,26 @@ def _as_double(array: npt.NDArray[Any], name: str) -> Points:
     return array.astype(np.float64)
 
 
+def repr_of(value: Any) -> str:
+    """The repr of a value for a message, shortened if it is long; Python refuses to write the longest integers."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return f"a{'n' * isinstance(value, int)} {type(value).__name__} with too many digits to show"
+    return text if len(text) <= MOST_SHOWN else f"{text[: MOST_SHOWN // 2 - 3]}...{text[-(MOST_SHOWN // 2 - 3) :]}"
+
+
 def _as_double_scalar(value: Any, name: str, kind: str = "coordinates") -> float:
     if not isinstance(value, Number) and not hasattr(value, "__float__"):
-        raise TypeError(f"{name}: {kind} must be real numbers, got {value!r}")
+        raise TypeError(f"{name}: {kind} must be real numbers, got {repr_of(value)}")
     try:
         double = float(value.real if isinstance(value, complex) and value.imag == 0 else value)
     except OverflowError:
-        raise ValueError(f"{name} is {value!r}: too large for a double") from None
+        raise ValueError(f"{name} is {repr_of(value)}: too large for a double") from None
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: {kind} must be real numbers, got {value!r}") from None
+        raise TypeError(f"{name}: {kind} must be real numbers, got {repr_of(value)}") from None
     if double != value and not math.isnan(double):
-        raise ValueError(f"{name} is {value!r}: no double has this value")
+        raise ValueError(f"{name} is {repr_of(value)}: no double has this value")
     return double
 
 

@@ -3,6 +3,7 @@
 A shape is any object with the two members of `Convex`; a `DynamicHull` is one. Moving, turning, scaling and adding
 shapes makes new shapes that query the old ones, so a live hull inside one stays live.
 
+>>> from dynhull.convex import ball, box, capsule, minkowski_sum, moved
 >>> square = box([0, 0], [2, 2])
 >>> capsule([0, 0], [5, 0], radius=1).support([[1, 0], [0, 1]]).tolist()
 [[6.0, 0.0], [0.0, 1.0]]

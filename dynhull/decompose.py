@@ -32,6 +32,7 @@ def convex_pieces(contour: npt.ArrayLike) -> list[Points]:
     Raises:
         ValueError: the contour is empty, touches itself or crosses itself: the message names the edges.
 
+    >>> from dynhull.decompose import convex_pieces
     >>> [piece.tolist() for piece in convex_pieces([[0, 0], [2, 0], [2, 2], [1, 1], [0, 2]])]
     [[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 2.0]]]
     """

@@ -45,6 +45,7 @@ def convexity_defects(contour: npt.ArrayLike) -> Defects:
         ValueError, TypeError: a point is bad, or the contour crosses itself, so that the corners of the hull are not in
             order along it.
 
+    >>> from dynhull.defects import convexity_defects
     >>> found = convexity_defects([[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]])
     >>> found.start, found.end, found.farthest, found.depth
     (array([2]), array([4]), array([3]), array([3.]))

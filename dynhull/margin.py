@@ -52,6 +52,7 @@ def max_margin(a: npt.ArrayLike | Convex, b: npt.ArrayLike | Convex) -> Margin:
     Raises:
         ValueError, TypeError: there are no points, a point is bad, or the dimensions differ.
 
+    >>> from dynhull.margin import max_margin
     >>> gap = max_margin([[0, 0], [1, 0], [0, 1]], [[3, 0], [4, 4]])
     >>> gap.margin, gap.normal.tolist(), gap.offset
     (2.0, [1.0, 0.0], 2.0)

@@ -1,5 +1,6 @@
 """What an update does to the hull tree, as data: a `TracedTree` keeps an event for each step, with the tree after it.
 
+>>> from dynhull.trace import TracedTree
 >>> tree = TracedTree([[0, 0], [2, 1], [4, 0]])
 >>> tree.insert(2, 3)
 True

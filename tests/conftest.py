@@ -3,19 +3,21 @@ from collections import Counter
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 from server_process import server_process
 
 collect_ignore = ["data/make_phases.py", "mutants/run.py"]  # need packages that the tests do not
 
 # A slow moment of the machine is not a failure.
 settings.register_profile("dynhull", deadline=None, print_blob=True)
+# Each mutant gets the same examples: none that another one has left in the database, and no time spent on shrinking.
+settings.register_profile("mutants", settings.get_profile("dynhull"), phases=[Phase.explicit, Phase.generate])
 settings.load_profile("dynhull")
 
 
 @pytest.fixture(scope="session")
 def address() -> Iterator[str]:
-    """A server that tests share: each uses hulls of its own."""
+    """A server that tests share; each test uses hulls of its own."""
     with server_process() as server:
         yield server.address
 

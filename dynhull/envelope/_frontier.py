@@ -42,6 +42,7 @@ class Frontier:
     Which points are efficient is exact. Methods that take points raise ValueError or TypeError for bad ones; the
     message names the first bad row, and nothing is changed.
 
+    >>> from dynhull.envelope import Frontier
     >>> frontier = Frontier([[1, 2], [2, 5], [4, 6], [3, 3]])
     >>> frontier.efficient().tolist()
     [[1.0, 2.0], [2.0, 5.0], [4.0, 6.0]]

@@ -45,6 +45,7 @@ class PhaseDiagram:
     names the first bad row, and nothing is changed. O(log² n) an update; the first query after a change reads the lower
     hull, O(h log n).
 
+    >>> from dynhull.envelope import PhaseDiagram
     >>> diagram = PhaseDiagram([[0, 0], [1, 0], [0.5, -1]])
     >>> diagram.add(0.25, -0.75).tolist()  # nothing became unstable
     []

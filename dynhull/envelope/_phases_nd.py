@@ -27,6 +27,7 @@ def energy_above_hull_nd(compositions: npt.ArrayLike, energies: npt.ArrayLike) -
         ValueError, TypeError: a bad row, which the message names; or a pure element has no entry.
         ModuleNotFoundError: scipy is not installed (`pip install 'dynhull[nd]'`).
 
+    >>> from dynhull.envelope import energy_above_hull_nd
     >>> elements = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> energy_above_hull_nd([*elements, [0.5, 0.5, 0], [0.5, 0.25, 0.25]], [0, 0, 0, -2, -0.5]).tolist()
     [0.0, 0.0, 0.0, 0.0, 0.5]

@@ -32,6 +32,8 @@ def intersect_many(a: npt.ArrayLike, b: npt.ArrayLike) -> Bools:
 
     O(m + n) a step, and a few steps. Pairs that floats cannot decide are decided one by one, exactly.
 
+    >>> import numpy as np
+    >>> from dynhull.gjk import intersect_many
     >>> squares = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]]])
     >>> intersect_many(np.repeat(squares, 3, axis=0), squares + [[[1, 1]], [[0.5, 0]], [[1, 1.01]]])
     array([ True,  True, False])

@@ -45,6 +45,7 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     Raises:
         ValueError, TypeError: bad input; the message names the first bad row.
 
+    >>> from dynhull.static import chan
     >>> trace = []
     >>> chan([[0, 0], [4, 0], [5, 2], [4, 4], [2, 3], [0, 4], [1, 2], [2, 1]], trace=trace).tolist()
     [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]

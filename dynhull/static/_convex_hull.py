@@ -30,6 +30,7 @@ def convex_hull(xy: npt.ArrayLike) -> Points:
     Raises:
         ValueError, TypeError: bad input; the message names the first bad row.
 
+    >>> from dynhull.defects import convex_hull
     >>> convex_hull([[0, 0], [1, 0], [2, 0], [1, 1], [1, 0.5]]).tolist()
     [[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]
     """

@@ -36,6 +36,7 @@ def graham_scan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace |
     Raises:
         ValueError, TypeError: bad input; the message names the first bad row.
 
+    >>> from dynhull.static import graham_scan
     >>> trace = []
     >>> graham_scan([[0, 0], [4, 0], [1, 1], [0, 4]], trace=trace).tolist()
     [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]

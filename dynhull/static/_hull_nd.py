@@ -86,6 +86,7 @@ def hull_nd(points: npt.ArrayLike, merge: bool = False) -> HullND:
         ValueError, TypeError: bad input; the message names the first bad row.
         ModuleNotFoundError: d is 3 or more, and scipy is not installed.
 
+    >>> from dynhull.static import hull_nd
     >>> hull = hull_nd([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.1, 0.1, 0.1]])
     >>> hull.vertices.tolist()
     [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]

@@ -34,6 +34,7 @@ def jarvis_march(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace 
     Raises:
         ValueError, TypeError: bad input; the message names the first bad row.
 
+    >>> from dynhull.static import jarvis_march
     >>> jarvis_march([[0, 0], [4, 0], [1, 1], [0, 4], [2, 0]]).tolist()
     [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]
     """

@@ -34,6 +34,7 @@ def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trac
     Raises:
         ValueError, TypeError: bad input; the message names the first bad row.
 
+    >>> from dynhull.static import monotone_chain
     >>> monotone_chain([[0, 0], [1, 0], [2, 0], [1, 1]]).tolist()
     [[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]
     """

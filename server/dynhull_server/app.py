@@ -8,16 +8,20 @@ import ssl
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import grpc
 from grpc_health.v1 import health_pb2
 
+from .certificates import server_context
 from .engine.engine import Engine
 from .engine.live_hull import LiveHull
 from .engine.scrub import Scrub
 from .engine.supervisor import Supervisor
 from .engine.threads import Machine
 from .engine.verification import Verification
+from .failure import text_of
+from .listening import listening_error, why_not
 from .rpc.access import ANONYMOUS, LOOK_SECONDS, Caller, TokenFile
 from .rpc.calls import Calls, Context
 from .rpc.health import Health
@@ -80,7 +84,8 @@ class Server:
         )
         self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
         self._metrics = Metrics()
-        self._tokens = None if settings.tokens is None else TokenFile(settings.tokens)
+        self._tls = _tls(settings)
+        self._tokens = None if settings.tokens is None else _token_file(settings.tokens)
         authenticate = _anonymous if self._tokens is None else _bearer(self._tokens)
         streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
         self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams)
@@ -176,8 +181,10 @@ class Server:
             self._health.set(SERVING if reason is None else NOT_SERVING, "", SERVICE)
 
     def _listen(self) -> int:
-        address = f"{self._settings.host}:{self._settings.port}"
         settings = self._settings
+        address = f"{settings.host}:{settings.port}"
+        if reason := why_not(settings.host, settings.port):  # gRPC does not give the operating system's reason
+            raise OSError(f"cannot listen on {address}: {reason}")
         if settings.tls_cert is None or settings.tls_key is None:
             return self._server.add_insecure_port(address)
         client_ca = None if settings.tls_client_ca is None else settings.tls_client_ca.read_bytes()
@@ -195,25 +202,14 @@ class Server:
         registry.register(StateCollector(self._engine, self._metrics, self._supervisor, asyncio.get_running_loop()))
         host, port = self._settings.metrics_host, self._settings.metrics_port
         open_to_others = not is_loopback(host)
-        tls = self._tls() if open_to_others else None
+        tls = self._tls if open_to_others else None
         bearer = self._tokens.bearer if open_to_others and self._tokens is not None else None
         try:
             page = MetricsPage(host, port, registry, bearer, tls, self._calls.refused_elsewhere())
         except OSError as error:
-            raise OSError(f"cannot serve metrics on {host}:{port}: {error.strerror}") from None
+            raise OSError(f"cannot listen on {host}:{port} for metrics: {listening_error(error)}") from None
         self.metrics_url = f"{'http' if tls is None else 'https'}://{host}:{page.port}/metrics"
         self._stop_metrics = page.close
-
-    def _tls(self) -> ssl.SSLContext | None:
-        settings = self._settings
-        if settings.tls_cert is None or settings.tls_key is None:
-            return None
-        context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-        context.load_cert_chain(settings.tls_cert, settings.tls_key)
-        if settings.tls_client_ca is not None:
-            context.load_verify_locations(settings.tls_client_ca)
-            context.verify_mode = ssl.CERT_REQUIRED
-        return context
 
     def _compared(self, hull: LiveHull, outcome: Verification) -> None:
         equal = outcome.equal
@@ -224,6 +220,19 @@ class Server:
                 extra={"hull": hull.name, "difference": outcome.difference, "keys_equal": outcome.keys_equal},
             )
             self._health.set(NOT_SERVING, SCRUB)
+
+
+def _tls(settings: Settings) -> ssl.SSLContext | None:
+    if settings.tls_cert is None or settings.tls_key is None:
+        return None
+    return server_context(settings.tls_cert, settings.tls_key, settings.tls_client_ca)
+
+
+def _token_file(path: Path) -> TokenFile:
+    try:
+        return TokenFile(path)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"--tokens {text_of(error)}") from None
 
 
 def _storage(settings: Settings) -> Storage:

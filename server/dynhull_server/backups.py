@@ -9,7 +9,7 @@ DATA = Path("dynhull-data")
 
 
 def backup(
-    target: Annotated[Path, typer.Argument(help="The folder to create.")],
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="The folder to create.")],
     data: Annotated[Path, typer.Option(help="The data folder; a server may be using it.")] = DATA,
 ) -> None:
     """Copy a data folder consistently, also while a server uses it.
@@ -23,7 +23,9 @@ def backup(
 
 
 def restore(
-    backup: Annotated[Path, typer.Argument(help="A backup, or any data folder.", exists=True, file_okay=False)],
+    backup: Annotated[
+        Path, typer.Argument(metavar="BACKUP", help="A backup, or any data folder.", exists=True, file_okay=False)
+    ],
     data: Annotated[Path, typer.Option(help="The data folder to create.")] = DATA,
     accept_loss: Annotated[
         bool, typer.Option(help="If the log is missing or damaged, continue without the commits in it.")
@@ -36,14 +38,16 @@ def restore(
 
 
 def check(
-    data: Annotated[Path, typer.Argument(help="A data folder or a backup; a server may be using it.")] = DATA,
+    data: Annotated[
+        Path, typer.Argument(metavar="DATA", help="A data folder or a backup; a server may be using it.")
+    ] = DATA,
 ) -> None:
     """Examine a data folder or a backup, and report on each hull. Nothing is changed.
 
     All batches and snapshots are compared with their checksums, also those that the next start would not need. While a
     server uses the folder, the data committed at one moment is examined, but not the log.
 
-    The exit code is 0 if everything is intact, and 1 if anything is damaged or cannot be read:
+    The exit code is 0 if everything is intact, 1 if anything is damaged, and 2 if there is no data folder:
 
         dynhull check backups/monday && echo "can be restored"
     """
@@ -53,8 +57,10 @@ def check(
 
 
 def export(
-    name: Annotated[str, typer.Argument(help="The hull.")],
-    file: Annotated[Path, typer.Argument(help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)],
+    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)
+    ],
     data: Annotated[Path, typer.Option(help="The data folder or a backup; a server may be using it.")] = DATA,
 ) -> None:
     """Write the points of one hull, as of the last commit, to a file.

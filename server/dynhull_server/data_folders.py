@@ -1,6 +1,5 @@
 """What the commands for data folders do: copy, check and export, with a progress bar and errors as messages."""
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import typer
 
 from .exports import WRITERS
+from .failure import code_of, fail, text_of
 from .progress import progress_bar
 from .state.contents import replayed
 from .storage.port import StorageError
@@ -20,7 +20,7 @@ def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> Non
         report = copies.copy(source, target, progress, accept_loss=accept_loss)
     for note in report.notes:
         typer.echo(note, err=True)
-    typer.echo(f"{target}: {len(report.hulls)} hulls")
+    typer.echo(f"{target}: {_hulls(report)}")
 
 
 def check_folder(data: Path) -> bool:
@@ -36,15 +36,19 @@ def check_folder(data: Path) -> bool:
     elif report.notes:
         typer.echo(f"{data}: damaged; it can be served without the parts named above")
     else:
-        typer.echo(f"{data}: {len(report.hulls)} hulls, all whole")
+        typer.echo(f"{data}: {_hulls(report)}, all whole")
     return not report.fatal and not report.notes
+
+
+def _hulls(report: copies.Report) -> str:
+    return "1 hull" if len(report.hulls) == 1 else f"{len(report.hulls):,} hulls"
 
 
 def export_hull(data: Path, name: str, file: Path) -> None:
     """Write the points of a hull to a file, in the format of its suffix."""
+    if file.suffix not in WRITERS:
+        fail(f"{file}: the name must end in {', '.join(WRITERS)}")
     with _errors_reported():
-        if file.suffix not in WRITERS:
-            raise StorageError(f"{file}: the name must end in {', '.join(WRITERS)}")
         row, kept, notes = copies.read(data, name)
         for note in notes:
             typer.echo(note, err=True)
@@ -60,4 +64,4 @@ def _errors_reported() -> Iterator[None]:
     try:
         yield
     except (StorageError, OSError) as error:
-        sys.exit(f"error: {error}")
+        fail(text_of(error), code_of(error))

@@ -15,14 +15,14 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
     """A typer command with one flag per setting; `command` gets the settings and the origin of each."""
 
     def run(config: Path | None, **given: Any) -> None:
+        from .failure import fail
         from .setting_sources import SettingsError, load, origins
 
         flags = {name: value for name, value in given.items() if value is not None}
         try:
             settings, where = load(flags, config), origins(flags, config)
         except SettingsError as error:
-            typer.echo(f"error: {error}", err=True)
-            raise typer.Exit(1) from None
+            fail(str(error))
         command(settings, where)
 
     file_help = "TOML file of settings; the names are those of the flags, with _ for -."

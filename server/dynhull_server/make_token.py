@@ -18,6 +18,10 @@ def token(
 
     dynhull token --name trucks --read fleet/ --write fleet/truck- >> tokens.toml
     """
+    from .failure import fail
+
+    if not read and not write:
+        fail('a token without rights is of no use: give --read or --write with a prefix; "" stands for every hull')
     new = secrets.token_urlsafe(32)
     typer.echo(f"token: {new}", err=True)
     typer.echo("[[token]]")

@@ -2,18 +2,22 @@
 
 import asyncio
 import gc
+import logging
+import resource
 import signal
 import socket
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from . import logs
 from .app import Server
+from .failure import code_of, fail, text_of
 from .malloc import return_large_blocks
 from .progress import progress_bar
 from .settings import Settings
 from .storage.port import StorageError
+
+log = logging.getLogger(__name__)
 
 SIGNALS = signal.SIGTERM, signal.SIGINT
 
@@ -22,12 +26,20 @@ def run(settings: Settings) -> None:
     """Serve, then return; an error of the settings, the storage or the operating system ends the process."""
     logs.configure(settings.log_level, settings.log_format)
     return_large_blocks()
+    _allow_connections(settings.max_connections)
     try:
         asyncio.run(_serve(settings))
-    except RuntimeError as error:
-        sys.exit(f"cannot listen on {settings.host}:{settings.port}: {error}")
-    except (OSError, ValueError, StorageError) as error:
-        sys.exit(f"cannot serve: {error}")
+    except (OSError, RuntimeError, ValueError, StorageError) as error:
+        fail(f"cannot serve: {text_of(error)}", code_of(error))
+
+
+def _allow_connections(most: int) -> None:
+    """Raise the limit on open files as far as the system permits, and warn if the connections can exceed it."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard <= most:
+        log.warning("--max-connections %d is not below the limit on open files, %d: see `ulimit -Hn`", most, hard)
+    elif soft != resource.RLIM_INFINITY and soft <= most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
 async def _serve(settings: Settings) -> None:

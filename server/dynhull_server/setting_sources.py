@@ -7,13 +7,17 @@ pydantic-settings.
 import os
 import tomllib
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, TomlConfigSettingsSource
 
 from .settings import PREFIX, Settings
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 
 class SettingsError(Exception):
@@ -23,6 +27,7 @@ class SettingsError(Exception):
 def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
     """The settings from flags, environment and file, or raise SettingsError."""
     read_file(file)
+    _refuse_ignored(flags)
 
     class Sources(Settings, BaseSettings):
         model_config = SettingsConfigDict(env_prefix=PREFIX, toml_file=file)
@@ -38,10 +43,8 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
     try:
         return Sources(**flags)
     except ValidationError as error:
-        lines = []
-        for each in error.errors():
-            where = ".".join(map(str, each["loc"]))
-            lines.append(f"{where}: {each['msg']}" if where else str(each["ctx"]["error"]))
+        sources = origins(flags, file)
+        lines = [_explained(each, sources, file) for each in error.errors()]
         raise SettingsError("\n".join(lines)) from None
 
 
@@ -61,11 +64,36 @@ def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
     return origins
 
 
+def _refuse_ignored(flags: Mapping[str, Any]) -> None:
+    for name in ("data", "durability"):
+        if flags.get("in_memory") and name in flags:
+            raise SettingsError(f"--in-memory stores nothing, so --{name} has no effect: leave one of them out")
+
+
+def _explained(error: "ErrorDetails", origins: Mapping[str, str], file: Path | None) -> str:
+    """A line that names the setting as its source does: as a flag, a variable, or a key of the file."""
+    if not error["loc"]:
+        return str(error["ctx"]["error"])
+    name, value, message = str(error["loc"][0]), error["input"], error["msg"]
+    if error["type"] == "extra_forbidden":
+        close = get_close_matches(name, Settings.model_fields, 1)
+        return f"{file}: {name}: there is no such setting" + (f"; did you mean {close[0]}?" if close else "")
+    match origins[name]:
+        case "flag":
+            return f"--{name.replace('_', '-')} {value}: {message}"
+        case origin if origin == str(file):
+            return f"{file}: {name} = {value!r}: {message}"
+        case variable:
+            return f"{variable}={value!r}: {message}"
+
+
 def read_file(file: Path | None) -> dict[str, Any]:
     """The content of a settings file, or raise SettingsError."""
     if file is None:
         return {}
     try:
         return tomllib.loads(file.read_text("utf-8"))
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise SettingsError(f"--config {file}: {error.strerror}") from None
+    except ValueError as error:
         raise SettingsError(f"{file}: {error}") from None

@@ -69,6 +69,8 @@ LOADS = [
 FOLLOWED_ELSEWHERE = {
     "--token": "test_commands.py: test_tokens",
     "--tls": "test_commands.py: test_tls",
+    "--tls-ca": "test_commands.py: test_tls",
+    "--out": "test_demo.py: test_a_day_of_flights",
     "--client-cert": "test_commands.py: test_tls",
     "--client-key": "test_commands.py: test_tls",
     "dynhull serve": "every test with a server",

@@ -1,13 +1,15 @@
-"""The commands that ask: query, watch, verify, top, bench. What they print, for people and pipes, and how they end."""
+"""The reading commands: query, watch, verify, top, bench. Their output, for people and pipes, and their exit codes."""
 
 import hashlib
 import json
 import os
+import re
 import subprocess
 
 import pytest
 import trustme
-from command_line import dynhull
+from command_line import dynhull, on_a_terminal
+from forgetful import FORGETFUL
 from server_process import COMMAND, PATIENCE, server_process
 
 from dynhull_client import HullClient
@@ -61,9 +63,14 @@ def test_what_is_no_point(hull, text):
     assert text in done.stderr
 
 
+def test_vertices_are_asked_for_without_points(hull):
+    done = dynhull("query", hull, "vertices", "1,2")
+    assert (done.exit_code, done.stderr) == (2, "error: vertices takes no points, but '1,2' was given\n")
+
+
 def test_watch(hull):
     done = dynhull("watch", hull, "--events", 1)
-    assert (done.exit_code, done.stdout) == (0, "1  6  4  +4 -0  16  16\n")
+    assert (done.exit_code, done.stdout) == (0, "1\t6\t4\t4\t0\t16.0\t16.0\n")
     done = dynhull("watch", hull, "--events", 1, "--json")
     event = json.loads(done.stdout)
     assert (event["revision"], event["points"], event["snapshot"]) == (1, 6, True)
@@ -91,6 +98,18 @@ def test_verify(hull, name):
     done = dynhull("verify", hull, f"{name}-not-there")
     assert done.exit_code == 1
     assert done.stderr.startswith(f"error: there is no hull '{name}-not-there'\n")
+
+
+def test_verify_of_a_wrong_hull():
+    with server_process("--scrub-cpu", "0", wrap=FORGETFUL) as server, HullClient(server.address) as client:
+        client.create_hull("a")
+        client.apply("a", insert=SQUARE)
+        done = dynhull("verify", "--address", server.address)
+        assert done.exit_code == 1
+        assert done.stdout.startswith("a: DIFFERENT at revision 1: ")
+        found = json.loads(dynhull("verify", "a", "--address", server.address, "--json").stdout)
+    assert (found["name"], found["equal"], found["points"]) == ("a", False, 6)
+    assert found["difference"] == {"row": 0, "live": [4, 0], "recomputed": [0, 0]}
 
 
 def test_measure(hull):
@@ -172,7 +191,25 @@ def test_top(hull, served):
         (hull, 6, 5),
     ]
     done = dynhull("top", hull, "--interval", 0.05)
-    assert done.stdout.splitlines()[1] == f"{hull}\t1\t6\t5\t0.0\t+0"
+    assert done.stdout.splitlines()[1] == f"{hull}\t1\t6\t5\t0.0\t0.0"
+
+
+def test_watch_and_top_on_a_terminal_show_tables(served):
+    with HullClient(served) as client:
+        client.create_hull("shown")
+        client.apply("shown", insert=SQUARE)
+    code, shown = on_a_terminal("watch", "shown", "--events", "1", "--address", served)
+    assert code == 0
+    assert "shown at revision 1" in shown
+    assert cells(shown)[-1] == ["1", "6", "4", "+4 -0", "16", "16"]
+    code, shown = on_a_terminal("top", "shown", "--interval", "0.01", "--looks", "2", "--address", served)
+    assert code == 0
+    assert cells(shown)[-1] == ["shown", "1", "6", "5", "0.0", "+0"]
+
+
+def cells(shown):
+    """The rows of the tables on a terminal."""
+    return [[cell.strip() for cell in line.split("│")[1:-1]] for line in shown.splitlines() if "│" in line]
 
 
 def test_bench(served):
@@ -181,6 +218,11 @@ def test_bench(served):
     figures = json.loads(done.stdout)
     assert figures["updates_per_second"] > 0
     assert 0 < figures["locate_ms_median"] <= figures["locate_ms_p99"]
+    done = dynhull("bench", "--seconds", 0.1, "--points", 10)
+    rate, acknowledgement, locate = done.stdout.splitlines()
+    assert re.fullmatch(r"[\d,]+ updates per second", rate)
+    for what, line in (("acknowledgement", acknowledgement), ("locate", locate)):
+        assert re.fullmatch(what + r": median [\d.]+ ms, 99th percentile [\d.]+ ms", line)
     with HullClient(served) as client:
         assert list(client.list_hulls("bench-")) == []
 
@@ -252,6 +294,43 @@ def test_a_reader_that_has_enough(hull, served):
     command = f"{COMMAND} query {hull} --address {served} | head -1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert (done.stdout.count("\n"), done.stderr) == (1, "")
+
+
+def test_a_reader_of_a_quiet_hull_that_has_enough(hull, served):
+    for options in ("", "--json"):
+        command = f"{COMMAND} watch {hull} {options} --address {served} | head -1"
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        assert (done.stdout.count("\n"), done.stderr) == (1, "")
+
+
+def test_columns_are_named():
+    for command, names in (
+        ("watch", "revision, points, vertices, vertices added, vertices removed, area, perimeter"),
+        ("top", "name, revision, points, distinct points, batches per second, and points gained per second"),
+    ):
+        assert names in " ".join(dynhull(command, "--help").stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--tls-ca points.csv", "--tls-ca points.csv: the file has no certificates in PEM format"),
+        ("--client-cert key --client-key cert", "not a certificate and its private key in PEM format"),
+        ("--token a\nb", "token must consist of printable ASCII characters"),
+    ],
+)
+def test_what_gRPC_would_not_explain(tmp_path, monkeypatch, options, words):  # noqa: N802
+    issued = trustme.CA().issue_cert("127.0.0.1")
+    issued.private_key_pem.write_to_path(tmp_path / "key")
+    issued.cert_chain_pems[0].write_to_path(tmp_path / "cert")
+    (tmp_path / "points.csv").write_text("x,y\n1,2\n")
+    monkeypatch.chdir(tmp_path)
+    done = subprocess.run(
+        [COMMAND, "list", "--address", "127.0.0.1:1", *options.split(" ")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_completion_knows_the_commands(tmp_path):

@@ -3,10 +3,15 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
+import server_process as servers
+from command_line import dynhull
+from forgetful import FORGETFUL
 
+from dynhull_cli.demo import command
 from dynhull_cli.demo.replay import replay
 from dynhull_cli.demo.scene import Frame
 from dynhull_cli.demo.server import server_process
@@ -72,6 +77,20 @@ def test_unusable_input_says_what_to_do(tmp_path, text, options, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--day", "x"], "--day 'x' is not a day such as 2013-03-08"),
+        (["--out", "d.txt"], "--out d.txt: the name must end in .png"),
+        (["--out", "nowhere/d.png"], "--out nowhere/d.png: there is no folder nowhere"),
+    ],
+)
+def test_unusable_options_are_refused_at_once(options, message):
+    done = demo(*options)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+
+
 def test_a_day_of_another_year():
     done = demo("--day", "2014-01-01")
     assert done.returncode == 2
@@ -95,3 +114,21 @@ def test_the_first_difference_is_told():
     with server_process() as address, HullClient(address) as client:
         differences = [step.difference for step in replay(client, Scene())]
     assert differences == [None, "the server holds 3 points, 2 were sent"]
+
+
+def test_a_wrong_server_is_found_out(tmp_path, monkeypatch):
+    @contextmanager
+    def wrong_server() -> Iterator[str]:
+        with servers.server_process("--scrub-cpu", "0", wrap=FORGETFUL) as server:
+            yield server.address
+
+    monkeypatch.setattr(command, "server_process", wrong_server)
+    points, picture = tmp_path / "points.csv", tmp_path / "picture.png"
+    points.write_text("t,x,y\n1,0,0\n1,4,0\n1,0,4\n2,5,5\n")
+    done = dynhull("demo", "--points", points, "--time", "t", "--out", picture)
+    assert done.exit_code == 1
+    *_, compared, difference = done.stdout.splitlines()
+    assert compared == "Live hull compared with Chan's recomputation and with the watcher's copy: 0 batches"
+    assert difference.startswith("DIFFERENT at 1: the live hull differs from Chan's recomputation: ")
+    assert "VERIFIED" not in done.stdout
+    assert not picture.exists()

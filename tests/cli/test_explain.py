@@ -57,7 +57,7 @@ def test_sheet(example, tmp_path):
 
 
 def test_vector_sheet(example, tmp_path):
-    """Its text is text, and the same points make the same file."""
+    """The SVG holds text as text, and equal points give equal files."""
     assert explain("graham_scan", example, "--out", tmp_path / "a.svg").returncode == 0
     drawing = ET.fromstring((tmp_path / "a.svg").read_text(encoding="utf-8"))
     words = {element.text for element in drawing.iter("{http://www.w3.org/2000/svg}text")}
@@ -107,7 +107,7 @@ def test_the_tree_of_the_example(tmp_path):
 
 
 def test_the_page_in_a_browser(tmp_path):
-    """Keys go through the steps; a point says its coordinates; nothing goes to the console."""
+    """Keys move through the steps; a point shows its coordinates; the console stays empty."""
     chromium = shutil.which("chromium")
     assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
     assert explain("tree", "--out", tmp_path / "page.html").returncode == 0
@@ -142,7 +142,7 @@ def test_the_tree_of_own_points(example, tmp_path):
 
 @pytest.mark.parametrize("count", [1, 2, 5, 30])
 def test_the_tree_shows_the_hull_of_its_points(count):
-    """Points that repeat, among them."""
+    """Some of the points are equal."""
     points = [(float(i * i % 11), float(i * 7 % 13)) for i in range(count)] + [(1.0, 1.0)] * 3
     story = tree_story("points", points)
     position = {name: place for place, name in story.names.items()}
@@ -181,13 +181,17 @@ def test_long_traces_are_thinned_out_and_say_so(tmp_path):
         (["graham_scan", "FILE", "--x", "east"], "FILE has no column 'east' (--x); it has x, y"),
         (["quickhull", "FILE"], "quickhull: not an algorithm; choose graham_scan, jarvis_march,"),
         (["tree", "FILE", "--collinear", "keep"], "--collinear keep: the tree keeps vertices only"),
+        (["graham_scan", "MORE"], "has 2,001 points: a picture of a static algorithm has room for 2,000; draw a part"),
+        (["graham_scan", "FILE", "--out", "nowhere/a.svg"], "nowhere/a.svg: there is no folder nowhere"),
         (["tree", "MANY"], "has 201 points: a picture of the tree has room for 200"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(example, tmp_path, arguments, message):
     many = tmp_path / "many.csv"
     many.write_text("x,y\n" + "".join(f"{i},{i * i}\n" for i in range(201)))
-    files = {"FILE": str(example), "MANY": str(many)}
+    more = tmp_path / "more.csv"
+    more.write_text("x,y\n" + "".join(f"{i},{i * i}\n" for i in range(2001)))
+    files = {"FILE": str(example), "MANY": str(many), "MORE": str(more)}
     done = explain(*[files.get(argument, argument) for argument in arguments])
     assert done.returncode == 2
     assert message.replace("FILE", str(example)) in done.stderr

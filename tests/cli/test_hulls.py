@@ -2,36 +2,17 @@
 
 import json
 import os
-import pty
 import subprocess
 
 import pytest
-from command_line import dynhull
-from server_process import COMMAND, PATIENCE
+from command_line import dynhull, on_a_terminal
+from server_process import COMMAND
 
 from dynhull_client import HullClient
 
 
 def names(prefix):
     return [line.split("\t")[0] for line in dynhull("list", prefix).stdout.splitlines()]
-
-
-def on_a_terminal(*arguments, answer):
-    """Run a command on a terminal of its own; its exit code and what it showed."""
-    controller, terminal = pty.openpty()
-    with subprocess.Popen([COMMAND, *arguments], stdin=terminal, stdout=terminal, stderr=terminal) as command:
-        os.close(terminal)
-        os.write(controller, answer)
-        code = command.wait(PATIENCE)
-        shown = b""
-        while True:
-            try:
-                part = os.read(controller, 65536)
-            except OSError:  # the other end is closed, and everything has been read
-                break
-            shown += part
-    os.close(controller)
-    return code, shown.decode()
 
 
 @pytest.mark.usefixtures("served")

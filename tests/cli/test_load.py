@@ -1,4 +1,4 @@
-"""`dynhull load`: what is in the file is in the hull, once, whatever was in the way."""
+"""`dynhull load`: the hull gets every point of the file once, after any failure on the way."""
 
 import hashlib
 import json
@@ -225,7 +225,7 @@ def test_resume_after_the_command_was_killed(tmp_path, served, name):
 
 
 def test_a_server_that_goes_and_comes_back(tmp_path):
-    """First it stays away for too long, then it is back in time."""
+    """First the server is down for too long, then it is back in time."""
     data = ("--data", str(tmp_path / "data"))
     rows = "".join(f"{x!r},{y!r}\n" for x, y in np.random.default_rng(1).normal(size=(16_384, 2)).tolist())
     load = [COMMAND, "load", "a", "-", "--producer", "p"]

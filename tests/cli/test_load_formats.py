@@ -127,6 +127,7 @@ def test_what_may_surprise_is_said(tmp_path, name, content, options, points, sai
         ("a.csv.gz", gzip.compress(COMMA.encode())[:-9], [], "the compressed data is damaged"),
         ("a.csv.gz", gzip.compress(b"x,y\n" + bytes(99))[:20] + bytes(99), [], "the compressed data is damaged"),
         ("a.csv", "x,y\n1,2\n", ["--x", "3", "--y", "1"], "has no column '3' (--x); it has x, y"),
+        ("a.csv", f"x,y\n1,2\n{'3' * 200_000},4\n", [], "a.csv, line 3: field larger than field limit"),
     ],
     ids=count(),
 )
@@ -202,6 +203,34 @@ def test_geometries_that_are_no_points(tmp_path, name):
     done = dynhull("load", name, path)
     assert done.exit_code == 2
     assert "encoded as multipoint" in done.stderr
+
+
+@pytest.mark.usefixtures("served")
+def test_geojson_that_is_no_geometry(tmp_path, name):
+    geometries = [
+        {"type": "Point", "coordinates": [1, 2]},
+        {"type": "Point", "coordinates": [1]},
+        {"type": "Circle", "coordinates": [1, 2]},
+        {"type": "Polygon", "coordinates": [7]},
+        {"type": "GeometryCollection", "geometries": 7},
+        {"type": "MultiPoint", "coordinates": [[1, True]]},
+    ]
+    path = tmp_path / "points.ndjson"
+    path.write_text("\n".join(map(json.dumps, geometries)))
+    done = dynhull("load", name, path, "--vertices", "--json")
+    assert (done.exit_code, json.loads(done.stdout)["points"]) == (0, 1)
+    for reason in (
+        "line 2: not two coordinates",
+        "line 3: its geometry is Circle, which GeoJSON does not have",
+        "line 4: its coordinates are not a list",
+        "line 5: its coordinates are not a list",
+        "line 6: y is true, not a number",
+    ):
+        assert reason in done.stderr
+    path.write_text("\n".join(map(json.dumps, geometries[1:])))
+    done = dynhull("load", name, path, "--vertices", "--dry-run")
+    assert done.exit_code == 2
+    assert "has no points" in done.stderr
 
 
 def test_a_compressed_pipe(tmp_path, served, name):

@@ -124,14 +124,14 @@ def test_an_unknown_command() -> None:
 @pytest.mark.parametrize("arguments", [("serve",), ("serve", "--port", "0")])
 def test_a_missing_extra_says_how_to_install_it(arguments: tuple[str, ...]) -> None:
     result = run_without("grpc", *arguments)
-    assert result.returncode == 1
+    assert result.returncode == 2
     assert "pip install 'dynhull[server]'" in result.stderr
     assert "Traceback" not in result.stderr
 
 
 def test_something_missing_that_is_loaded_late() -> None:
     result = run_without("pandas", "demo")
-    assert result.returncode == 1
+    assert result.returncode == 2
     assert "dynhull demo needs pandas" in result.stderr
     assert "pip install 'dynhull[demo]'" in result.stderr
     assert "Traceback" not in result.stderr
@@ -141,7 +141,7 @@ def test_a_format_that_is_not_installed(tmp_path: Path) -> None:
     file = tmp_path / "points.geojson"
     file.write_text("{}")
     result = run_without("ijson", "load", "a", str(file))
-    assert result.returncode == 1
+    assert result.returncode == 2
     assert "dynhull load needs ijson" in result.stderr
     assert "pip install 'dynhull[client,cli,files]'" in result.stderr
 
@@ -157,5 +157,5 @@ def test_help_works_without_the_extra() -> None:
 
 def test_without_a_command_line() -> None:
     result = run_without("typer", "serve")
-    assert result.returncode == 1
+    assert result.returncode == 2
     assert "pip install 'dynhull[cli]'" in result.stderr

@@ -339,3 +339,33 @@ def test_reads_and_numbered_writes_are_tried_again(address: str, connect: type[H
             client.apply(name, insert=[[3, 4]])
     with connect(address) as client:
         assert client.get_hull(name).revision == 1
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda client: client.get_hull("a", min_revision=-1), "min_revision must be at least 0, got -1"),
+        (lambda client: client.get_hull("a", timeout=-1), "timeout must be at least 0, got -1"),
+        (lambda client: client.get_hull("a", timeout=float("nan")), "timeout must be at least 0, got nan"),
+        (lambda client: list(client.list_hulls(timeout=-0.5)), "timeout must be at least 0, got -0.5"),
+        (lambda client: client.watch("a", min_revision=-2), "min_revision must be at least 0, got -2"),
+        (lambda client: client.apply("a", producer="p", sequence=-3), "sequence must be at least 0, got -3"),
+    ],
+)
+def test_a_number_that_no_call_can_have(client: HullClient, ask, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ask(client)
+
+
+def test_what_no_connection_can_have(connect: type[HullClient]) -> None:
+    with pytest.raises(ValueError, match="timeout must be at least 0, got -1"):
+        connect("127.0.0.1:1", timeout=-1)
+    for token in ("a\nb", "ä", "a b"):
+        with pytest.raises(ValueError, match="token must consist of printable ASCII characters without") as caught:
+            connect("127.0.0.1:1", token=token)
+        assert token not in str(caught.value)
+
+
+def test_a_revision_that_does_not_come(client: HullClient, hull: str) -> None:
+    with pytest.raises(DeadlineError, match=f"longer than 0.1 s; hull '{hull}' may not have reached revision 7"):
+        client.get_hull(hull, min_revision=7, timeout=0.1)

@@ -1,4 +1,4 @@
-"""What a client does with answers that a later version of the server may give: errors and events it does not know."""
+"""A client handles errors and events of later server versions, which it does not know."""
 
 from collections.abc import Iterator
 from concurrent import futures

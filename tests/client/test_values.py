@@ -1,4 +1,4 @@
-"""What a person sees of the client in an interpreter: names, signatures, answers as values."""
+"""The client as a person sees it in an interpreter: names, signatures, answers as values."""
 
 import inspect
 import pydoc

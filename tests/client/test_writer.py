@@ -1,4 +1,4 @@
-"""The writer: every batch exactly once, after any failure of the connection or the server."""
+"""The writer: every batch is applied exactly once, after any failure of the connection or the server."""
 
 import signal
 import threading

@@ -84,6 +84,18 @@ def test_touching_by_one_unit_in_the_last_place():
             assert contact(left, right).depth == 0
 
 
+@pytest.mark.parametrize("gap", [0.0, 2.0**-52])
+@pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 3.0)])
+def test_segments_on_one_line(way, gap):
+    """They have an end in common, or the smallest gap there is; no edge of one is beside the other."""
+    start, end, again, last = ([t * way[0], t * way[1]] for t in (0, 1, 1 + gap, 2))
+    for one, other in (([start, end], [again, last]), ([start, end], [again]), ([end], [again, last])):
+        distance = 0.0 if gap == 0 else pytest.approx(gap * np.hypot(*way), rel=0.5)
+        for a, b in ((one, other), (other, one)):
+            assert intersect(polygon(a), polygon(b)) == (gap == 0)
+            assert contact(polygon(a), polygon(b)).distance == distance
+
+
 @pytest.mark.parametrize("d", [2, 3])
 def test_rounded_shapes(d):
     x, y = np.eye(d)[:2]
@@ -130,7 +142,7 @@ def bodies():
 
 
 def test_cylinders_and_cones_against_their_sections():
-    """A point lies to a solid of revolution as it lies to the section in one plane with it."""
+    """A solid of revolution is as far from a point as its section in the plane through the point and the axis."""
     random = np.random.default_rng(4)
     for _ in range(40):
         base, top = random.normal(size=(2, 3))
@@ -244,7 +256,7 @@ def test_bad_input(ask, message):
 
 
 def test_a_sliver_beside_the_origin():
-    """Ends so far away that their weighted sums are off by more than the distance."""
+    """Ends so far away that the error of their weighted sums exceeds the distance."""
     sliver = [(1166548778139278.0, 0.0), (1.0, 0.0), (-1.4295695843808416e16, 256955.0)]
     distance = float(root(oracle.polygons([(0.0, 0.0)], sliver)))
     assert contact(point([0, 0]), polygon(sliver)).distance == pytest.approx(distance, rel=1e-9)

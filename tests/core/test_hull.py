@@ -160,6 +160,16 @@ def test_a_batch_is_a_set(make, rows, batch, more):
 
 
 @both
+def test_a_batch_that_empties_the_hull_on_the_way(make):
+    """The least points go first, the greatest come last, twice."""
+    hull = make([[0, 0], [1, 0]])
+    assert hull.apply([-1, -1, 1, 1], [[0, 0], [1, 0], [2, 3], [2, 3]]) == 4
+    hull.check()
+    assert (len(hull), hull.distinct, hull.count(2, 3)) == (2, 1, 2)
+    assert hull.vertices().tolist() == [[2, 3]]
+
+
+@both
 def test_example(make):
     hull = make(EXAMPLE)
     assert hull.vertices().tolist() == CORNERS

@@ -16,7 +16,10 @@ BAD = [
     ([1.0, 2.0], ValueError, r"must have shape \(n, 2\), got \(2,\); one point is \[\[1\.0, 2\.0\]\]"),
     ([[1, 2, 3]], ValueError, r"must have shape \(n, 2\), got \(1, 3\)"),
     (np.zeros((2, 2, 2)), ValueError, r"\(2, 2, 2\)"),
-    (7, ValueError, r"must have shape \(n, 2\), got \(\)"),
+    (7, ValueError, r"must have shape \(n, 2\), got 7$"),
+    ({(1, 2), (3, 4)}, ValueError, r"must have shape \(n, 2\), got a set: use list\(points\)"),
+    ({1: (1, 2)}.values(), ValueError, r"must have shape \(n, 2\), got a dict_values: use list\(points\)"),
+    ({"x": 1}, ValueError, r"must have shape \(n, 2\), got a dict"),
     ([[0, 0], [1]], ValueError, r"row 1 is \[1\]: must be two numbers"),
     ([[0, 0], 5], ValueError, r"row 1 is 5: must be two numbers"),
     ([[0, 0], [1, "x"]], TypeError, r"row 1: coordinates must be real numbers"),
@@ -25,7 +28,17 @@ BAD = [
     (np.array([["2020-01-01", "2020-01-01"]], "M8[D]"), TypeError, r"real numbers"),
     (np.array([[0, 0], [2**53 + 1, 0]]), ValueError, r"points row 1 is 9007199254740993: no double has this value"),
     (np.array([[0, 0], [0, 2**64 - 1]], np.uint64), ValueError, r"points row 1 is 18446744073709551615"),
-    ([[0, 0], [0, 10**400]], ValueError, r"points row 1 is 1.*too large for a double"),
+    ([[0, 0], [0, 10**400]], ValueError, r"points row 1 is 10{36}\.\.\.0{37}: too large for a double"),
+    (
+        [[0, 0], [0, 10**5000]],
+        ValueError,
+        r"points row 1 is an int with too many digits to show: too large for a double",
+    ),
+    (
+        [[0, Fraction(1, 10**5000)]],
+        ValueError,
+        r"row 0 is a Fraction with too many digits to show: no double has",
+    ),
     ([[Fraction(1, 2), Fraction(1, 3)]], ValueError, r"row 0 is Fraction\(1, 3\): no double has this value"),
     ([[Decimal("0.1"), 0]], ValueError, r"row 0 is Decimal\('0\.1'\)"),
     ([[0, 0], [1, 1j]], ValueError, r"row 1 .*not exactly a pair of doubles"),
@@ -84,6 +97,18 @@ def test_bad_coordinates(method, x, y, error, message):
     with pytest.raises(error, match=message):
         getattr(hull, method)(x, y)
     assert len(hull) == 1
+
+
+def test_a_number_too_long_to_show():
+    hull = DynamicHull()
+    with pytest.raises(ValueError, match="y is an int with too many digits to show: too large for a double"):
+        hull.insert(0, 10**5000)
+
+
+@pytest.mark.parametrize("point", ["a", "ab", 5, None, (1,), (1, 2, 3)])
+def test_what_is_no_point_is_not_in_a_hull(point):
+    with pytest.raises((TypeError, ValueError), match=r"a point is \(x, y\), got|must be real numbers"):
+        point in DynamicHull([[0, 0]])  # noqa: B015
 
 
 def test_good_coordinates():

@@ -2,7 +2,7 @@
 
 import random
 from fractions import Fraction
-from itertools import permutations, product
+from itertools import combinations_with_replacement, permutations, product
 from math import inf
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from inputs import EXTREME, ULP, point
 
 import dynhull
 from dynhull import _predicates as predicates
-from dynhull._predicates import direction_sign, orientation
+from dynhull._predicates import cross_sign, cross_signs, direction_sign, dot_sign, dot_signs, orientation
 
 CASES = Path(__file__).parents[1] / "data" / "orient2d.txt"
 
@@ -138,6 +138,14 @@ def test_any_crossing(crossing, points):
     assert crossing(a, b, c, d, z) == exact_crossing(a, b, c, d, z)
 
 
+def test_every_crossing_on_a_small_grid(crossing):
+    """Vertical edges on both sides, and z above, below and at the ends of them."""
+    grid = list(product((0.0, 1.0, 2.0), repeat=2))
+    for a, b, z, c, d in combinations_with_replacement(grid, 5):
+        if a < b < z and c < d and (a[0] < b[0] or c[0] < d[0]):
+            assert crossing(a, b, c, d, z) == exact_crossing(a, b, c, d, z)
+
+
 @pytest.mark.parametrize("scale", [1.0, 1e-150, 1e120])
 def test_lines_that_cross_very_near_the_vertical(crossing, scale):
     """Where the two heights differ by less than rounding: the sign that no hull test can be sure to need."""
@@ -169,3 +177,37 @@ def test_directions_across_an_edge():
         stretch = random_.random()
         d = stretch * (a[1] - b[1]), stretch * (b[0] - a[0])
         assert direction_sign(d, a, b) == sign(oracle.dot(d, b) - oracle.dot(d, a))
+
+
+def exact_cross_and_dot(*points):
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = exact(*points)
+    (ux, uy), (vx, vy) = (bx - ax, by - ay), (dx - cx, dy - cy)
+    return sign(ux * vy - uy * vx), sign(ux * vx + uy * vy)
+
+
+def check_cross_and_dot(quadruples):
+    """One by one, and as arrays."""
+    expected = [exact_cross_and_dot(*points) for points in quadruples]
+    assert [(cross_sign(*points), dot_sign(*points)) for points in quadruples] == expected
+    arrays = np.array(quadruples).transpose(1, 0, 2)
+    assert list(zip(cross_signs(*arrays).tolist(), dot_signs(*arrays).tolist(), strict=True)) == expected
+
+
+@given(st.lists(st.tuples(point, point, point, point), min_size=1, max_size=5))
+@example([((0.0, 0.0), (1.7e308, 1.7e308), (-1.7e308, 0.0), (0.0, -1.7e308))])
+@example([((0.0, 0.0), (1e-200, 3e-200), (0.0, 0.0), (1e-200, 3e-200))])
+def test_any_two_vectors(quadruples):
+    check_cross_and_dot(quadruples)
+
+
+def test_vectors_very_nearly_parallel_or_perpendicular():
+    """As near as rounding gets to one direction, or to the right angle with it."""
+    random_ = random.Random(0)
+    quadruples = []
+    for i in range(2000):
+        a, b, c = [tuple(random_.uniform(-1, 1) * 10 ** random_.uniform(-3, 3) for _ in range(2)) for _ in range(3)]
+        x, y = b[0] - a[0], b[1] - a[1]
+        x, y = (x, y) if i % 2 else (-y, x)
+        stretch = random_.uniform(-2, 2)
+        quadruples.append((a, b, c, (c[0] + stretch * x, c[1] + stretch * y)))
+    check_cross_and_dot(quadruples)

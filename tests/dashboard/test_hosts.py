@@ -84,3 +84,11 @@ def test_its_own_names_are_answered(dashboard: str, path: str) -> None:
     for host in (dashboard, f"LocalHost:{port}", f"[::1]:{port}", NAMED):
         assert status(dashboard, path, Host=host, Origin=f"http://{host}") == expected
     assert status(dashboard, path, Host=dashboard, Origin=f"https://{NAMED}") == expected
+
+
+def test_whether_the_page_is_there_can_be_asked(dashboard: str) -> None:
+    connection = http.client.HTTPConnection(dashboard, timeout=PATIENCE)
+    connection.request("HEAD", "/")
+    answered = connection.getresponse()
+    assert (answered.status, answered.read()) == (http.HTTPStatus.OK, b"")
+    connection.close()

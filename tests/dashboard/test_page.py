@@ -18,6 +18,21 @@ from dynhull_client import HullClient
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
 
+# Pixels between the heading of a cell and its figure, or the height of a line if the figure is below.
+GAP = """cell => {
+    const heading = document.createElement("span")
+    heading.textContent = cell.dataset.heading
+    heading.style.position = "absolute"
+    cell.append(heading)
+    const {width, height} = heading.getBoundingClientRect()
+    heading.remove()
+    const figure = document.createRange()
+    figure.selectNodeContents(cell)
+    const {left, top} = figure.getBoundingClientRect()
+    const place = cell.getBoundingClientRect()
+    return top >= place.top + height ? height : left - place.left - width
+}"""
+
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
@@ -81,7 +96,7 @@ def pick(page: Page, name: str) -> None:
 
 
 def wait_for_hulls(page: Page, *names: str) -> None:
-    """Until the page knows of these hulls."""
+    """Wait until the page lists these hulls."""
     page.wait_for_function(
         """names => {
             const known = Bokeh.documents[0]?.get_model_by_name("page").offered ?? []
@@ -268,6 +283,14 @@ def test_a_refused_token_is_named_as_the_cause(browser: Browser, tmp_path: Path)
         expect(page.get_by_role("alert")).to_contain_text("Start the dashboard with a --token that the server knows")
 
 
+@pytest.mark.parametrize("name", ["<b>x", "a b"])
+def test_a_name_that_no_hull_can_have(browser: Browser, url: str, name: str) -> None:
+    with opened(browser, url, name) as page:
+        expect(note(page)).to_contain_text(
+            f"The server has no hull {name}. Check the name, or pick another hull above."
+        )
+
+
 def test_a_name_in_the_address_is_never_html(browser: Browser, url: str) -> None:
     name = "<img src=x onerror=document.title='run'>"
     with opened(browser, url, name) as page:
@@ -349,13 +372,17 @@ def test_a_dashboard_that_goes_and_comes_back(browser: Browser, server: tuple[Se
         page.close()
 
 
-def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, hull: str) -> None:
+def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullClient, hull: str) -> None:
     with opened(browser, url, hull, **PHONE) as page:
         wait_for_vertices(page, hull, SQUARE)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         plane = page.locator(".plane").bounding_box()
         assert plane["width"] > 350
         assert plane["height"] < 600
+        client.apply(hull, insert=[[0, 2984], [2985, 2984]])
+        area = page.locator("td[data-heading^=Area]")
+        expect(area).to_contain_text("4,459,588")
+        assert area.evaluate(GAP) >= 4
 
 
 def test_light_and_dark(browser: Browser, url: str, hull: str) -> None:

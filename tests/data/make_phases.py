@@ -1,4 +1,4 @@
-"""Write phases.json: what pymatgen's PhaseDiagram says of the formation energies that come with pymatgen.
+"""Write phases.json: the answers of pymatgen's PhaseDiagram on the formation energies that come with pymatgen.
 
     pip install pymatgen && python tests/data/make_phases.py > tests/data/phases.json
 

@@ -1,4 +1,4 @@
-"""The monitoring kit: what the tools of its addressees say, and whether it speaks of metrics that there are."""
+"""The files in deploy/: the tools that read them accept them, and every metric that they name exists."""
 
 import json
 import re
@@ -17,7 +17,7 @@ NAME = re.compile(r"\b(?:dynhull|process)_[a-z_]+")
 
 
 def accepted(*command: str | Path) -> str:
-    """What a program of Debian's says, which must be content."""
+    """The output of a program of Debian, which must exit with code 0."""
     ended = subprocess.run(
         [program(command[0]), *command[1:]], capture_output=True, text=True, timeout=PATIENCE, check=False
     )

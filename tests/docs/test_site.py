@@ -1,4 +1,4 @@
-"""Pages hold where they are read: on a code host, beside the files, and in the built site."""
+"""Links and markup of the pages work on a code host and in the built site."""
 
 import importlib
 import inspect
@@ -44,6 +44,11 @@ def test_links_hold_beside_the_files(page: Path) -> None:
     assert [str(target) for target in targets if not target.exists() and target not in GENERATED] == []
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if "docs" in page.parts], ids=lambda page: page.name)
+def test_the_text_of_a_link_is_not_the_name_of_a_page(page: Path) -> None:
+    assert re.findall(r"\[[\w/-]+\.md\]\(", page.read_text()) == []
+
+
 def test_links_hold_in_the_site(site: Path) -> None:
     broken = []
     for page in site.rglob("*.html"):
@@ -54,6 +59,12 @@ def test_links_hold_in_the_site(site: Path) -> None:
         targets = [(page.parent / path).resolve() for path in paths(addresses.found)]
         broken += [f"{page.relative_to(site)}: {target}" for target in targets if not target.exists()]
     assert broken == []
+
+
+def test_pictures_are_described(site: Path) -> None:
+    undescribed = re.compile(r'<img alt="(?:No description[^"]*)?"')
+    assert [page.parent.name for page in site.rglob("index.html") if undescribed.search(page.read_text())] == []
+    assert '<img alt="&lt;DynamicHull of 10 points' in (site / "notebooks/frames/index.html").read_text()
 
 
 def test_the_site_needs_no_other_host(site: Path) -> None:

@@ -100,7 +100,7 @@ def test_what_has_no_points_is_an_error(source: object, complaint: str) -> None:
 
 
 def test_a_single_object_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"points must have shape \(n, 2\), got \(\)"):
+    with pytest.raises(ValueError, match=r"points must have shape \(n, 2\), got None"):
         DynamicHull(np.array(None))
 
 

@@ -1,4 +1,4 @@
-// A client nobody here wrote: @grpc/grpc-js, from the .proto files alone. Prints one line of JSON with what it saw.
+// A client of other authors: @grpc/grpc-js, from the .proto files alone. Prints one line of JSON with what it saw.
 "use strict";
 
 const path = require("path");

@@ -10,7 +10,7 @@ HERE = Path(__file__).parent
 
 
 def pytest_ignore_collect(collection_path):
-    """Without the kernel there is nothing here to test."""
+    """Skip the tests of this folder where the kernel is not built."""
     return True if kernel is None and HERE in collection_path.parents else None
 
 

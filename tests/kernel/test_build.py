@@ -26,7 +26,7 @@ def test_no_operation_is_fused(x, y):
 
 
 def test_infinities_and_nans_are_respected():
-    """What -ffast-math takes away: an overflowing filter has to find that it cannot tell."""
+    """A filter that overflows must detect that it cannot decide; -ffast-math would remove that."""
     big = 1.7e308
     assert _kernel.orientation((-big, -big), (big, big), (big, -big)) == -1
     assert _kernel.orientation((-big, -big), (0.0, 0.0), (big, big)) == 0
@@ -36,7 +36,7 @@ def test_infinities_and_nans_are_respected():
 
 
 def test_the_build_forbids_fusing(compiler, tmp_path):
-    """Even for a processor that can, with the flags of CMakeLists.txt; without the one that forbids it, it happens."""
+    """With the flags of CMakeLists.txt, even where the processor can fuse; without -ffp-contract=off it does fuse."""
     options = re.search(r"target_compile_options\(_kernel PRIVATE (-.*)\)", (ROOT / "CMakeLists.txt").read_text())
     flags = options.group(1).split()
     source = tmp_path / "filter.cpp"

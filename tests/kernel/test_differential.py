@@ -1,4 +1,4 @@
-"""The kernel and the reference live the same lives and answer the same, to the last bit."""
+"""The kernel and the reference give the same answers after the same operations, to the last bit."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ def outcome(action, *arguments):
 
 @dataclass
 class Both:
-    """Two trees that are asked the same."""
+    """Two trees that run the same operations."""
 
     reference: tree.HullTree
     kernel: _kernel.HullTree
@@ -141,9 +141,11 @@ TestTwins.settings = settings(max_examples=60, stateful_step_count=30, deadline=
 def test_a_window_that_moves(kind):
     """Leaves fill, split, empty and merge; batches of every size, from one row to more than there are points."""
     random = np.random.default_rng(7)
-    window = cloud(kind, 3000, random)
+    # In a column all points are on one line: the reference needs exact arithmetic for every turn.
+    share = 4 if kind == "columns" else 1
+    window = cloud(kind, 3000 // share, random)
     both = Both(tree.HullTree(window), _kernel.HullTree(window))
-    for size in (1, 5, 30, 200, 1500, 40, 2500, 6000, 300):
+    for size in (1, 5, 30, 200, 1500 // share, 40, 2500 // share, 6000 // share, 300):
         fresh = cloud(kind, size, random)
         old = window[:size]
         ops = np.concatenate([np.ones(len(fresh), np.int8), np.full(len(old), -1, np.int8)])

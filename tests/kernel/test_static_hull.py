@@ -1,4 +1,4 @@
-"""The kernel's static hull throws away only what is inside."""
+"""The kernel's static hull discards only points inside the hull."""
 
 import numpy as np
 import pytest

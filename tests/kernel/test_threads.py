@@ -27,7 +27,7 @@ def impatient():
 
 @pytest.fixture
 def polite():
-    """Never take the interpreter from a thread: it has to let go of it."""
+    """Never switch threads: a thread has to release the interpreter itself."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1000)
     yield
@@ -36,7 +36,7 @@ def polite():
 
 @pytest.mark.usefixtures("impatient")
 def test_writers_and_readers():
-    """Every writer has points of its own, so what has to be there in the end is known."""
+    """Every writer has points of its own, so the final content is known."""
     tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
     before = tree.points()
     wrong = []
@@ -108,7 +108,7 @@ def test_a_query_sees_no_half_of_an_update():
 
 
 def test_other_threads_run_during_a_batch():
-    """A batch lets go of the interpreter: another thread counts while it runs."""
+    """A batch releases the interpreter: another thread counts while it runs."""
     rows = np.random.default_rng(0).random((1_000_000, 2))
     counted = []
     done = threading.Event()
@@ -163,7 +163,7 @@ def test_other_threads_run_during_queries(method):
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.usefixtures("impatient")
 def test_fork_during_batches():
-    """Whenever the fork comes, the child's hull is whole, and both processes go on."""
+    """At whatever moment a process forks, the child's hull is consistent, and both processes continue."""
     tree = _kernel.HullTree(np.random.default_rng(0).random((1000, 2)))
     stop = threading.Event()
     rows = np.random.default_rng(1).random((ROWS, 2))
@@ -198,7 +198,7 @@ def test_fork_during_batches():
 
 @pytest.mark.parametrize("before", [0, 1000])
 def test_points_that_another_thread_changes_meanwhile(before):
-    """Which points the hull gets is anybody's guess, or whether it refuses them; all are there or none."""
+    """The hull inserts some mixture of the arrays, or refuses it: all of the points or none."""
     random = np.random.default_rng(0)
     points, few = random.random((200_000, 2)), random.random((before, 2))
     spoiled = points.copy()

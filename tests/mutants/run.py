@@ -2,24 +2,28 @@
 
     make mutants MUTANTS=200 SEED=1
 
-Works on a copy in build/mutants. Draws mutants at random: in one line a sign, comparison, constant, condition or loop
-is changed. Prints what the tests do not find as a difference, and the score.
+Works on a copy in build/mutants. Each mutant, drawn at random, changes one sign, comparison, constant, condition or
+loop. Prints the mutants that the tests do not find, as differences, and the score. A mutant is found if a test fails,
+or if the tests use far more processor time than without it: limits on processor time and memory end its endless loops,
+however busy the machine is.
 """
 
 import argparse
 import os
 import random
 import re
+import resource
 import shlex
 import shutil
 import sys
-import time
+from collections.abc import Sequence
+from math import ceil
 from pathlib import Path
 
 from cosmic_ray.commands import init
 from cosmic_ray.mutating import mutate_and_test
 from cosmic_ray.work_db import WorkDB, use_db
-from cosmic_ray.work_item import TestOutcome, WorkItem
+from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome, WorkItem, WorkResult
 
 ROOT = Path(__file__).parents[2]
 COPY = ROOT / "build/mutants/tree"
@@ -28,32 +32,53 @@ MODULES = [
     *(f"dynhull/_{name}.py" for name in ("predicates", "nodes", "tree")),
     *(f"dynhull/static/_{name}.py" for name in ("boundary", "graham", "jarvis", "monotone_chain", "chan")),
 ]
-TESTS = ["static/test_static.py", "core/test_predicates.py", "core/test_stateful.py", "core/test_hull.py"]
-SLOW = "100000 or splits_and_merges or perturbation"
+TESTS = [
+    *(f"core/test_{name}.py" for name in ("hull", "predicates", "check", "stateful")),
+    "static/test_static.py",
+]
+SLOW = "20000 or splits_and_merges or perturbation"
 COMPARISON = "(Gt|GtE|Lt|LtE|Eq|NotEq)"
 OPERATORS = re.compile(
     r"core/(NumberReplacer|AddNot|ReplaceAndWithOr|ReplaceOrWithAnd|ReplaceTrueWithFalse|ReplaceFalseWithTrue"
     r"|ReplaceBreakWithContinue|ReplaceContinueWithBreak|ZeroIterationForLoop|ReplaceUnaryOperator_Delete_(USub|Not)"
     rf"|ReplaceBinaryOperator_(Add_Sub|Sub_Add|Mul_Add)|ReplaceComparisonOperator_{COMPARISON}_{COMPARISON})$"
 )
-PATIENCE = 2  # times as long as the tests take without a fault: what takes longer is found
+FACTOR = 2  # times the processor time that the tests use without a fault
+LONGEST = 600  # seconds of processor time that they may use without a fault
+MEMORY = 4_000_000  # KiB
+FAILED = re.compile(r"\d+ (failed|error)")
 
 
-def test_command() -> str:
-    """Stops at the first failure; the same examples for every mutant."""
-    tests = [f"tests/{path}" for path in TESTS]
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-x",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--hypothesis-seed=0",
-        "--timeout=30",
-    ]
-    return shlex.join(["env", "DYNHULL_KERNEL=python", "PYTHONPATH=.", *command, "-k", f"not ({SLOW})", *tests])
+def test_command(seconds: int, mutations: Sequence[MutationSpec]) -> str:
+    """Stops at the first failure; the same examples for every mutant, in the order that finds it soonest."""
+    static = any(mutation.module_path.parent.name == "static" for mutation in mutations)
+    limited = ["sh", "-c", f'ulimit -t {seconds} && ulimit -v {MEMORY} && exec "$@"', "sh"]
+    environment = ["env", "DYNHULL_KERNEL=python", "PYTHONPATH=."]
+    pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout=0"]
+    hypothesis = ["--hypothesis-profile=mutants", "--hypothesis-seed=0"]
+    tests = [f"tests/{path}" for path in (reversed(TESTS) if static else TESTS)]
+    return shlex.join([*limited, *environment, *pytest, *hypothesis, "-k", f"not ({SLOW})", *tests])
+
+
+def run(mutations: Sequence[MutationSpec], seconds: int) -> WorkResult:
+    """Run the tests with these mutations. Raises RuntimeError if they cannot be made."""
+    result = mutate_and_test(mutations, test_command(seconds, mutations), timeout=None)
+    if result.worker_outcome != WorkerOutcome.NORMAL or result.test_outcome == TestOutcome.INCOMPETENT:
+        raise RuntimeError(f"{mutations}: {result.worker_outcome} {result.output}")
+    return result
+
+
+def outcome(result: WorkResult) -> str:
+    """One of "NOT FOUND", "found" and "found by its processor time"."""
+    if result.test_outcome == TestOutcome.SURVIVED:
+        return "NOT FOUND"
+    return "found" if FAILED.search(result.output) else "found by its processor time"
+
+
+def processor_time() -> float:
+    """Seconds used by finished children."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def mutants(session: WorkDB) -> list[WorkItem]:
@@ -75,22 +100,22 @@ def main() -> int:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, COPY / name)
     os.chdir(COPY)
-    begun = time.monotonic()
-    if mutate_and_test([], test_command(), 600).test_outcome != TestOutcome.SURVIVED:
-        print("The tests fail without a fault.")
+    without = run([], LONGEST)
+    if without.test_outcome != TestOutcome.SURVIVED:
+        print(f"The tests fail without a fault.\n{without.output}")
         return 1
-    patience = PATIENCE * (time.monotonic() - begun)
+    seconds = ceil(FACTOR * processor_time())
     with use_db("session.sqlite") as session:
         everything = mutants(session)
     drawn = random.Random(options.seed).sample(everything, min(options.mutants, len(everything)))
     survivors = 0
     for item in drawn:
         [mutation] = item.mutations
-        result = mutate_and_test(item.mutations, test_command(), patience)
+        result = run(item.mutations, seconds)
         survived = result.test_outcome == TestOutcome.SURVIVED
         survivors += survived
         place = f"{mutation.module_path}:{mutation.start_pos[0]} {mutation.operator_name.removeprefix('core/')}"
-        print(f"NOT FOUND {place}\n{result.diff}" if survived else f"found {place}", flush=True)
+        print(f"{outcome(result)} {place}", *([result.diff] if survived else []), sep="\n", flush=True)
     found = len(drawn) - survivors
     print(f"{found} of {len(drawn)} mutants found ({found / len(drawn):.0%}), drawn from {len(everything)}")
     return 0

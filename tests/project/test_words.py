@@ -1,4 +1,4 @@
-"""The words of `make`: listed by `make help`, and explained to contributors."""
+"""The targets of `make`: listed by `make help`, and explained in CONTRIBUTING.md."""
 
 import re
 import subprocess

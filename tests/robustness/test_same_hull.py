@@ -134,6 +134,6 @@ def test_triangles_of_the_perturbation_grid(algorithm):
 
 
 def test_floating_point_alone_gets_these_wrong():
-    """The published inputs still kill: each has a triple whose rounded sign is not the true one."""
+    """Each published input has a triple whose rounded sign is wrong."""
     for rows in PUBLISHED.values():
         assert any(naive(*triple) != oracle.turn(*triple) for triple in permutations(rows, 3))

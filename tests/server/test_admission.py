@@ -1,4 +1,4 @@
-"""What those cost who may not, or no longer, talk to the server; and that nobody takes everything."""
+"""Callers without permission cost the server little, and no caller can use all of its resources."""
 
 import hashlib
 import json
@@ -34,7 +34,7 @@ MOST_BYTES = 100 * 10**6
 SERVICE = "/dynhull.v1.HullService/"
 POINT = {"inserts": {"coordinates": [1, 2]}}
 
-needs_proc = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells memory by /proc")
+needs_proc = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads memory use from /proc")
 
 
 class Tokens:
@@ -114,7 +114,7 @@ def test_messages_of_strangers_take_no_memory(flooded: Server, method: str, toke
 
 
 def test_a_token_taken_away_ends_its_calls(guarded: Server, tokens: Tokens) -> None:
-    """Nobody calls in between: the server finds out by itself."""
+    """The server notices by itself, without a call in between."""
     with ExitStack() as stack:
         one, two = (stub(stack, guarded, token) for token in ("one", "two"))
         one("CreateHull", pb.CreateHullRequest(name="a"))
@@ -166,7 +166,7 @@ def test_a_token_narrowed_ends_what_it_no_longer_allows(guarded: Server, tokens:
 
 
 def test_a_watcher_that_does_not_read_is_ended_too(tokens: Tokens) -> None:
-    """Its first event is larger than what waits on the way: it gets that event whole, and then the refusal."""
+    """Its first event is larger than the send buffer: it receives that event whole, and then the refusal."""
     x = np.arange(300_000.0)
     parabola = np.column_stack([x, x * x]).astype("<f8")
     options = ("--tokens", str(tokens.path), "--log-level", "error", "--create-on-write")
@@ -353,17 +353,39 @@ def test_metrics_for_other_machines_only_with_tls_and_tokens_or_when_told(
     metrics = ("--metrics-host", "0.0.0.0", "--metrics-port", "0")
     for options in ([], certificate, ["--tokens", str(tokens.path)]):
         refused = run("serve", "--port", "0", "--in-memory", *metrics, *options)
-        assert refused.returncode == 1
+        assert refused.returncode == 2
         assert "0.0.0.0 can be reached by other machines" in refused.stderr
     with server_process(*metrics, "--insecure") as server:
         assert server.process.stdout.readline().startswith("metrics on http://0.0.0.0:")
+
+
+def test_metrics_for_other_machines_need_the_client_certificate_that_calls_need(
+    tmp_path: Path, tokens: Tokens, certificate: list[str], authority: trustme.CA
+) -> None:
+    authority.cert_pem.write_to_path(tmp_path / "ca.pem")
+    tokens.write(all=([""], []))
+    options = ("--tokens", str(tokens.path), *certificate, "--tls-client-ca", str(tmp_path / "ca.pem"))
+    with server_process(*options, "--metrics-host", "0.0.0.0", "--metrics-port", "0") as server:
+        port = server.process.stdout.readline().rsplit(":", 1)[1].split("/")[0]
+        asked = urllib.request.Request(f"https://127.0.0.1:{port}/metrics", headers={"Authorization": "Bearer all"})
+        with pytest.raises(OSError, match="certificate required"):
+            urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting(authority)).close()
+        with urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting(authority, authority)) as response:
+            assert response.status == 200
+
+
+def trusting(authority: trustme.CA, issuer: trustme.CA | None = None) -> ssl.SSLContext:
+    """Trusts servers with a certificate of the authority; presents one of the issuer, if any."""
+    context = ssl.create_default_context(cadata=authority.cert_pem.bytes().decode())
+    if issuer is not None:
+        issuer.issue_cert("client@example.org").configure_cert(context)
+    return context
 
 
 def test_metrics_for_other_machines_are_for_who_may_read_everything(
     tokens: Tokens, certificate: list[str], authority: trustme.CA
 ) -> None:
     tokens.write(all=([""], []), some=(["a"], [""]))
-    trusting = ssl.create_default_context(cadata=authority.cert_pem.bytes().decode())
     options = ("--tokens", str(tokens.path), *certificate, "--metrics-host", "0.0.0.0", "--metrics-port", "0")
     with server_process(*options, complaints="UNAUTHENTICATED") as server:
         port = re.fullmatch(r"metrics on https://0.0.0.0:(\d+)/metrics\n", server.process.stdout.readline()).group(1)
@@ -371,10 +393,10 @@ def test_metrics_for_other_machines_are_for_who_may_read_everything(
         def page(token: str | None) -> str:
             headers = {} if token is None else {"Authorization": f"Bearer {token}"}
             asked = urllib.request.Request(f"https://127.0.0.1:{port}/metrics", headers=headers)
-            with urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting) as response:
+            with urllib.request.urlopen(asked, timeout=PATIENCE, context=trusting(authority)) as response:
                 return response.read().decode()
 
-        # Who connects and says nothing keeps nobody waiting.
+        # A connection that sends nothing delays no other caller.
         with socket.create_connection(("127.0.0.1", int(port))):
             for token, status in ((None, 401), ("wrong", 401), ("some", 403)):
                 with pytest.raises(urllib.error.HTTPError) as caught:

@@ -1,4 +1,4 @@
-"""Nothing dies in silence: what fails in the background is tried again, counted, and makes the server unwell."""
+"""Background work that fails is tried again and counted, and the health check reports it."""
 
 import os
 import resource
@@ -26,7 +26,7 @@ SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.Health
 
 @contextmanager
 def faulty_server(folder: Path, *options: str, **expected: object) -> Iterator[tuple[Server, Path]]:
-    """A server and the folder in which a file named after a fault brings it about."""
+    """A server, and the folder in which a file named after a fault causes that fault."""
     faults = folder / "faults"
     faults.mkdir()
     wrap = [sys.executable, FAULTY, str(faults)]

@@ -1,4 +1,4 @@
-"""What survives the end of a server, sudden or not: seen by clients of real processes."""
+"""What survives a stop or a kill of the server, as clients of real processes see it."""
 
 import os
 import signal
@@ -108,7 +108,7 @@ def test_a_second_server_on_the_folder_is_refused(tmp_path):
     with server_process(*options):
         command = [COMMAND, "serve", "--port", "0", *options]
         second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert second.returncode == 1
+    assert second.returncode == 2
     assert "another server" in second.stderr
     assert "Traceback" not in second.stderr
 
@@ -117,7 +117,7 @@ FULL_DISK = 'mount -t tmpfs -o size=3m none "$0" && exec "$@"'
 
 
 def test_a_full_disk_refuses_writes_and_recovers(tmp_path):
-    """The folder lies on a file system of three megabytes, in a mount namespace of the server's own."""
+    """The folder is on a file system of three megabytes, in a mount namespace of the server's own."""
     folder = tmp_path / "small"
     folder.mkdir()
     wrap = ["unshare", "--map-root-user", "--mount", "sh", "-c", FULL_DISK, str(folder)]

@@ -1,4 +1,4 @@
-"""Whatever is sent, the answer is a status of the contract's with a detail, and a refusal changes nothing."""
+"""Every request is answered with a status and detail of the contract, and a refused request changes nothing."""
 
 import math
 import os
@@ -63,7 +63,7 @@ FIELDS = {
 
 @st.composite
 def messages(draw: st.DrawFn, descriptor: Descriptor) -> Message:
-    """A message any of whose fields may hold anything."""
+    """A message with arbitrary values in any of its fields."""
     message = GetMessageClass(descriptor)()
     for name in {"name", "other_name"} & set(descriptor.fields_by_name):
         setattr(message, name, "a")
@@ -85,7 +85,7 @@ def set_field(draw: st.DrawFn, message: Message, field: FieldDescriptor) -> None
 
 
 def requests(method) -> st.SearchStrategy[list[bytes]]:
-    """What to send to a method: messages with anything in them, some bent, and bytes that are none."""
+    """Requests for a method: arbitrary messages, damaged messages, and bytes that are no message."""
     well_formed = messages(method.input_type).map(lambda message: message.SerializeToString())
     bent = st.tuples(well_formed, st.integers(0, 60), st.binary(min_size=1, max_size=3)).map(
         lambda parts: parts[0][: parts[1]] + parts[2] + parts[0][parts[1] + 1 :]
@@ -125,7 +125,7 @@ def check_refusal(error: grpc.RpcError) -> None:
 
 @pytest.fixture(scope="module")
 def channel() -> Iterator[grpc.Channel]:
-    """To a server of its own, which must not have said a word in the end."""
+    """A server of this module's own, which must not log a warning."""
     with server_process("--max-hulls", "20") as server, grpc.insecure_channel(server.address) as channel:
         yield channel
 

@@ -1,4 +1,4 @@
-"""A client nobody here wrote talks to the server: @grpc/grpc-js, from the .proto files alone."""
+"""A client of other authors calls the server: @grpc/grpc-js, from the .proto files alone."""
 
 import json
 import subprocess

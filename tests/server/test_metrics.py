@@ -1,4 +1,4 @@
-"""What Prometheus sees, and whether it is happy with it."""
+"""The metrics of a server: their values, and that Prometheus scrapes and accepts them."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from metrics import fetch, measured, scrape
 from patience import wait_until
 from peers import program
-from server_process import PATIENCE, run
+from server_process import PATIENCE
 
 from dynhull_client import HullClient, PointMissingError
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
@@ -152,12 +152,3 @@ def test_the_scrub_compares_every_hull() -> None:
         while (samples := scrape(address))[equal] < 2:
             assert samples[different] == 0
         assert samples["dynhull_scrub_cpu_seconds_total"] > 0
-
-
-def test_metrics_on_a_port_in_use() -> None:
-    with measured() as (_, address):
-        port = address.rpartition(":")[2]
-        refused = run("serve", "--port", "0", "--metrics-port", port)
-        assert refused.returncode == 1
-        assert f"127.0.0.1:{port}" in refused.stderr
-        assert "Traceback" not in refused.stderr

@@ -1,4 +1,4 @@
-"""Clients that do not read: they cost no memory, and are told so in the end."""
+"""Clients that do not read: they cost the server no memory, and their calls end with an error that says why."""
 
 import grpc
 import numpy as np
@@ -10,7 +10,7 @@ from dynhull_client._messages import decode_event
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-# Without this a client takes in megabytes that nobody reads.
+# Without this a client buffers megabytes that it does not read.
 SMALL_WINDOW = [("grpc.http2.bdp_probe", 0)]
 VERTICES = 1_000
 STALLED = 40
@@ -18,13 +18,13 @@ WARM_UP, BATCHES = 150, 600
 
 
 def ring(i: int) -> np.ndarray:
-    """So many vertices, all of them others for each i."""
+    """VERTICES vertices, different ones for each i."""
     angles = np.linspace(0, 2 * np.pi, VERTICES, endpoint=False) + i
     return 1e6 * np.stack((np.cos(angles), np.sin(angles)), axis=1)
 
 
 def turn(client: HullClient, begin: int, end: int) -> None:
-    """Replace the ring by the next, so many times: every batch changes the whole hull."""
+    """Replace each ring from `begin` to `end` by the next: every batch changes the whole hull."""
     with client.ingest("a") as stream:
         for i in range(begin, end):
             stream.apply(move=(ring(i), ring(i + 1)))
@@ -66,7 +66,7 @@ def test_watchers_that_do_not_read_cost_no_memory() -> None:
 
 
 def test_a_stream_whose_acknowledgements_are_not_read_is_not_read_either() -> None:
-    """The client would send for ever; what it got rid of is bounded."""
+    """The client would send for ever; the amount that the server accepts is bounded."""
     with (
         measured("--scrub-cpu", "0") as (server, address),
         HullClient(server.address) as client,

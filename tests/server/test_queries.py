@@ -171,7 +171,7 @@ def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
 
 @needs_proc
 def test_a_large_answer_is_given_up_when_its_caller_goes() -> None:
-    """What it costs after that is less than an answer about a tenth as many entries."""
+    """The call ends with its caller: the server then uses less time than for an answer about a tenth of the entries."""
     entries = np.random.default_rng(12).uniform(0, 1, (300_000, 2))
 
     def diagram(count: int) -> grpc.Future:

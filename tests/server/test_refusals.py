@@ -3,6 +3,7 @@
 import math
 import struct
 from collections.abc import Callable, Iterator
+from itertools import chain
 
 import grpc
 import pytest
@@ -151,6 +152,20 @@ INVALID_REQUESTS = {
         None,
         "nan",
     ),
+    "a sketch to be resumed": (
+        "Watch",
+        lambda hull: pb.WatchRequest(name=hull, directions=ONE, resume={"uid": "a"}),
+        "resume",
+        None,
+        "resume and directions",
+    ),
+    "a state of no hull": (
+        "Watch",
+        lambda hull: pb.WatchRequest(name=hull, resume={"revision": 1}),
+        "resume.uid",
+        None,
+        "",
+    ),
     "a progress interval of nothing": (
         "Watch",
         lambda hull: pb.WatchRequest(name=hull, progress_interval=Duration()),
@@ -184,7 +199,7 @@ def test_a_name_in_a_message_cannot_be_misread(stub: HullServiceStub, name: str,
 
 
 def finish(response: object) -> object:
-    """A unary response as it is; all of a stream."""
+    """A unary response, or the list of a stream's responses."""
     return list(response) if isinstance(response, Iterator) else response
 
 
@@ -310,3 +325,11 @@ def test_limits_are_told() -> None:
         assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
         assert dict(info.metadata) == {"limit": "max_message_bytes", "value": "4096"}
         assert stub.GetHull(pb.GetHullRequest(name="one")).hull.revision == 0
+        # An answer is limited like a request.
+        parabola = [[x, x * x] for x in range(300)]
+        for half in (parabola[:150], parabola[150:]):
+            points = points_pb2.Points(packed=struct.pack("<300d", *chain.from_iterable(half)))
+            stub.Apply(pb.ApplyRequest(name="one", batch=batch_pb2.Batch(inserts=points)))
+        code, info, _ = refusal(lambda: stub.GetHull(pb.GetHullRequest(name="one")))
+        assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
+        assert dict(info.metadata) == {"limit": "max_message_bytes", "value": "4096"}

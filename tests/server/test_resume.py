@@ -1,4 +1,4 @@
-"""A watch that is broken off and goes on: what the watcher holds is exactly the hull at the revision named."""
+"""A watch that is cut off and resumed: the watcher holds exactly the hull of each revision."""
 
 import threading
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ NAMES = iter(f"resume/{i}" for i in range(1_000_000))
 
 @dataclass(frozen=True)
 class Manner:
-    """How a watcher watches: at most so many events a second, an event for so many batches, so many to a connection."""
+    """How a watcher watches."""
 
     max_rate: float
     batches_between: int
@@ -41,7 +41,7 @@ MANNERS = st.builds(
 
 
 class Writer:
-    """Writes random batches, and knows the hull at every revision."""
+    """Writes random batches, and records the hull of every revision."""
 
     def __init__(self, client: HullClient, name: str, seed: int) -> None:
         self._client = client
@@ -72,7 +72,7 @@ class Writer:
 
 
 def follow(address: str, name: str, manner: Manner, writer: Writer) -> int:
-    """Watch to the end; returns how many connections went on without a snapshot."""
+    """Watch to the end; returns the number of connections that resumed without a snapshot."""
     copy, resumed = HullCopy(), 0
     with proxy(address) as way:
         while copy.revision < BATCHES:

@@ -1,11 +1,10 @@
-"""The background scrub finds a hull that is wrong, and leaves alone what it has seen."""
+"""The background scrub finds a wrong hull, and does not compare a revision twice."""
 
 import asyncio
-import sys
-from pathlib import Path
 
 import grpc
 import numpy as np
+from forgetful import FORGETFUL
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from live_engine import engine_in_memory, insert
 from patience import wait_until
@@ -28,7 +27,7 @@ class Liar(DynamicHull):
 
 
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:
-    """What so many rounds of a scrub compare."""
+    """The comparisons that `number` rounds of a scrub make."""
     seen: list[tuple[str, Verification]] = []
     scrub = Scrub(engine, Machine().clock, 1.0, lambda hull, outcome: seen.append((hull.name, outcome)))
     for _ in range(number):
@@ -70,10 +69,9 @@ def test_a_hull_that_is_as_it_was_is_left_out() -> None:
 
 
 def test_health_tells_of_a_wrong_hull_until_the_server_ends() -> None:
-    forgetful = [sys.executable, str(Path(__file__).with_name("forgetful.py"))]
     complaint = "differs from Chan's algorithm"
     with (
-        server_process("--scrub-pause", "0.1", wrap=forgetful, complaints=complaint) as server,
+        server_process("--scrub-pause", "0.1", wrap=FORGETFUL, complaints=complaint) as server,
         grpc.insecure_channel(server.address) as channel,
         HullClient(server.address) as client,
     ):

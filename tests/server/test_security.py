@@ -259,7 +259,7 @@ def test_other_machines_only_with_tls_and_tokens_or_when_told(tmp_path: Path, ce
     tokens.write_text(entry("t", [""], [""]))
     for options in ([], certificate, ["--tokens", str(tokens)]):
         refused = run("serve", "--host", "0.0.0.0", "--port", "0", *options)
-        assert refused.returncode == 1
+        assert refused.returncode == 2
         assert "--insecure" in refused.stderr
     for options in ([*certificate, "--tokens", str(tokens)], ["--insecure"]):
         with server_process("--host", "0.0.0.0", *options) as server:
@@ -285,7 +285,7 @@ def test_what_cannot_protect_is_refused(
     if text is not None:
         Path("bad.toml").write_text(text)
     refused = run("serve", "--port", "0", *options)
-    assert refused.returncode == 1
+    assert refused.returncode == 2
     assert message in refused.stderr
     assert "Traceback" not in refused.stderr
 

@@ -130,7 +130,7 @@ def test_an_ingest_counts_duplicates(stub: HullServiceStub, hull: str) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_exactly_once_over_broken_connections(address: str, name: str, seed: int) -> None:
-    """The connection is cut at random; the writer sends again whatever was not acknowledged."""
+    """The connection is cut at random; the writer sends again every batch that was not acknowledged."""
     random = np.random.default_rng(seed)
     total = 400
     batches = [random.normal(size=(random.integers(1, 200), 2)) for _ in range(total)]

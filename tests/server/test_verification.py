@@ -1,4 +1,4 @@
-"""A hull that is wrong is found out."""
+"""A verification names the first difference of a wrong hull."""
 
 import asyncio
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What a watcher holds is exactly the hull at the revision named."""
+"""A watcher holds exactly the hull of the revision that the event names."""
 
 import threading
 

@@ -28,7 +28,7 @@ def main() -> int:
     run.add_argument("--seconds", type=float, default=60.0)
     run.add_argument("--seed", type=int, default=1)
     run.add_argument("--layer", choices=("core", "shell", "sqlite", "all"), default="all")
-    run.add_argument("--lives", type=int, default=None, help="end after so many")
+    run.add_argument("--lives", type=int, default=None, help="end after this number of lives")
     run.add_argument("--keep", action="store_true", help="shrink what is found, and keep its plan")
     replay = commands.add_parser("replay", help="a plan that was kept")
     replay.add_argument("file", type=Path)

@@ -1,6 +1,6 @@
 """Clients: each does one operation of its plan after the other, and compares every answer with the model.
 
-They are coroutines that await nothing but the server, so that either layer can run them; a caller goes away by a
+They are coroutines that await nothing but the server, so that either layer can run them; a caller disconnects by a
 CancelledError.
 """
 
@@ -56,7 +56,7 @@ class Server(Protocol):
         """Remove a hull."""
 
     async def delete_at_once(self, name: str, times: int) -> None:
-        """Remove a hull, again and again; whatever the answers are."""
+        """Remove a hull repeatedly, and ignore the answers."""
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
         """Apply a batch."""
@@ -361,7 +361,7 @@ class Client:
             self.saw(asked, uid, revision, seen)
 
     def saw(self, asked: Asked, uid: str, revision: int, outline: Outline) -> None:
-        """The vertices at a revision have been told."""
+        """An answer has the vertices at a revision."""
         vertices, keys = outline
         seen = content(vertices)
         self.model.read(asked, uid, revision, seen)

@@ -320,7 +320,7 @@ class CoreServer:
     # Its life
 
     def client(self, client: Client, operations: list[Operation]) -> None:
-        """A client comes."""
+        """Add a client."""
         actor = ClientActor(client, operations)
         self._clients.append(actor)
         self.schedule.actor(client.producer, actor.ready, actor.act)
@@ -330,7 +330,7 @@ class CoreServer:
         return self.schedule.turn()
 
     def rest(self) -> None:
-        """Let everybody finish."""
+        """Let all clients finish."""
         self.schedule.rest()
 
     def waiting(self) -> list[str]:
@@ -366,7 +366,7 @@ class CoreServer:
             raise self.model.finds(f"{overdue} have not lost what should have left")
 
     def kill(self) -> None:
-        """Nothing more happens."""
+        """End the life without a shutdown, as a kill does."""
         for actor in self._clients:
             actor.abandon()
 
@@ -379,6 +379,8 @@ class CoreServer:
 
 def compare(core: Core, model: Model) -> None:
     """Compare what a core holds with the truth."""
+    if core.busy or core.ill:
+        raise model.finds("a name is busy or its state unknown at rest")
     if list(core.hulls) != sorted(model.alive):
         raise model.finds(f"in memory there are the hulls {list(core.hulls)}, kept are {sorted(model.alive)}")
     for name, hull in core.hulls.items():
@@ -392,8 +394,6 @@ def compare(core: Core, model: Model) -> None:
             _compare_entities(name, state, truth, model)
         if not model.days and state.kept().producers != truth.producers:
             raise model.finds(f"producers in memory: {state.kept().producers}, kept: {truth.producers}")
-        if core.state_of(name) != "there":
-            raise model.finds(f"{name} is {core.state_of(name)} at rest")
 
 
 def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -> None:
@@ -408,7 +408,7 @@ def _remember(failed: list[Exception | None], error: Exception | None, _: bool) 
 
 
 class ClientActor:
-    """A client, its turns: it begins an operation, hears an answer, or goes away."""
+    """The turns of a client: it begins an operation, receives an answer, or disconnects."""
 
     def __init__(self, client: Client, operations: list[Operation]) -> None:
         self.client = client
@@ -440,7 +440,7 @@ class ClientActor:
         return self._condition is not None
 
     def abandon(self) -> None:
-        """The server has been killed: nobody waits any more."""
+        """The server has been killed: no client waits any more."""
         if self._work is not None:
             self._work.close()
 

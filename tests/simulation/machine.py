@@ -113,7 +113,7 @@ class Loop(asyncio.AbstractEventLoop):
             self._model.finds(f"{context.get('message')}: {context.get('exception')!r}")
 
     def kill(self) -> None:
-        """End the process: nobody's last words count."""
+        """End the process: its last answers reach no client."""
         self.dead = True
         for task in self.tasks:
             task._log_destroy_pending = False  # type: ignore[attr-defined]

@@ -3,11 +3,11 @@
 The storage reports what it has kept, in order; that is the truth. Each batch inserts one point of a parabola, named by
 its x, and all points of a parabola are vertices: so an answer names the batches that it has seen.
 
-* Acknowledged batches are in the truth when they are acknowledged, at the revision told; refused ones never are.
+* Acknowledged batches are in the truth when they are acknowledged, at the revision answered; refused ones never are.
 * Of batches to several hulls all are kept by one commit, or none; and who has seen one of them sees the others.
 * No batch is there twice, and no two of one producer have the same number.
 * A read at a revision is the truth at that revision, and so is a recall.
-* Whatever is asked after an answer has been seen is not older than that answer.
+* No answer to a later request is older than an answer that has been seen.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
@@ -78,7 +78,7 @@ class Asked:
 
 
 class Model:
-    """All that has been kept and all that has been told, over the lives of a plan.
+    """Every commit and every answer, over the lives of a plan.
 
     Args:
         limits: the servers'.
@@ -118,13 +118,13 @@ class Model:
         return limit == "max_points" and truth is not None and len(truth.contents[-1]) >= most
 
     def finds(self, what: str) -> Finding:
-        """A promise is broken: to be raised."""
+        """A Finding, to be raised."""
         if self.finding is None:
             self.finding = what
         return Finding(what)
 
     def new_life(self) -> None:
-        """A server begins with what has been kept: whatever was under way has been decided."""
+        """A server starts on what has been kept: the outcome of every pending commit is decided."""
         self.faulty = self.stopping = False
         self._open.clear()
         for truth in self._hulls.values():
@@ -238,7 +238,7 @@ class Model:
         return f"uid{self._uids_given}"
 
     def ask(self, name: str, *, makes: bool = False, removes: bool = False) -> Asked:
-        """Somebody is about to ask for something that may make or remove a hull."""
+        """A client is about to send a request that may make or remove a hull."""
         floor = self._floor.get(name, (0, DELETED))
         alive = floor[1] != DELETED and not self._open[name, "delete"]
         absent = name not in self.alive and not self._open[name, "create"]
@@ -277,14 +277,14 @@ class Model:
         """A hull has been made."""
         truth = self._uids.get(uid)
         if truth is None:
-            raise self.finds(f"the hull {asked.name} was told before it was kept")
+            raise self.finds(f"the hull {asked.name} was answered before it was kept")
         self._answered(asked, (truth.row.number, 0))
 
     def deleted(self, asked: Asked) -> None:
         """A hull has been removed."""
         gone = [each for each in self._hulls.values() if each.row.name == asked.name and each.deleted]
         if not gone:
-            raise self.finds(f"the end of {asked.name} was told before it was kept")
+            raise self.finds(f"the deletion of {asked.name} was answered before it was kept")
         self._answered(asked, (max(each.row.number for each in gone), DELETED))
 
     def applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:
@@ -339,19 +339,19 @@ class Model:
             raise self.finds(f"{asked.name} was never made, and is called there")
 
     def content(self, uid: str, revision: int) -> Content:
-        """The truth at a revision of a hull that somebody was told of."""
+        """The truth at a revision of a hull that an answer has named."""
         truth = self._uids.get(uid)
         if truth is None:
-            raise self.finds(f"a hull was told that is not kept: {uid}")
+            raise self.finds(f"an answer names a hull that is not kept: {uid}")
         if not 0 <= revision <= truth.revision:
-            raise self.finds(f"revision {revision} of {truth.row.name} was told, and is not kept")
+            raise self.finds(f"an answer names revision {revision} of {truth.row.name}, which is not kept")
         return truth.contents[revision]
 
     def read(self, asked: Asked, uid: str, revision: int, seen: Content) -> None:
         """A hull was read."""
         kept = self.content(uid, revision)
         if seen != kept:
-            raise self.finds(f"revision {revision} of {asked.name} was told as {seen}, and is kept as {kept}")
+            raise self.finds(f"revision {revision} of {asked.name} was answered as {seen}, and is kept as {kept}")
         self._answered(asked, (self._uids[uid].row.number, revision))
 
     def named(self, uid: str, revision: int, seen: Sequence[float], keys: Sequence[Key]) -> None:
@@ -367,10 +367,10 @@ class Model:
             raise self.finds(f"revision {revision} was recalled as {seen}, and is kept as {kept}")
 
     def last(self, asked: Asked, producer: str, sequence: int) -> None:
-        """The last number of a producer was told."""
+        """The last number of a producer was answered."""
         kept = [each.producers.get(producer, 0) for each in self._hulls.values() if each.row.name == asked.name]
         if sequence > max(kept, default=0):
-            raise self.finds(f"number {sequence} of {producer} was told, and is not kept")
+            raise self.finds(f"number {sequence} of {producer} was answered, and is not kept")
 
 
 def tag(attempt: int, kind: str) -> Key:

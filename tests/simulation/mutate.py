@@ -1,5 +1,6 @@
-"""The test of the test: each patch in mutants/ puts in a fault, most of them from the past. Is it found, and how soon?"""
+"""Tests of the simulation: each patch in mutants/ puts in a fault, most of them of the past. How many lives find it?"""
 
+import os
 import re
 import shutil
 import subprocess
@@ -21,7 +22,7 @@ SEED = 1
 
 @dataclass(frozen=True, slots=True)
 class Hunt:
-    """How a fault was looked for: after how many lives it was found, None where it was not, and as what."""
+    """The search for a fault: the number of lives until it was found, or None, and the finding."""
 
     name: str
     lives: int | None
@@ -30,7 +31,7 @@ class Hunt:
 
 
 def fits(patch: Path) -> None:
-    """Raise RuntimeError where a patch does not fit the code any more."""
+    """Raise RuntimeError if a patch no longer applies to the code."""
     with tempfile.TemporaryDirectory() as folder:
         _put_in(patch, Path(folder))
 
@@ -52,10 +53,13 @@ def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
     with tempfile.TemporaryDirectory() as folder:
         _put_in(patch, Path(folder))
         begun = time.monotonic()
+        # coverage would look for the lines of the copy when it is gone.
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")}
         command = ["--package", folder, "run", "--layer", layer[1], "--lives", str(lives), "--seconds", "600"]
         run = subprocess.run(
             [sys.executable, "-m", "simulation", *command, "--seed", str(SEED)],
             cwd=HERE.parent,
+            env=environment,
             capture_output=True,
             text=True,
             check=False,
@@ -70,7 +74,7 @@ def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
 
 
 def report(names: list[str]) -> int:
-    """Look for each, and say after how many lives it was found. Exit code 1 where one was not."""
+    """Search for each fault, and print after how many lives it was found. Exit code 1 if one was not."""
     missed = 0
     for patch in PATCHES:
         if names and patch.stem not in names:

@@ -7,7 +7,7 @@ says who comes when, is drawn from the plan's seed and nothing else.
      "lives": [{"clients": [[operation, ...], ...], "end": "kill", "after": 40}, ...],
      "faults": [{"at": "commit", "nth": 3, "kind": "ghost", "calls": 1}, ...]}
 
-An operation names what to do and to which hull; with `leave` its caller goes away after so many turns of waiting.
+An operation names what to do and to which hull; with `leave` its caller disconnects after that number of turns.
 """
 
 import random

@@ -1,4 +1,4 @@
-"""Who comes next: actors that are ready take turns at random, each at its own speed."""
+"""The scheduler: actors that are ready take turns at random, each at its own speed."""
 
 import random
 import zlib
@@ -27,11 +27,11 @@ class Schedule:
         self._actors.append((ready, 10 ** self.random.uniform(-2, 0), act, name.encode()))
 
     def clear(self) -> None:
-        """All actors leave."""
+        """Remove all actors."""
         self._actors = []
 
     def note(self, what: object) -> None:
-        """Something that has to be the same when the run is repeated."""
+        """Record a value that must be the same when the run is repeated."""
         self.trace = zlib.crc32(repr(what).encode(), self.trace)
 
     def turn(self) -> bool:

@@ -27,7 +27,7 @@ from .plan import Operation
 from .schedule import Schedule
 from .store import FaultyStorage
 
-# Simulated seconds within which everything that anybody waits for has to happen, once nothing fails.
+# Simulated seconds within which every waiting actor has to be answered, once nothing fails.
 FOREVER = 600.0
 # Turns, too: time may pass much faster than threads get on.
 MANY_TURNS = 20_000
@@ -85,7 +85,7 @@ class ShellServer:
         self._engine.keep_house(SNAPSHOT_POINTS, SYNC_SECONDS)
 
     def _drive(self, work: Coroutine[Any, Any, None], name: str) -> None:
-        """Let everybody take turns until some work is done."""
+        """Let all actors take turns until the work is done."""
         task = self.loop.create_task(work)
         self._until(task.done, name)
         task.result()
@@ -177,13 +177,13 @@ class ShellServer:
     # Its life
 
     def client(self, client: Client, operations: list[Operation]) -> None:
-        """A client comes."""
+        """Add a client."""
         actor = ClientActor(self, client, operations)
         self._clients.append(actor)
         self.schedule.actor(client.producer, actor.ready, actor.act)
 
     def rest(self) -> None:
-        """Let everybody finish."""
+        """Let all clients finish."""
         for actor in self._clients:
             self._until(actor.finished, f"the client {actor.client.producer}")
         self._until(lambda: not self._engine._core.busy, "the core")
@@ -209,10 +209,10 @@ class ShellServer:
         self._until(lambda: not set(self._supervisor.failing()) - {"commits", "examination"}, "the background work")
 
     def kill(self) -> None:
-        """Nothing more happens."""
+        """End the life without a shutdown, as a kill does."""
         self.loop.kill()
         self._threads.kill()
-        self.model.finding = None  # nobody hears what the dead say
+        self.model.finding = None  # the answers of a killed server reach no client
 
     def stop(self) -> None:
         """End the server as the process does: background work first, then its callers, then the engine."""
@@ -228,7 +228,7 @@ class ShellServer:
 
 
 class ClientActor:
-    """A client, its turns: it begins an operation, or goes away."""
+    """The turns of a client: it begins an operation, or disconnects."""
 
     def __init__(self, server: ShellServer, client: Client, operations: list[Operation]) -> None:
         self.client = client

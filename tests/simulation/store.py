@@ -120,14 +120,14 @@ class FaultyStorage:
         return self._inner.oldest(number)
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
-        """Steps, each of which may fail."""
+        """Steps; each may fail."""
         for step in self._inner.snapshot(number, kept):
             self.give_way()
             self._fail("snapshot")
             yield step
 
     def sweep(self) -> Iterator[Step]:
-        """Steps, each of which may fail."""
+        """Steps; each may fail."""
         self._fail("sweep")
         for step in self._inner.sweep():
             self.give_way()

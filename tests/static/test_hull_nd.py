@@ -128,7 +128,7 @@ def test_flat_input_gives_the_hull_of_its_dimension(d):
 
 
 def test_nearly_flat_is_not_flat():
-    """Thickness of one unit in the last place at a great distance: too flat for Qhull's own coordinates."""
+    """One unit in the last place thick, far from the origin: too flat for the coordinates that Qhull computes with."""
     thin = CUBE * (1.0, 1.0, 2.0**-30) + (2.0**22, 2.0**22, 2.0**22)
     hull = hull_nd(thin, merge=True)
     assert hull.dimension == 3

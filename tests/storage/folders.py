@@ -79,7 +79,7 @@ def killed(path, target):
 
 
 def stopped(path, last=9):
-    """A folder with one hull, at revision `last`."""
+    """A folder with one hull and `last` batches."""
     storage, _ = opened(path)
     fill(storage, last)
     storage.close()

@@ -1,4 +1,4 @@
-"""The promises of the port, which every storage keeps."""
+"""What every implementation of the storage promises."""
 
 import io
 import itertools

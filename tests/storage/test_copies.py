@@ -1,9 +1,11 @@
 """Backup, restore, check and export, as commands, beside servers that run or were killed."""
 
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections import Counter
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -40,23 +42,23 @@ def run(*command, **more):
 
 
 def done(*command, says):
-    """A command that ends well, with these last words."""
+    """Run a command that must succeed; `says` is its last line."""
     finished = run(*command)
     assert finished.returncode == 0, finished.stderr
     assert finished.stdout.splitlines()[-1] == says
     return finished
 
 
-def refused(*command, says):
-    """A command that ends with a line that says why."""
+def refused(*command, says, code=2):
+    """Run a command that must fail; `says` is in its error message."""
     finished = run(*command)
-    assert finished.returncode == 1
+    assert finished.returncode == code
     assert says in finished.stderr
     assert "Traceback" not in finished.stderr
 
 
 def served(folder, last, number=1):
-    """What a server makes of a folder."""
+    """Open a folder as a server does, and check what it holds."""
     storage, contents = opened(folder)
     same(storage.read(number).records, records(1, last))
     storage.close()
@@ -148,9 +150,11 @@ def test_a_backup_of_an_earlier_format_is_checked_restored_and_exported(tmp_path
 def test_a_damaged_backup_is_not_restored(paths):
     data, copy, new = paths
     stopped(data)
-    done("backup", copy, "--data", data, says=f"{copy}: 1 hulls")
+    done("backup", copy, "--data", data, says=f"{copy}: 1 hull")
     flip(copy / DATABASE, record(4).rows.inserts.tobytes())
-    refused("restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones exist")
+    refused(
+        "restore", copy, "--data", new, says="hull 'fleet': revisions 4 to 4 are damaged, and later ones exist", code=1
+    )
     assert not new.exists()
 
 
@@ -164,8 +168,8 @@ def test_what_is_left_is_restored_where_loss_is_accepted(paths, tmp_path):
     crash = killed(data, tmp_path / "crash")
     storage.close()
     (crash / LOG).unlink()
-    refused("restore", crash, "--data", new, says="dynhull restore --accept-loss")
-    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hulls")
+    refused("restore", crash, "--data", new, says="dynhull restore --accept-loss", code=1)
+    finished = done("restore", crash, "--data", new, "--accept-loss", says=f"{new}: 1 hull")
     assert "copied without what is lost" in finished.stderr
     assert served(new, 5).notes == []
 
@@ -235,7 +239,7 @@ def test_a_copy_that_fails_leaves_nothing(paths):
     stopped(data, 300)
     limited = ["sh", "-c", 'ulimit -f 64; exec "$0" "$@"', COMMAND, "backup", copy, "--data", data]
     finished = subprocess.run(limited, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert finished.returncode == 1
+    assert finished.returncode == 2
     assert f"error: {data} cannot be copied to {copy}" in finished.stderr
     assert not copy.exists()
 
@@ -279,7 +283,7 @@ def test_check_beside_a_server(paths):
     data, *_ = paths
     storage, _ = opened(data)
     fill(storage, 5)
-    done("check", data, says=f"{data}: 1 hulls, all whole")
+    done("check", data, says=f"{data}: 1 hull, all whole")
     append(storage, 6, 9)
     storage.close()
     assert served(data, 9).notes == []
@@ -318,6 +322,28 @@ def test_check_says_what_is_damaged(paths):
     assert (data / DATABASE).read_bytes() == content
 
 
+def test_every_command_warns_of_a_commit_that_was_under_way(paths, tmp_path):
+    data, copy, _ = paths
+    file = tmp_path / "points.csv"
+    warning = "incomplete or damaged and was dropped, with at most 1 of the newest commits"
+    storage, _ = opened(data)
+    fill(storage, 9)
+    crash = killed(data, tmp_path / "crash")
+    storage.close()
+    log = (crash / LOG).read_bytes()
+    (crash / LOG).write_bytes(log[: log.rindex(record(9).inserts.tobytes()) + 10])
+    exported = done("export", "fleet", file, "--data", crash, says=f"{file}: 24 points of fleet at revision 8")
+    copied = done("backup", copy, "--data", crash, says=f"{copy}: 1 hulls")
+    assert all(warning in finished.stderr for finished in (exported, copied))
+    checked = run("check", crash)
+    assert checked.returncode == 1
+    assert warning in checked.stderr
+    with server_process("--data", str(crash), complaints=warning) as server, HullClient(server.address) as client:
+        assert client.get_hull("fleet").revision == 8
+    done("check", crash, says=f"{crash}: 1 hulls, all whole")
+    refused("export", "boats", file, "--data", copy, says=f"there is no hull 'boats' in {copy}")
+
+
 @pytest.mark.parametrize("suffix", ["csv", "parquet", "geojson"])
 def test_export_and_import(tmp_path, suffix):
     data, file = tmp_path / "data", tmp_path / f"points.{suffix}"
@@ -337,6 +363,14 @@ def test_export_and_import(tmp_path, suffix):
 
 def sorted_rows(points):
     return points[np.lexsort((points[:, 1], points[:, 0]))]
+
+
+def test_a_database_of_something_else(tmp_path):
+    with closing(sqlite3.connect(tmp_path / DATABASE)) as connection:
+        connection.executescript("CREATE TABLE a (b); DROP TABLE a")
+    refused("check", tmp_path, says=f"{tmp_path} is no data folder: its {DATABASE} is empty")
+    (tmp_path / DATABASE).write_bytes(b"no database" * 400)
+    refused("check", tmp_path, says="cannot be read (file is not a database): restore a backup")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Commits that fail, at each place where they can, and a machine that has run out of things."""
+"""Commits that fail, at each place where they can, and a machine without memory, disk space or descriptors."""
 
 import os
 import resource
@@ -27,7 +27,7 @@ def failure(code):
 
 
 class FaultyDisk(Disk):
-    """Fails once, at a given statement.
+    """Fails once, at a chosen statement.
 
     Attributes:
         statement: how the statement begins that fails.

@@ -2,6 +2,8 @@
 
 import shutil
 import sqlite3
+from contextlib import closing
+from itertools import product
 
 import numpy as np
 import pytest
@@ -20,11 +22,12 @@ from folders import (
     stopped,
 )
 
-from dynhull_server.state.records import Append, Create, Delete, HullRow, HullSettings, Window
+from dynhull_server.state.contents import replayed
+from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept, Window
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
 from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES, HEADER_BYTES
-from dynhull_server.storage.sqlite.schema import PAGE_BYTES
+from dynhull_server.storage.sqlite.schema import PAGE_BYTES, TABLES
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 FRAME_BYTES = FRAME_HEADER_BYTES + PAGE_BYTES
@@ -64,6 +67,19 @@ def test_a_start_that_is_refused_lets_others_in(folder):
             opened(folder)
     (folder / DATABASE).write_bytes(whole)
     opened(folder)[0].close()
+
+
+def test_a_server_that_was_killed_before_it_made_the_tables(folder):
+    folder.mkdir()
+    with closing(sqlite3.connect(folder / DATABASE)) as connection:
+        connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+        connection.execute("PRAGMA journal_mode = WAL")
+    assert (folder / DATABASE).stat().st_size > 0
+    storage, contents = opened(folder)
+    assert (contents.notes, contents.hulls) == ([], [])
+    fill(storage, 3)
+    storage.close()
+    assert notes(folder) == []
 
 
 def test_a_newer_format_is_refused(folder):
@@ -137,6 +153,46 @@ def test_damaged_settings_are_refused(folder):
         (folder / DATABASE).write_bytes(content)
         with pytest.raises(DamagedError, match=r"the row of hull 1, .* is damaged|cannot be read"):
             opened(folder)
+
+
+def points_of(storage, number):
+    return replayed(storage.read(number)).hull.points()
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_a_foreign_value_in_any_column_is_refused_or_repaired_with_a_note(folder, tmp_path, table):
+    """Nothing but what the server raises for damage, and nothing lost in silence."""
+    storage, _ = opened(folder)
+    fill(storage, 3)
+    fill(storage, 2, "other", 2)
+    for step in storage.snapshot(1, Kept(3, Contents(points_of(storage, 1)))):
+        storage.commit([step])
+    append(storage, 4, 6)
+    kept = [points_of(storage, number) for number in (1, 2)]
+    storage.close()
+    with closing(sqlite3.connect(folder / DATABASE)) as database:
+        columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
+    damaged = 0
+    for i, (column, value) in enumerate(product(columns, (2**62, "x", b"\0"))):
+        copy = tmp_path / str(i)
+        shutil.copytree(folder, copy)
+        change = f"UPDATE {table} SET {column} = ? WHERE rowid = (SELECT min(rowid) FROM {table})"
+        with closing(sqlite3.connect(copy / DATABASE, isolation_level=None)) as database:
+            try:
+                database.execute(change, [value])
+            except sqlite3.IntegrityError:  # no value for this column
+                continue
+        try:
+            storage, contents = opened(copy)
+        except DamagedError:
+            damaged += 1
+            continue
+        damaged += bool(contents.notes)
+        if not contents.notes:
+            for number, expected in enumerate(kept, start=1):
+                np.testing.assert_array_equal(points_of(storage, number), expected)
+        storage.close()
+    assert damaged >= 2 * len(columns)
 
 
 @pytest.mark.parametrize("gone", ["first IN (4, 5)", "first = 9", "first = 1"])

@@ -1,10 +1,33 @@
-"""Commands of `dynhull` in this process: as users run them, without the half second that a process takes to start."""
+"""Commands of `dynhull` as users run them."""
 
+import os
+import pty
+import subprocess
+
+from server_process import COMMAND, PATIENCE
 from typer.testing import CliRunner, Result
 
 from dynhull_cli.commands import app
 
 
 def dynhull(*arguments: object, input: str | bytes | None = None) -> Result:  # noqa: A002
-    """Run a command to its end."""
+    """Run a command to its end: in this process, because another one takes half a second to start."""
     return CliRunner().invoke(app, [str(each) for each in arguments], input=input)
+
+
+def on_a_terminal(*arguments: str, answer: bytes = b"") -> tuple[int, str]:
+    """Run a command on a terminal of its own; returns its exit code and what it showed."""
+    controller, terminal = pty.openpty()
+    with subprocess.Popen([COMMAND, *arguments], stdin=terminal, stdout=terminal, stderr=terminal) as command:
+        os.close(terminal)
+        os.write(controller, answer)
+        code = command.wait(PATIENCE)
+        shown = b""
+        while True:
+            try:
+                part = os.read(controller, 65536)
+            except OSError:  # the other end is closed, and everything has been read
+                break
+            shown += part
+    os.close(controller)
+    return code, shown.decode()

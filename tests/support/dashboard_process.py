@@ -1,6 +1,7 @@
 """A real dashboard in a process of its own, and its page in a real browser."""
 
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from urllib.parse import urlencode
@@ -21,7 +22,10 @@ VERTICES = """name => {
 def dashboard_process(address: str, *options: str) -> Iterator[str]:
     """`dynhull dashboard` on a free port, unless the options name one; yields its URL. It must exit with code 0."""
     command = [COMMAND, "dashboard", "--port", "0", "--address", address, *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+    ):
         try:
             first_line = process.stdout.readline()
             assert first_line.startswith("dynhull dashboard on http://")
@@ -29,6 +33,8 @@ def dashboard_process(address: str, *options: str) -> Iterator[str]:
         finally:
             process.terminate()
             assert process.wait(PATIENCE) == 0
+            errors.seek(0)
+            assert "Failed sending message" not in errors.read()  # pages may close at any time
 
 
 @contextmanager
@@ -49,6 +55,6 @@ def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[
 
 
 def wait_for_vertices(page: Page, name: str, vertices: list[list[float]]) -> None:
-    """Until the polygon on the page is this one."""
+    """Wait until the page shows this polygon."""
     same = f"([name, vertices]) => JSON.stringify(({VERTICES})(name)) == JSON.stringify(vertices)"
     page.wait_for_function(same, arg=[name, vertices])

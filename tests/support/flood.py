@@ -6,7 +6,7 @@ from collections import Counter
 
 import grpc
 
-UNKNOWN_FIELD = b"\x7a"  # number 15, with so many bytes as follow
+UNKNOWN_FIELD = b"\x7a"  # field 15, length-delimited
 
 
 def message(size: int) -> bytes:

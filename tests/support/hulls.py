@@ -71,8 +71,8 @@ ONE_SHOT = {"convex_hull": convex_hull}
 
 if kernel is not None:
 
-    def told(discard, threads):
+    def one_shot(discard, threads):
         return lambda xy: kernel.convex_hull(as_points(xy), discard, threads)
 
     for discard, threads in product((False, True), repeat=2):
-        ONE_SHOT[f"convex_hull, discard {discard}, threads {threads}"] = told(discard, threads)
+        ONE_SHOT[f"convex_hull, discard {discard}, threads {threads}"] = one_shot(discard, threads)

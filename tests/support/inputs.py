@@ -39,7 +39,7 @@ any_points = st.one_of(grid_points, points(12).filter(len), st.lists(st.sampled_
 
 @st.composite
 def questions(draw, max_size: int):
-    """Points to make a hull of, and points to ask about: any, and such as touch the hull or nearly do."""
+    """Points of a hull, and query points: arbitrary ones, and ones that touch the hull or nearly do."""
     rows = draw(any_points)
     corners = hull(rows)
     asked = draw(points(max_size))
@@ -56,7 +56,7 @@ def questions(draw, max_size: int):
 
 
 def moved(x: float, steps: int) -> float:
-    """Some doubles further."""
+    """The double `steps` doubles above x, or below it where negative."""
     for _ in range(abs(steps)):
         x = nextafter(x, copysign(inf, steps))
     return x

@@ -1,4 +1,4 @@
-"""Collision and distance in space by python-fcl, which brings a solver of its own (libccd)."""
+"""Collision and distance in space by python-fcl, which has a solver of its own (libccd)."""
 
 import fcl
 import numpy as np

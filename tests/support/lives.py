@@ -114,7 +114,7 @@ class Model:
 
 
 class Life:
-    """One hull from its first point to its last, and what should be there."""
+    """One hull from its first point to its last, and the model of it."""
 
     def __init__(self, seed):
         self.random = Random(seed)
@@ -126,7 +126,7 @@ class Life:
         self.operations = 0
 
     def live(self):
-        """Some dozens of operations; how many."""
+        """Run some dozens of operations; returns their number."""
         updates = [self.insert] * 5 + [self.delete] * 3 + [self.delete_vertex] * 2 + [self.batch] * 3
         rare = [self.delete_missing, self.refuse, self.copy, self.rebuild, self.clear]
         queries = [self.locate, self.support, self.tangents, self.count]
@@ -147,7 +147,7 @@ class Life:
         return [self.any_number() for _ in range(self.random.randrange(most))]
 
     def check_update(self, changed, changes):
-        """The hull against the model and against its own invariants, after an update from so many changes."""
+        """Compare the hull with the model and check its invariants; `changes` is their number before the update."""
         before, self.corners = self.corners, self.model.hull()
         assert changed == (before != self.corners), f"changed is {changed}"
         assert self.hull.changes == changes + changed, "changes is off"
@@ -265,7 +265,7 @@ class Life:
 
 
 def survive(seeds):
-    """How many operations all these lives had, and what went wrong in one of them, if anything did."""
+    """The number of operations in all these lives, and the first failure or None."""
     operations = 0
     for seed in seeds:
         life = Life(seed)

@@ -1,4 +1,4 @@
-"""What is right, from rational arithmetic and definitions: slow, and shares nothing with the library."""
+"""The right answers, by definition and in rational arithmetic: slow, and without code of the library."""
 
 from collections.abc import Iterable
 from fractions import Fraction

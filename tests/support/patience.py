@@ -1,4 +1,4 @@
-"""Waiting for what must come true, with an end."""
+"""Waiting for a condition, with a time limit."""
 
 import time
 from collections.abc import Callable

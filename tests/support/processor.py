@@ -1,4 +1,4 @@
-"""The processor time of another process, by /proc."""
+"""The processor time of another process, from /proc."""
 
 import os
 import time
@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="tells processor time by /proc")
+needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads processor time from /proc")
 
 
 def processor_time(pid: int) -> float:
-    """Seconds, of the system's work for the process too."""
+    """Seconds in user and system mode."""
     user, system = Path(f"/proc/{pid}/stat").read_text().split()[13:15]
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def wait_for_rest(pid: int) -> None:
-    """Until the process has used no processor time for half a second."""
+    """Wait until the process has used no processor time for half a second."""
     before = None
     while (now := processor_time(pid)) != before:
         before = now

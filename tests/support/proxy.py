@@ -1,4 +1,4 @@
-"""A way to a server that can be cut."""
+"""A TCP proxy whose connections can be cut."""
 
 import socket
 import threading

@@ -1,4 +1,4 @@
-"""What the server says when it refuses."""
+"""The status of a refused call."""
 
 from collections.abc import Callable
 

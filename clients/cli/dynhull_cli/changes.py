@@ -13,7 +13,9 @@ from rich.text import Text
 
 from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Snapshot, Watch
 
+from .closed_pipe import when_pipe_closes
 from .json_lines import json_line
+from .tab_lines import tab_line
 
 SHOWN_EVENTS = 12
 NOTHING = np.empty((0, 2))
@@ -34,6 +36,10 @@ class Corners:
         self.joined = [key for key in self._keys if key not in set(before)]
         self.left = [key for key in before if key not in set(self._keys)]
 
+    def difference(self) -> str:
+        """The keys that came and went, for people."""
+        return " ".join([*(f"+{key}" for key in self.joined), *(f"-{key}" for key in self.left)])
+
 
 def follow(client: HullClient, name: str, *, max_rate: float, events: int | None, as_json: bool, keys: bool) -> None:
     """Print the changes of a hull: lines of JSON, a live table on a terminal, or else lines of text.
@@ -47,10 +53,12 @@ def follow(client: HullClient, name: str, *, max_rate: float, events: int | None
         if not as_json and console.is_terminal:
             _show(console, name, stream, copy, corners, events)
             return
+        if not console.is_terminal:
+            when_pipe_closes(stream.close)
         for event in islice(stream, events):
             if corners is not None:
                 corners.update()
-            typer.echo(_json(event, corners) if as_json else "  ".join(_cells(event, copy, corners)))
+            typer.echo(_json(event, corners) if as_json else _line(event, copy, corners))
 
 
 def _show(
@@ -80,11 +88,7 @@ def _cells(event: Event, copy: HullCopy, corners: Corners | None) -> list[str]:
     added, removed = _difference(event)
     measures = _measures(event)
     areas = [f"{measures.area:.6g}", f"{measures.perimeter:.6g}"] if measures else []
-    names = (
-        []
-        if corners is None
-        else [" ".join([*(f"+{key}" for key in corners.joined), *(f"-{key}" for key in corners.left)])]
-    )
+    names = [] if corners is None else [corners.difference()]
     return [
         f"{event.revision:,}",
         f"{event.points:,}",
@@ -93,6 +97,14 @@ def _cells(event: Event, copy: HullCopy, corners: Corners | None) -> list[str]:
         *(areas or ([""] * 2 if names else [])),
         *names,
     ]
+
+
+def _line(event: Event, copy: HullCopy, corners: Corners | None) -> str:
+    added, removed = _difference(event)
+    measures = _measures(event)
+    sizes = ("", "") if measures is None else (measures.area, measures.perimeter)
+    named = () if corners is None else (corners.difference(),)
+    return tab_line(event.revision, event.points, len(copy.vertices), len(added), len(removed), *sizes, *named)
 
 
 def _json(event: Event, corners: Corners | None) -> str:

@@ -2,8 +2,10 @@
 
 import io
 import os
+import select
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -37,3 +39,25 @@ def success_on_closed_pipe() -> Iterator[None]:
         yield
     finally:
         sys.stdout.flush()
+
+
+def when_pipe_closes(stop: Callable[[], None]) -> None:
+    """Call `stop` from a thread when the reader of standard output closes the pipe.
+
+    For commands that may not write for a long time: only a write notices otherwise. Does nothing on systems without
+    `poll`, and if standard output has no file descriptor.
+    """
+    try:
+        output = sys.stdout.fileno()
+    except (AttributeError, io.UnsupportedOperation):
+        return
+    if not hasattr(select, "poll"):
+        return
+    closed = select.poll()
+    closed.register(output, 0)  # reports POLLERR and POLLHUP only
+
+    def wait() -> None:
+        closed.poll()
+        stop()
+
+    threading.Thread(target=wait, name="closed pipe", daemon=True).start()

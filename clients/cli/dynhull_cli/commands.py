@@ -14,6 +14,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from .exits import Exit
+
 GROUP = "dynhull.commands"
 PANELS = {
     "Hulls and their points": ("list", "create", "delete", "insert", "put", "remove", "load", "import"),
@@ -106,7 +108,7 @@ def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[]
             f"Install it with: pip install 'dynhull[{extras}]'",
             err=True,
         )
-        raise typer.Exit(1)
+        raise typer.Exit(Exit.UNUSABLE)
 
     explain.__doc__ = f'Not installed: needs the extra "{extras}".'
     return explain
@@ -134,6 +136,7 @@ def options(
     Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
     DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
 
-    Exit codes: 0 success, 1 a hull differs or the server refused a request, 2 the command or its input is unusable,
-    3 the server does not answer, 4 the server requires another token, 130 interrupted.
+    Exit codes: 0 success, 1 a hull differs, data is damaged or the server refused a request, 2 the command or its input
+    is unusable, 3 the server does not answer, 4 the server requires another token, 70 `dynhull serve` ended itself
+    because it could not rely on its own state, 130 interrupted.
     """

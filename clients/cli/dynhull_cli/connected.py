@@ -1,18 +1,18 @@
 """Shared by the commands that connect to a server: the options of the connection, the client, and exit codes."""
 
 import inspect
+import os
 import sys
 from collections.abc import Callable
-from enum import IntEnum
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
 
 import typer
 
-if TYPE_CHECKING:
-    import grpc
+from .exits import Exit
 
+if TYPE_CHECKING:
     from dynhull_client import AsyncHullClient, HullClient
 
 Client = TypeVar("Client", "HullClient", "AsyncHullClient")
@@ -24,15 +24,6 @@ class Connect(Protocol):
     def __call__(self, kind: type[Client], /, **more: Any) -> Client:
         """The client."""
         ...
-
-
-class Exit(IntEnum):
-    """Exit codes for scripts; 0 is success, 130 an interruption."""
-
-    FAILED = 1
-    UNUSABLE = 2
-    UNAVAILABLE = 3
-    FORBIDDEN = 4
 
 
 def _option(variable: str, text: str, **more: Any) -> Any:
@@ -86,15 +77,19 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         client_key: ClientKey = None,
         **given: Any,
     ) -> None:
+        os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what gRPC would log, the message of the error says
+
         import dynhull_client as sdk
 
+        from .certificates import credentials
+
         try:
-            credentials = _credentials(tls, tls_ca, client_cert, client_key)
-            command(lambda kind, **more: kind(address, token=token, tls=credentials, **more), **given)
+            encryption = credentials(tls, tls_ca, client_cert, client_key)
+            command(lambda kind, **more: kind(address, token=token, tls=encryption, **more), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
             encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
-            encryption = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
-            advice = f"Is it running (dynhull serve), is the address right (--address), {encryption}?"
+            about_tls = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
+            advice = f"Is it running (dynhull serve), is the address right (--address), {about_tls}?"
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
         except sdk.UnauthenticatedError as error:
             fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
@@ -102,6 +97,8 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
             fail(Exit.FORBIDDEN, str(error))
         except sdk.HullNotFoundError as error:
             fail(Exit.FAILED, f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one.")
+        except sdk.InvalidRequestError as error:
+            fail(Exit.UNUSABLE, str(error))
         except sdk.DynhullError as error:
             fail(Exit.FAILED, str(error))
         except OSError as error:
@@ -122,17 +119,3 @@ def fail(code: Exit, message: str) -> NoReturn:
     """Print an error and end the command."""
     typer.echo(f"error: {message}", err=True)
     sys.exit(code)
-
-
-def _credentials(
-    tls: bool, ca: Path | None, certificate: Path | None, key: Path | None
-) -> "grpc.ChannelCredentials | None":
-    if (certificate is None) != (key is None):
-        raise ValueError("--client-cert and --client-key must be given together")
-    if not (tls or ca or certificate):
-        return None
-    import grpc
-
-    return grpc.ssl_channel_credentials(
-        *(None if path is None else path.read_bytes() for path in (ca, key, certificate))
-    )

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .connected import AsJson, Exit, connected, fail
+from .connected import AsJson, connected, fail
 from .durations import duration, shown
+from .exits import Exit
 from .json_lines import json_line
 from .plural import plural
 

@@ -3,6 +3,7 @@
 import sys
 
 from .closed_pipe import success_on_closed_pipe
+from .exits import Exit
 
 
 def main() -> None:
@@ -12,6 +13,7 @@ def main() -> None:
     except ModuleNotFoundError as error:
         if error.name not in ("typer", "click", "rich"):
             raise
-        sys.exit("The command line is not installed. Install it with: pip install 'dynhull[cli]'")
+        sys.stderr.write("error: the command line is not installed. Install it with: pip install 'dynhull[cli]'\n")
+        sys.exit(Exit.UNUSABLE)
     with success_on_closed_pipe():
         app()

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from .connected import AsJson, Exit, HullName, connected, fail
+from .connected import AsJson, HullName, connected, fail
 from .durations import duration
+from .exits import Exit
 from .json_lines import json_line
 from .plural import plural
 

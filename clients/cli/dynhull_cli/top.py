@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 from .connected import AsJson, connected
 from .json_lines import json_line
+from .tab_lines import tab_line
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,9 @@ def top(
 ) -> None:
     """Show hulls with their sizes and rates, the busiest first.
 
-    dynhull top fleet/ --interval 5
+        dynhull top fleet/ --interval 5
+
+    A line has, between tabs: name, revision, points, distinct points, batches per second, and points gained per second.
     """
     from rich.console import Console
     from rich.live import Live
@@ -59,7 +62,7 @@ def top(
                 members = {"revision": info.revision, "points": info.points, "distinct": info.distinct}
                 typer.echo(json_line(name=info.name, **members, batches=row.batches, growth=row.growth))
             else:
-                typer.echo("\t".join(_cells(row)))
+                typer.echo(tab_line(info.name, info.revision, info.points, info.distinct, row.batches, row.growth))
 
 
 def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[list[Row]]:

@@ -9,7 +9,8 @@ import typer
 if TYPE_CHECKING:
     from dynhull_client import HullClient, Verification
 
-from .connected import AsJson, Exit, connected
+from .connected import AsJson, connected
+from .exits import Exit
 from .json_lines import json_line
 
 

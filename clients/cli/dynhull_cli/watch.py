@@ -23,6 +23,9 @@ def watch(
 
         dynhull watch fleet/north --json | jq -c .added
 
+    A line has, between tabs: revision, points, vertices, vertices added, vertices removed, area, perimeter. The first
+    line counts all vertices as added.
+
     With --json, each event has the revision, the number of points, the measures, and the vertices added and removed
     since the event before. The first event has "snapshot": true and adds all vertices. After a lost connection the
     watch resumes by itself, with the changes it missed or, if the server no longer has them, with a new snapshot.

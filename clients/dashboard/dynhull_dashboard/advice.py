@@ -2,7 +2,13 @@
 
 from collections.abc import Iterable
 
-from dynhull_client import DynhullError, HullNotFoundError, PermissionDeniedError, UnauthenticatedError
+from dynhull_client import (
+    DynhullError,
+    HullNotFoundError,
+    InvalidRequestError,
+    PermissionDeniedError,
+    UnauthenticatedError,
+)
 
 from .feed import HullFeed
 from .server_metrics import ServerMetrics
@@ -55,7 +61,7 @@ def about_picture(address: str, server: ServerState, feeds: Iterable[HullFeed]) 
         return ""
     if empty := [feed.name for feed in feeds if feed.trouble is None and feed.followed]:
         return f"{empty[0]} has no points yet. Add some: dynhull load {empty[0]} FILE.csv --address {address}"
-    if missing := [feed.name for feed in feeds if isinstance(feed.trouble, HullNotFoundError)]:
+    if missing := [feed.name for feed in feeds if isinstance(feed.trouble, HullNotFoundError | InvalidRequestError)]:
         return f"The server has no hull {missing[0]}. Check the name, or pick another hull above."
     if feeds:
         return ""

@@ -42,9 +42,19 @@ class KnownHosts(BokehTornado):
             unknown = request.host
         elif origin is not None and self._hosts.isdisjoint(_with_port(urlsplit(origin).netloc)):
             unknown = origin
+        elif request.method == "HEAD" and request.path == "/":
+            return self.get_handler_delegate(request, Presence)
         else:
             return super().find_handler(request)
         return self.get_handler_delegate(request, Refusal, {"unknown": unknown})
+
+
+class Presence(RequestHandler):
+    """Answers HEAD, which Bokeh's pages refuse, without a session: whether the page is there."""
+
+    def head(self) -> None:
+        """Answer 200 without a body."""
+        self.finish()
 
 
 class Refusal(RequestHandler):

@@ -1,6 +1,7 @@
 """The dashboard's HTTP server, which is Bokeh's."""
 
 import asyncio
+import logging
 import signal
 from collections.abc import Sequence
 from functools import partial
@@ -34,6 +35,8 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     Raises:
         ValueError: if one of `origins` is not a name.
     """
+    # Bokeh warns of each message that it could not send to a page that was closed, which is no fault.
+    logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)

@@ -12,7 +12,7 @@ from ._async_writer import AsyncWriter
 from ._calls import Call
 from ._connection import AsyncConnection
 from ._messages import HullInfo
-from ._methods import Client, answer_of, documented, opening
+from ._methods import Client, answer_of, described, documented, opening
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -24,7 +24,7 @@ def _answering(
     """The coroutine that makes a call and returns its answer."""
 
     async def method(self: "AsyncHullClient", /, *arguments: P.args, **options: P.kwargs) -> Result:
-        return await self._connection.answer(describe(*arguments, **options))
+        return await self._connection.answer(described(describe, *arguments, **options))
 
     documented(method, describe, answer_of(describe))
     return method
@@ -69,7 +69,7 @@ class AsyncHullClient(Client[AsyncConnection]):
         """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
         following: str | None = ""
         while following is not None:
-            hulls, token = await self._connection.answer(calls.list_page(prefix, following, timeout))
+            hulls, token = await self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
             for each in hulls:
                 yield each
             following = token or None

@@ -6,6 +6,7 @@ The methods of `HullClient` and `AsyncHullClient` are made of these functions an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Generic, Literal, Never, TypeVar
 from uuid import uuid4
 
@@ -90,6 +91,13 @@ class Call(Generic[Answer]):
     instead: Callable[[DynhullError], Call[Answer] | None] = _nothing
     awaits_hull: bool = False
     in_parts: bool = False
+
+
+def require_not_negative(**numbers: float | None) -> None:
+    """Raise ValueError if one of the arguments is negative or not a number."""
+    for argument, value in numbers.items():
+        if isinstance(value, Real) and not value >= 0:
+            raise ValueError(f"{argument} must be at least 0, got {value}")
 
 
 def create_hull(
@@ -550,6 +558,8 @@ class Ingesting:
 def ingest(name: str, *, missing: Missing | None = None, timeout: float | None = None) -> Ingesting:
     """A stream of batches in one call, for use in a with statement. `missing` as for `apply` and `remove`.
 
+    >>> from dynhull_client import HullClient
+    >>> client = HullClient()  # doctest: +SKIP
     >>> with client.ingest("fleet") as stream:  # doctest: +SKIP
     ...     for minute in minutes:
     ...         stream.apply(move=(before, after))
@@ -588,6 +598,8 @@ def writer(
 ) -> Writing:
     """A writer that gathers points into batches, each applied exactly once.
 
+    >>> from dynhull_client import HullClient
+    >>> client = HullClient()  # doctest: +SKIP
     >>> with client.writer("fleet") as writer:  # doctest: +SKIP
     ...     for before, after in moves:
     ...         writer.put(move=(before, after))
@@ -646,7 +658,8 @@ def watch(
 ) -> Watching:
     """Follow a hull: an iterator of events, from which a `HullCopy` maintains a copy of the hull.
 
-    >>> copy = HullCopy()
+    >>> from dynhull_client import HullClient, HullCopy
+    >>> client, copy = HullClient(), HullCopy()  # doctest: +SKIP
     >>> for event in client.watch("fleet", copy=copy):  # doctest: +SKIP
     ...     print(event.revision, len(copy.vertices))
 

@@ -10,7 +10,7 @@ from ._calls import Call
 from ._connection import BlockingConnection
 from ._ingest import Ingest
 from ._messages import HullInfo
-from ._methods import Client, answer_of, documented, opening
+from ._methods import Client, answer_of, described, documented, opening
 from ._watch import Watch
 from ._writer import Writer
 
@@ -22,7 +22,7 @@ def _answering(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["Hul
     """The method that makes a call and returns its answer."""
 
     def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Result:
-        return self._connection.answer(describe(*arguments, **options))
+        return self._connection.answer(described(describe, *arguments, **options))
 
     documented(method, describe, answer_of(describe))
     return method
@@ -80,7 +80,7 @@ class HullClient(Client[BlockingConnection]):
         """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
         following: str | None = ""
         while following is not None:
-            hulls, token = self._connection.answer(calls.list_page(prefix, following, timeout))
+            hulls, token = self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
             yield from hulls
             following = token or None
 

@@ -11,7 +11,7 @@ import grpc
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 from ._address import target
-from ._calls import Call
+from ._calls import Call, require_not_negative
 from ._errors import DynhullError, error_of
 from ._retry import Attempts
 
@@ -53,6 +53,9 @@ class Connection:
         tls: grpc.ChannelCredentials | None,
         retries: int,
     ) -> None:
+        require_not_negative(timeout=timeout, retries=retries)
+        if token is not None and not (token.isascii() and token.isprintable() and " " not in token):
+            raise ValueError("token must consist of printable ASCII characters without spaces")
         self.address, encrypted = target(address)
         if tls is None and encrypted:
             tls = grpc.ssl_channel_credentials()

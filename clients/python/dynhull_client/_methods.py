@@ -6,6 +6,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 import grpc
 
+from ._calls import require_not_negative
 from ._connection import DEFAULT_ADDRESS, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
 
 P = ParamSpec("P")
@@ -14,6 +15,8 @@ Stream = TypeVar("Stream")
 AnyConnection = TypeVar("AnyConnection", bound=Connection)
 
 Function = Callable[..., Any]
+
+NOT_NEGATIVE = ("min_revision", "other_min_revision", "sequence", "timeout")
 
 
 class Client(Generic[AnyConnection]):
@@ -70,6 +73,13 @@ def documented(method: Function, describe: Function, returns: str) -> None:
     )
 
 
+def described(describe: Callable[P, Description], *arguments: P.args, **options: P.kwargs) -> Description:
+    """What the function describes; ValueError for a number that is not allowed in any call."""
+    given: dict[str, Any] = options
+    require_not_negative(**{name: given.get(name) for name in NOT_NEGATIVE})
+    return describe(*arguments, **options)
+
+
 def answer_of(describe: Function) -> str:
     """The source of the answer's type: that of a description is `Call[answer]`."""
     annotation: str = describe.__annotations__["return"]
@@ -82,7 +92,7 @@ def opening(
     """The method that opens a stream of the given kind."""
 
     def method(self: Client[AnyConnection], /, *arguments: P.args, **options: P.kwargs) -> Stream:
-        return kind(self._connection, describe(*arguments, **options))
+        return kind(self._connection, described(describe, *arguments, **options))
 
     documented(method, describe, kind.__name__)
     return method

@@ -70,5 +70,15 @@ class Attempts:
             return call, pause
         self._left -= 1
         if self._left < 0 or late or not passes(error):
-            raise error from None
+            raise self._explained(call, error) from None
         return call, pause
+
+    def _explained(self, call: Call[Answer], error: DynhullError) -> DynhullError:
+        """The error; after the timeout with the revision that the call waited for, which gRPC does not know."""
+        if not isinstance(error, DeadlineError) or self._timeout is None:
+            return error
+        message = f"the call took longer than {self._timeout:g} s"
+        revision = getattr(call.request, "min_revision", 0)
+        if revision:
+            message += f"; hull {getattr(call.request, 'name', '')!r} may not have reached revision {revision}"
+        return DeadlineError(message, error.code, error.reason, error.metadata)

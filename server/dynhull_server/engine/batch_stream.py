@@ -36,11 +36,6 @@ class BatchStream:
         self._birth = birth
         self._notify = notify
 
-    @property
-    def hull(self) -> Hull | None:
-        """The hull; None until it exists."""
-        return self._stream.hull
-
     def write(self, request: WriteBatch) -> None:
         """Send a batch."""
         self.batches += 1

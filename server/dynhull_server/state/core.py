@@ -93,16 +93,6 @@ class _Queue:
         """Why the storage cannot be read after a failed commit, None unless that is so."""
         return None if self.trip is None else self.trip.ill
 
-    @property
-    def state(self) -> str:
-        """One of absent, there, creating, deleting and unknown."""
-        trip = self.trip
-        if trip is not None and trip.failure is not None:
-            return "unknown"
-        if trip is None or len(trip.legs) > 1 or trip.legs[0].after is self.hull:
-            return "absent" if self.hull is None else "there"
-        return "deleting" if trip.legs[0].after is None else "creating"
-
 
 class Core:
     """All names of a server.
@@ -189,11 +179,6 @@ class Core:
     def ill(self) -> bool:
         """Whether the state of any name is unknown, because the storage cannot be read."""
         return any(queue.ill is not None for queue in self._queues.values())
-
-    def state_of(self, name: str) -> str:
-        """The state of a name: one of absent, there, creating, deleting and unknown."""
-        queue = self._queues.get(name)
-        return "absent" if queue is None else queue.state
 
     def expiring(self, time: int) -> bool:
         """Whether points are about to leave, or should have left by a time. O(hulls)."""

@@ -57,7 +57,5 @@ class History:
         oldest = self._entries[0].first
         if not oldest <= revision <= newest:
             raise RevisionForgottenError(revision, oldest, newest)
-        for entry in reversed(self._entries):
-            if entry.first <= revision:
-                return entry.vertices if entry.last is None or revision <= entry.last else None
-        return None
+        entry = next(each for each in reversed(self._entries) if each.first <= revision)
+        return entry.vertices if entry.last is None or revision <= entry.last else None

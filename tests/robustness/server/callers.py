@@ -1,11 +1,11 @@
-"""Callers that go away: in every call, at every moment, many on one name, while others go on and the server is killed.
+"""Callers that disconnect: in every call, at every moment, many on one name, while others go on and kills happen.
 
     python tests/robustness/server/callers.py --calls 10000 --kills 5
 
 Batches are single points, each another one on a parabola, so the count of a point says whether its batch is there.
 
-* Of the hulls that nobody deletes: an acknowledged batch is there once, over every kill; a refused one is not; one
-  whose caller went away is there once or not at all, and stays as it was seen.
+* Of the hulls that no caller deletes: an acknowledged batch is there once, over every kill; a refused one is not; one
+  whose caller disconnected is there once or not at all, and does not change once a reader has seen it.
 * Of the hulls that are created and deleted all the time: at the end each can be created, written, read and deleted.
 * Others write to another hull meanwhile: every one of their batches is acknowledged.
 """
@@ -34,7 +34,7 @@ CHURNED = ["churned/a", "churned/b", "churned/c"]
 STEADY = "steady"
 CALLERS = 24
 PATIENCE = 30.0  # seconds, for anything that must happen
-LONGEST_STAY = 0.02  # seconds until a caller goes away
+LONGEST_STAY = 0.02  # seconds until a caller disconnects
 # Otherwise a channel to a new server waits for the pause that one to the killed server has begun.
 OWN = [("grpc.use_local_subchannel_pool", 1)]
 STREAMED = 4  # batches of a stream
@@ -88,7 +88,7 @@ class Server:
 
 
 class Model:
-    """What is known of each batch: True, it must be there; False, it must not; None, nobody knows."""
+    """What is known of each batch: True, it must be there; False, it must not; None, either is correct."""
 
     def __init__(self) -> None:
         self.numbers = count(1)
@@ -99,7 +99,7 @@ class Model:
         self.batches.get(name, {})[number] = None
         return number
 
-    def told(self, name: str, number: int, applied: bool) -> None:
+    def answered(self, name: str, number: int, applied: bool) -> None:
         if name in self.batches:
             self.batches[name][number] = applied
 
@@ -165,9 +165,9 @@ class Callers:
             await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(number)))
         except grpc.RpcError as error:
             if error.code() in REFUSED:
-                self._model.told(name, number, applied=False)
+                self._model.answered(name, number, applied=False)
             raise
-        self._model.told(name, number, applied=True)
+        self._model.answered(name, number, applied=True)
         self.acknowledged += 1
 
     async def _stream(self, stub: HullServiceStub, name: str) -> None:
@@ -181,7 +181,7 @@ class Callers:
         try:
             done = iter(numbers)
             async for _ in call:
-                self._model.told(name, next(done), applied=True)
+                self._model.answered(name, next(done), applied=True)
                 self.acknowledged += 1
         finally:
             call.cancel()
@@ -207,7 +207,7 @@ class Callers:
         while True:
             number = self._model.new(STEADY)
             await stub.Apply(pb.ApplyRequest(name=STEADY, batch=batch_of(number)), timeout=PATIENCE)
-            self._model.told(STEADY, number, applied=True)
+            self._model.answered(STEADY, number, applied=True)
             self.steady += 1
 
     async def _check(self, stub: HullServiceStub) -> None:
@@ -243,7 +243,7 @@ class Callers:
 
 
 def callers(folder: Path, calls: int, kills: int, seed: int) -> str:
-    """Make the calls. Returns the counts; raises BrokenPromiseError with what was broken."""
+    """Make the calls. Returns the counts; raises BrokenPromiseError with the broken promise."""
     server = Server(folder / "data")
     run = Callers(server, seed)
     try:
@@ -261,7 +261,7 @@ def callers(folder: Path, calls: int, kills: int, seed: int) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Callers that go away while a model watches.")
+    parser = argparse.ArgumentParser(description="Callers that disconnect while a model checks every answer.")
     parser.add_argument("--calls", type=int, default=10_000, help="how many (default 10,000)")
     parser.add_argument("--kills", type=int, default=5, help="how often the server is killed meanwhile (default 5)")
     parser.add_argument("--seed", type=int, default=0, help="what the calls depend on (default 0)")

@@ -9,7 +9,7 @@ and send again. After every fault a model, the multiset of all batches, checks e
 * no reader ever sees a revision below one it has seen
 * a watcher's copy is the exact hull at the revision named
 * the hull is the one that a static algorithm finds, here and in the server
-* callers that go away in the middle of a call, and a server that is out of file descriptors, change nothing of this
+* callers that cancel a call, and a server that is out of file descriptors, change nothing of this
 * a server that is given the data with one bit changed does not start, and says why, or keeps all this too, but for the
   last batches, and says that it lost them
 * a backup of the running server, and a restore of a killed one's folder, have every batch acknowledged before
@@ -107,7 +107,7 @@ class Server:
 
 @dataclass
 class Shared:
-    """What all threads see."""
+    """The state that all threads share."""
 
     target: str
     gate: threading.Event = field(default_factory=threading.Event)  # open: writers write
@@ -121,7 +121,7 @@ class Shared:
 
 
 class Actor(threading.Thread):
-    """Does one thing again and again; a passing failure makes it begin anew."""
+    """Repeats one action; a transient failure makes it start again."""
 
     def __init__(self, shared: Shared, name: str) -> None:
         super().__init__(name=name, daemon=True)
@@ -148,7 +148,7 @@ class Actor(threading.Thread):
 
 
 class Writer(Actor):
-    """Inserts points, deletes some of its own again; `batches` is all it ever sent, in order."""
+    """Inserts points and deletes some of its own; `batches` holds every batch it has sent, in order."""
 
     def __init__(self, shared: Shared, number: int, seed: int) -> None:
         super().__init__(shared, f"writer-{number}")
@@ -260,7 +260,7 @@ class Watcher(Actor):
 
 
 class Leaver(Actor):
-    """Makes calls, and goes away in the middle of most: nobody else may notice."""
+    """Makes calls and cancels most of them: no other caller may notice."""
 
     NAMES = ("left/a", "left/b")
 
@@ -319,7 +319,7 @@ class Torture:
         self.shared.gate.set()
 
     def round(self, fault: str) -> None:
-        """Traffic, a fault in the middle of it, what must be true at once, and what must be true in the end."""
+        """Traffic, a fault during it, the checks that must hold at once, and those that must hold at rest."""
         self.faults[fault] += 1
         time.sleep(self._random.uniform(0.05, 0.6))
         getattr(self, f"_{fault}")()
@@ -357,7 +357,7 @@ class Torture:
             ballast.unlink()
 
     def _descriptors(self) -> None:
-        """No file can be opened, and no connection taken, for a while."""
+        """For a while the server can open no file and accept no connection."""
         pid = self.server.process.pid
         before = resource.prlimit(pid, resource.RLIMIT_NOFILE)
         used = max(int(each.name) for each in Path(f"/proc/{pid}/fd").iterdir())
@@ -397,7 +397,7 @@ class Torture:
         copied.kill()
 
     def _damage(self) -> None:
-        """A kill, and a second server on a copy of the data in which a bit is another one."""
+        """A kill, and a second server on a copy of the data in which one bit is flipped."""
         self.shared.gate.clear()
         self.server.kill()
         with tempfile.TemporaryDirectory() as folder:
@@ -441,7 +441,7 @@ class Torture:
     def _check_damaged(
         self, stub: HullServiceStub, acknowledged: dict[str, int], server: Server, where: str
     ) -> dict[str, int]:
-        """It has whole batches, the first so many of each writer; returns how many."""
+        """It must hold whole batches, the first n of each writer; returns n for each writer."""
         last = {}
         for name in acknowledged:
             last[name] = stub.GetProducer(pb.GetProducerRequest(name=HULL, producer=name), timeout=10).last_sequence
@@ -457,7 +457,7 @@ class Torture:
         return last
 
     def _settle(self) -> None:
-        """Everything sent is acknowledged, and nobody writes."""
+        """Wait until every batch is acknowledged, and no writer sends another."""
         self.shared.gate.clear()
         for writer in self.writers:
             deadline = time.monotonic() + PATIENCE
@@ -489,7 +489,7 @@ class Torture:
         require(counts == [points[p] for p in sample], "points are there more or less often than they were inserted")
 
     def _model(self, last: dict[str, int]) -> Counter[tuple[float, float]]:
-        """The points after so many batches of each writer."""
+        """The points after the first `last[name]` batches of each writer."""
         points: Counter[tuple[float, float]] = Counter()
         for writer in self.writers:
             for inserts, deletes in writer.batches[: last[writer.name]]:
@@ -521,7 +521,7 @@ class Torture:
 
 
 def torture(folder: Path, faults: int, seed: int, writers: int = 3) -> str:
-    """Run so many rounds. Returns the counts; raises BrokenPromiseError with what was broken."""
+    """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     run = Torture(folder, seed, writers)
     kinds = ["kill", "kill", "descriptors", "damage", "kill", "full_disk", "pause", "copy", "kill", "sever"]
     try:

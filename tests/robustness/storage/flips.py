@@ -132,7 +132,7 @@ class Builder:
             self.acknowledged[change.number] += change.records
 
     def snapshot(self, number: int, points: int) -> None:
-        """As of now."""
+        """Store a snapshot of the current revision."""
         revision = len(self.acknowledged[number])
         for step in self.storage.snapshot(
             number, Kept(revision, snapshot_contents(number, revision, points), {"a": revision}, clock=-revision)
@@ -140,7 +140,7 @@ class Builder:
             self.storage.commit([step])
 
     def delete(self, number: int, *, sweep: bool = True) -> None:
-        """A hull, and what it leaves."""
+        """Delete a hull; with `sweep`, also remove the rows that it leaves."""
         self.storage.commit([Delete(number)])
         del self.acknowledged[number]
         for step in self.storage.sweep() if sweep else ():
@@ -160,7 +160,7 @@ def snapshot_contents(number: int, revision: int, count: int = 0) -> Contents:
 
 
 def fill(builder: Builder) -> None:
-    """A bit of everything."""
+    """A folder with hulls of every kind."""
     for number in range(1, 6):
         builder.create(number)
     for turn in range(5):
@@ -332,6 +332,8 @@ def run(folder: Path, count: int, seed: int, processes: int, every: int = 1) -> 
             counts[what] += 1
             if what in FAULTS:
                 faults.append(f"{what}: {flip}: {words}")
+        pool.close()
+        pool.join()  # a worker that ends by itself reports the lines that it ran
     return counts, faults
 
 
@@ -340,7 +342,7 @@ def main() -> None:
     parser.add_argument("--flips", type=int, default=20_000, help="at random, beside those of the headers")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--every", type=int, default=1, help="try each n-th bit of the headers only")
+    parser.add_argument("--every", type=int, default=1, help="of the headers' bits, flip every Nth")
     parser.add_argument("--folder", type=Path, default=None, help="where to work; in memory is quickest")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:

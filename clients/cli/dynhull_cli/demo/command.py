@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..durations import duration
+from ..out_file import check_out
 
 if TYPE_CHECKING:
     from datetime import timedelta
@@ -19,12 +20,12 @@ DEFAULT_DAY = "2013-03-08"
 
 def demo(
     day: Annotated[
-        datetime,
+        str,
         typer.Option(
-            formats=["%Y-%m-%d"],
+            metavar="YYYY-MM-DD",
             help="The day of 2013 to replay. 2013-03-08 had snow and the worst delays of the year.",
         ),
-    ] = DEFAULT_DAY,  # type: ignore[assignment]  # typer reads the text
+    ] = DEFAULT_DAY,
     points: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="Replay this CSV file instead.")
     ] = None,
@@ -70,6 +71,7 @@ def demo(
 
     console = Console(highlight=False, soft_wrap=True)
     try:
+        check_out(out, [".png"])
         scene = _scene(day, points, x, y, identity, time, batches, duration(window, "--window"))
         verified = show(console, scene, out)
     except (ValueError, OSError, RuntimeError, DynhullError) as error:
@@ -81,7 +83,7 @@ def demo(
 
 
 def _scene(
-    day: datetime,
+    day: str,
     points: Path | None,
     x: str | None,
     y: str | None,
@@ -96,9 +98,13 @@ def _scene(
         from .table import Table
 
         return Table(points, x, y, identity, time, batches)
+    try:
+        date = datetime.strptime(day, "%Y-%m-%d").date()
+    except ValueError:
+        raise ValueError(f"--day {day!r} is not a day such as {DEFAULT_DAY}") from None
     from .flights import Flights  # pandas and pyproj, which a CSV file does not need
 
-    flights = Flights(day.date())
+    flights = Flights(date)
     if max_age is None:
         return flights
     from .window import RecentPositions

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..out_file import check_out
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -58,6 +60,7 @@ def explain(
     the bridges searched anew. Its leaves hold up to 4 points here, so that a few points make a tree.
 
     A sheet has room for 40 steps, an animation for 300, a page for 2000; if there are more, an even choice is drawn.
+    A static algorithm takes up to 2000 points, the tree 200.
     """
     try:
         algorithm, write = _full_name(algorithm), _writer(out)
@@ -103,9 +106,8 @@ def _story(algorithm: str, name: str, points: "list[Point]", collinear: Boundary
 
 def _writer(path: Path) -> "Callable[[Path, Story], int]":
     """The function that writes a file with this suffix and returns the number of steps in it."""
+    check_out(path, SUFFIXES)
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ValueError(f"--out {path}: the name must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     if suffix == ".html":
         from .page import write_page
 

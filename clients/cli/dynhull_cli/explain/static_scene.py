@@ -24,6 +24,7 @@ from .scene import (
 )
 from .steps import Step, explained
 
+MOST_POINTS = 2000  # the time grows with the square: of ten thousand points it is minutes
 MOST_NUMBERS = 30  # with more points in the order, their numbers would cover them
 EDGE = 1.15  # leaves room for the numbers around [-1, 1]
 TURNED = {1: "left turn", 0: "straight on", -1: "right turn"}
@@ -57,7 +58,16 @@ LEGEND = {
 
 
 def static_story(algorithm: str, name: str, points: Sequence[Point], collinear: Collinear) -> Story:
-    """An algorithm of `dynhull.static` on points from a source of that name."""
+    """An algorithm of `dynhull.static` on points from a source of that name.
+
+    Raises:
+        ValueError: there are more points than a picture has room for.
+    """
+    if len(points) > MOST_POINTS:
+        raise ValueError(
+            f"{name} has {len(points):,} points: a picture of a static algorithm has room for {MOST_POINTS:,}; "
+            "draw a part of the file"
+        )
     steps = explained(algorithm, points, collinear)
     where = places(list(dict.fromkeys(points)))
     return Story(

@@ -143,6 +143,8 @@ def _claim(target: Path) -> bool:
         return True
     if (target / UNFINISHED).exists():
         raise StorageError(f"{target} {UNFINISHED_WORDS}")
+    if target.is_file():
+        raise StorageError(f"{target} is a file: name an empty folder, or one that does not exist yet")
     if any(target.iterdir()):
         raise StorageError(f"{target} is not empty: name an empty folder, or one that does not exist yet")
     return False

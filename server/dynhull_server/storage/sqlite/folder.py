@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from pathlib import Path
 
-from ..port import DamagedError, FormatError, LockedError
+from ..port import DamagedError, FormatError, LockedError, StorageError
 from .disk import Access, Disk
 from .log import check_log
 from .totals import Totals, read_totals
@@ -29,9 +29,14 @@ class Folder:
     Attributes:
         database: the database file.
         log: the database's write-ahead log.
+
+    Raises:
+        StorageError: the path is that of a file.
     """
 
     def __init__(self, path: Path, disk: Disk) -> None:
+        if path.is_file():
+            raise StorageError(f"{path} is a file, not a data folder")
         self.path = path
         self.disk = disk
         self.database = path / DATABASE

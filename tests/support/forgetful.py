@@ -1,9 +1,11 @@
-"""Runs the command that follows, with hulls that forget their first vertex: for the tests of what notices that."""
+"""Runs the command in its arguments with hulls that omit their first vertex, to test what detects a wrong hull."""
 
 import runpy
 import sys
 
 from dynhull import DynamicHull
+
+FORGETFUL = [sys.executable, __file__]
 
 if __name__ == "__main__":
     right = DynamicHull.vertices
