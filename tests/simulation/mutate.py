@@ -1,4 +1,4 @@
-"""The test of the test: each patch in mutants/ puts in a fault, most of them from the past. Is it found, and how soon?"""
+"""The test of the test: each patch in mutants/ puts in a fault, most of them old ones. Is it found, and how soon?"""
 
 import re
 import shutil
