@@ -22,7 +22,8 @@ class BatchCounts:
         self._took = [0] * (len(buckets) + 1)
         self._seconds = 0.0
         self._applied = self._duplicate = self._refused = 0
-        self._updates = dict.fromkeys(("insert", "delete", "move", "evict", "expire", "missing"), 0)
+        self._inserted = self._deleted = self._missing = 0
+        self._updates = dict.fromkeys(("move", "evict", "expire"), 0)
         self._rows = dict.fromkeys(("stale", "late", "skipped", "clamped"), 0)
 
     def applied(self, applied: Applied, seconds: float) -> None:
@@ -33,12 +34,17 @@ class BatchCounts:
             self._duplicate += 1
             return
         self._applied += 1
-        self._updates["insert"] += applied.inserted
-        self._updates["delete"] += applied.deleted
+        self._inserted += applied.inserted
+        self._deleted += applied.deleted
+        self._missing += applied.missing
+        if applied.moved or applied.clock is not None or applied.stale or applied.skipped:
+            self._count_entities(applied)
+
+    def _count_entities(self, applied: Applied) -> None:
+        """Count what only hulls with keys or times do."""
         self._updates["move"] += applied.moved
         self._updates["evict"] += applied.evicted
         self._updates["expire"] += applied.expired
-        self._updates["missing"] += applied.missing
         self._rows["stale"] += applied.stale
         self._rows["late"] += applied.late
         self._rows["skipped"] += applied.skipped
@@ -62,7 +68,8 @@ class BatchCounts:
             "Points inserted, deleted, moved by their keys, evicted and expired; deletes of missing points.",
             labels=["operation"],
         )
-        for operation, count in self._updates.items():
+        plain = {"insert": self._inserted, "delete": self._deleted, "missing": self._missing}
+        for operation, count in (plain | self._updates).items():
             updates.add_metric([operation], count + (expired if operation == "expire" else 0))
         rows = CounterMetricFamily(
             "dynhull_rows",
