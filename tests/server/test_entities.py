@@ -326,7 +326,6 @@ QUESTIONS = {
     "Locate": lambda name: pb.LocateRequest(name=name, keys=keys("a")),
     "Distance": lambda name: pb.DistanceRequest(name="area", keys=keys("a"), keys_of=name),
     "Support": lambda name: pb.SupportRequest(name=name, directions=points(1, 0), include_keys=True),
-    "GetHull": lambda name: pb.GetHullRequest(name=name, include_keys=True),
     "SamplePoints": lambda name: pb.SamplePointsRequest(name=name, include_keys=True),
 }
 
@@ -343,6 +342,13 @@ def test_a_hull_without_keys_cannot_answer(stub: HullServiceStub, name: str, met
 
     code, info, _ = refusal(ask)
     assert (code, info.reason, dict(info.metadata)) == (FAILED, "HULL_UNSUITABLE", {"value": name})
+
+
+def test_a_hull_without_keys_has_no_names(stub: HullServiceStub, name: str) -> None:
+    """A client may ask for them without knowing what the hull is."""
+    stub.Apply(pb.ApplyRequest(name=name, batch=batch_pb2.Batch(inserts=points(1, 2))))
+    answer = stub.GetHull(pb.GetHullRequest(name=name, include_keys=True, encoding=COORDINATES))
+    assert (list(answer.vertices.coordinates), answer.HasField("vertex_keys")) == ([1, 2], False)
 
 
 def test_a_limit_refuses_new_keys_and_not_moves(stub: HullServiceStub, name: str) -> None:

@@ -58,6 +58,8 @@ TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
 TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
+# Seconds between looks at the commit in progress.
+WATCH_SECONDS = 1.0
 
 
 class Expiries:
@@ -144,6 +146,7 @@ class Engine:
         self._recalls = Recalls(self._storage, partial(self.run, self.disk))
         self._started = True
         self._supervisor.every(TICK, "clock", self._tick)
+        self._supervisor.every(WATCH_SECONDS, "commit watch", self._watch_commits)
         return contents.notes
 
     def keep_house(self, snapshot_points: int, sync_seconds: float | None) -> None:
@@ -411,6 +414,10 @@ class Engine:
         self.dispatch(Tick(now, time, self._expiries))
         if self._supervisor.fails("expiry") and not self._core.expiring(time):  # `expiring` is O(hulls)
             self._supervisor.succeeded("expiry")
+
+    async def _watch_commits(self) -> None:
+        """Report a commit that hangs."""
+        now = self._machine.clock.monotonic()
         since = self._commits.since
         if since is not None and now - since > STUCK:
             self._supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))

@@ -75,7 +75,7 @@ async def ask_of_keys(
 
 
 def _known(found: Found) -> Checked:
-    """The positions; the origin for a missing key, whose answer nobody reads."""
+    """The positions; the origin for a missing key, whose answer is ignored."""
     return Checked(np.where(found.present[:, np.newaxis], found.points, 0.0))
 
 

@@ -43,10 +43,10 @@ class Housekeeping:
         await self._carry_out(self._storage.sweep())
 
     async def snapshots(self, least_points: int) -> None:
-        """Write a snapshot of every hull that is due, one after another.
+        """Write a snapshot of every hull that needs one, one after another.
 
-        A hull is due when the batches since its last snapshot have at least as many points as the hull itself, and at
-        least `least_points`.
+        A hull needs one when the batches since its last snapshot have at least as many points as the hull itself, and
+        at least `least_points`.
         """
         failure: Exception | None = None
         for hull in self._engine:

@@ -101,9 +101,14 @@ class LiveHull:
         """Record a snapshot, which includes batches with this number of points."""
         self._hull.unsaved -= points
 
+    @property
+    def keyed(self) -> bool:
+        """Whether the points have keys."""
+        return self.settings.identity != "multiset"
+
     def require_keys(self) -> None:
         """Raise HullUnsuitableError if the points have no keys."""
-        if self.settings.identity == "multiset":
+        if not self.keyed:
             raise HullUnsuitableError(self.name, "has points without keys")
 
     def keys(self, keys: Keys | None) -> Keys:

@@ -251,8 +251,7 @@ class HullService:
             await hull.reached(request.min_revision)
             return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
         keys = None
-        if request.include_keys:
-            hull.require_keys()
+        if request.include_keys and hull.keyed:
             counts, (vertices, keys) = await hull.read(
                 lambda state: (state.vertices(), state.vertex_keys()), hull.vertex_count, request.min_revision
             )

@@ -530,7 +530,7 @@ class Core:
     # Time and shutdown
 
     def _tick(self, event: Tick, effects: list[Effect]) -> None:
-        """Make points leave where that is due."""
+        """Update the time, and begin to expire the points of hulls whose planned time has come."""
         self._now = event.now
         while self._due and self._due[0][0] <= event.time and not self._stopping:
             due, number, name = heappop(self._due)

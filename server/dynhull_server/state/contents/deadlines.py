@@ -20,6 +20,10 @@ class Deadlines:
     def __len__(self) -> int:
         return len(self._of)
 
+    def keys(self) -> list[Key]:
+        """The keys that have a deadline."""
+        return list(self._of)
+
     @property
     def first(self) -> int | None:
         """The earliest deadline, None if there is none."""

@@ -21,6 +21,8 @@ from .deadlines import Deadlines, Key
 # Changes are replayed as one of up to this many rows, which is many times faster.
 REPLAYED_TOGETHER = 65_536
 REMOVED = -1
+# Beyond twice the number of keys, deadlines of keys that have left are dropped.
+MOST_SPARE_DEADLINES = 1024
 KINDS = {"str": "strings", "int": "integers"}
 
 
@@ -276,6 +278,12 @@ class Keyed:
                 self._deadlines.set(key, deadline)
         for key in _listed(rows.removes):
             self._deadlines.drop(key)
+        if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE_DEADLINES:
+            keys = self._deadlines.keys()
+            there = self._has(_of_kind(keys, rows.keys))
+            for key, is_there in zip(keys, there.tolist(), strict=True):
+                if not is_there:  # evicted, or too old before its deadline
+                    self._deadlines.drop(key)
 
     def _expire(self, until: int | None, clock: int) -> int:
         """Remove the points that leave. Returns their number."""

@@ -1,4 +1,4 @@
-"""The points of a hull, whatever identifies them and however they leave."""
+"""What all kinds of contents have in common: with or without keys, with or without a window."""
 
 from collections.abc import Iterable
 from typing import Any, Protocol
