@@ -15,7 +15,7 @@ import dynhull_server
 HERE = Path(__file__).parent
 PATCHES = sorted((HERE / "mutants").glob("*.patch"))
 # Lives within which a fault must be found.
-MOST_LIVES = 5_000
+MOST_LIVES = 10_000
 # Seeds of the plans that look for it.
 SEED = 1
 

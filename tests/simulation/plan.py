@@ -24,8 +24,8 @@ TIMED = {"k": "str", "w": "multiset", "l": "int"}
 # a few operations meet (swarm testing: Groce and others, 2012).
 CORE = {
     "write": 40,
-    "put": 30,
-    "together": 14,
+    "put": 40,
+    "together": 8,
     "stream": 14,
     "read": 12,
     "delete": 10,
@@ -33,13 +33,13 @@ CORE = {
     "recall": 5,
     "snapshot": 5,
     "last": 4,
-    "tick": 10,
+    "tick": 12,
     "day": 1,
 }
 SHELL = {
     "write": 34,
-    "put": 26,
-    "together": 12,
+    "put": 34,
+    "together": 8,
     "stream": 14,
     "read": 10,
     "delete": 9,
@@ -68,14 +68,15 @@ ENDS = ("kill", "kill", "stop")
 def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     draw = random.Random(seed)
-    names = NAMES[: draw.randint(1, 3)]
-    timed = tuple(TIMED)[: draw.randint(0, 3)]
+    with_times = draw.random() < 0.5
+    names = NAMES[: draw.randint(1, 1 if with_times else 3)]
+    timed = tuple(draw.sample(tuple(TIMED), draw.randint(1, 3))) if with_times else ()
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
     weights["write"] += 1
     if not timed:
-        weights["put"] = 0
+        weights |= {"put": 0, "tick": 0}
         weights["together"] *= len(names) > 1
-    immediate = layer != "sqlite" and draw.random() < 0.1
+    immediate = layer != "sqlite" and draw.random() < 0.15
     lives = [_life(draw, names, timed, weights) for _ in range(draw.choice((1, 1, 2, 3)))]
     for name in timed:
         if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window

@@ -19,7 +19,7 @@ PLANS = {"core": 500, "shell": 100, "sqlite": 10}
 FIRST = 5 * 10**6
 # Faults that are found in a second; `python -m simulation mutants` has all of them.
 QUICK = {
-    "clock_not_restored",
+    "expiry_not_journalled",
     "row02_discarded_while_creating",
     "row06_commit_thread_catches_one_kind",
     "row18_unknown_is_nothing",
