@@ -89,11 +89,11 @@ class HullTree:
         """
 
     @overload
-    def apply(self, op: int, xy: object, ignore_missing: bool, together: bool | None = None) -> int:
+    def apply(self, op: int, xy: object | None, ignore_missing: bool, together: bool | None = None) -> int:
         """Insert all rows (+1) or delete all rows (-1)."""
 
     @overload
-    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], xy: object, ignore_missing: bool, together: bool | None = None) -> int:
+    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], xy: object | None, ignore_missing: bool, together: bool | None = None) -> int:
         """
         Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and conquer (True) or one change after the other (False); by default the batch decides.
         """

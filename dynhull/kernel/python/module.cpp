@@ -102,9 +102,9 @@ void add_hull_tree(nb::module_& module) {
            "Add a point. True if the hull changed. O(log² n).")
       .def("delete", &Hull::remove, nb::sig("def delete(self, x: float, y: float) -> bool"), "x"_a.none(), "y"_a.none(),
            "Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n).")
-      .def("apply", &Hull::apply_all, "op"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+      .def("apply", &Hull::apply_all, "op"_a, "xy"_a.none(), "ignore_missing"_a, "together"_a = nb::none(),
            "Insert all rows (+1) or delete all rows (-1).")
-      .def("apply", &Hull::apply_each, "ops"_a, "xy"_a, "ignore_missing"_a, "together"_a = nb::none(),
+      .def("apply", &Hull::apply_each, "ops"_a, "xy"_a.none(), "ignore_missing"_a, "together"_a = nb::none(),
            "Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that "
            "deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and "
            "conquer (True) or one change after the other (False); by default the batch decides.");
