@@ -50,6 +50,11 @@ LOADS = [
     ("load {name} points.csv --vertices", "--vertices is for parquet", "load {name} line.ndjson --vertices"),
     ("load loaded points.csv", "--resume loads", "load loaded points.csv --resume"),
     ("load loaded points.csv", "--again all", "load loaded points.csv --again"),
+    (
+        "load loaded points.csv --bad-rows points.csv",
+        "--bad-rows points.csv is the file that is loaded, and would replace it: name another file",
+        "load loaded points.csv --again --bad-rows bad.csv",
+    ),
     ("load loaded points.csv", "--replace deletes", "load loaded points.csv --replace"),
     ("load loaded points.csv --key x", "leave out --key", "load loaded points.csv --again"),
     (

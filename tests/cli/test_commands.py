@@ -156,7 +156,7 @@ def test_phases(served, name):
         "shares": [0.5, 0.5],
     }
     done = dynhull("phases", name, "2,0")
-    assert (done.exit_code, done.stderr) == (1, "error: entries[0] is (2.0, 0.0): a composition is from 0 to 1\n")
+    assert (done.exit_code, done.stderr) == (2, "error: entries[0] is (2.0, 0.0): a composition is from 0 to 1\n")
 
 
 def test_frontier(served, name):

@@ -11,7 +11,7 @@ import server_process as servers
 from command_line import dynhull
 from forgetful import FORGETFUL
 
-from dynhull_cli.demo import command
+from dynhull_cli.demo import show
 from dynhull_cli.demo.replay import replay
 from dynhull_cli.demo.scene import Frame
 from dynhull_cli.demo.server import server_process
@@ -122,13 +122,16 @@ def test_a_wrong_server_is_found_out(tmp_path, monkeypatch):
         with servers.server_process("--scrub-cpu", "0", wrap=FORGETFUL) as server:
             yield server.address
 
-    monkeypatch.setattr(command, "server_process", wrong_server)
+    monkeypatch.setattr(show, "server_process", wrong_server)
     points, picture = tmp_path / "points.csv", tmp_path / "picture.png"
     points.write_text("t,x,y\n1,0,0\n1,4,0\n1,0,4\n2,5,5\n")
     done = dynhull("demo", "--points", points, "--time", "t", "--out", picture)
     assert done.exit_code == 1
     *_, compared, difference = done.stdout.splitlines()
-    assert compared == "Live hull compared with Chan's recomputation and with the watcher's copy: 0 batches"
+    assert (
+        compared
+        == "Compared after each batch: the live hull with Chan's recomputation, its points with those sent, the watcher's copy with the live hull: 0 batches"
+    )
     assert difference.startswith("DIFFERENT at 1: the live hull differs from Chan's recomputation: ")
     assert "VERIFIED" not in done.stdout
     assert not picture.exists()

@@ -73,7 +73,7 @@ def test_a_watch_names_who_joins_and_leaves_the_corners(served, name):
         client.create_hull(name, keyed="str")
         client.put(name, ["a", "b", "c", "d"], [[0, 0], [4, 0], [0, 4], [1, 1]])
         shown = dynhull("watch", name, "--keys", "--events", "1").stdout
-        assert shown.split()[1:4] == ["4", "3", "+3"]
+        assert shown.split()[1:4] == ["4", "3", "3"]
         assert shown.rstrip().endswith("+a +b +c")
         event = json.loads(dynhull("watch", name, "--keys", "--events", "1", "--json").stdout)
         assert (event["joined"], event["left"]) == (["a", "b", "c"], [])

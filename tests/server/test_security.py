@@ -57,6 +57,8 @@ EVERY_CALL = {
     "GetProducer": lambda stub, name: stub.GetProducer(pb.GetProducerRequest(name=name, producer="p")),
     "Locate": lambda stub, name: stub.Locate(pb.LocateRequest(name=name)),
     "Count": lambda stub, name: stub.Count(pb.CountRequest(name=name)),
+    "GetPositions": lambda stub, name: stub.GetPositions(pb.GetPositionsRequest(name=name)),
+    "ReadEntities": lambda stub, name: next(stub.ReadEntities(pb.ReadEntitiesRequest(name=name))),
     "Support": lambda stub, name: stub.Support(pb.SupportRequest(name=name)),
     "Tangents": lambda stub, name: stub.Tangents(pb.TangentsRequest(name=name)),
     "SamplePoints": lambda stub, name: stub.SamplePoints(pb.SamplePointsRequest(name=name)),

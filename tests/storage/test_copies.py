@@ -331,16 +331,16 @@ def test_every_command_warns_of_a_commit_that_was_under_way(paths, tmp_path):
     crash = killed(data, tmp_path / "crash")
     storage.close()
     log = (crash / LOG).read_bytes()
-    (crash / LOG).write_bytes(log[: log.rindex(record(9).inserts.tobytes()) + 10])
+    (crash / LOG).write_bytes(log[: log.rindex(record(9).rows.inserts.tobytes()) + 10])
     exported = done("export", "fleet", file, "--data", crash, says=f"{file}: 24 points of fleet at revision 8")
-    copied = done("backup", copy, "--data", crash, says=f"{copy}: 1 hulls")
+    copied = done("backup", copy, "--data", crash, says=f"{copy}: 1 hull")
     assert all(warning in finished.stderr for finished in (exported, copied))
     checked = run("check", crash)
     assert checked.returncode == 1
     assert warning in checked.stderr
     with server_process("--data", str(crash), complaints=warning) as server, HullClient(server.address) as client:
         assert client.get_hull("fleet").revision == 8
-    done("check", crash, says=f"{crash}: 1 hulls, all whole")
+    done("check", crash, says=f"{crash}: 1 hull, all whole")
     refused("export", "boats", file, "--data", copy, says=f"there is no hull 'boats' in {copy}")
 
 
@@ -370,7 +370,7 @@ def test_a_database_of_something_else(tmp_path):
         connection.executescript("CREATE TABLE a (b); DROP TABLE a")
     refused("check", tmp_path, says=f"{tmp_path} is no data folder: its {DATABASE} is empty")
     (tmp_path / DATABASE).write_bytes(b"no database" * 400)
-    refused("check", tmp_path, says="cannot be read (file is not a database): restore a backup")
+    refused("check", tmp_path, says="cannot be read (file is not a database): restore a backup", code=1)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@
 """
 
 try:
-    import google.protobuf  # noqa: F401
-    import grpc  # noqa: F401
+    import google.protobuf as _protobuf  # noqa: F401
+    import grpc as _grpc  # noqa: F401
 except ModuleNotFoundError as _missing:
     raise ModuleNotFoundError(
         "dynhull_client needs grpcio and protobuf. Install them with: pip install 'dynhull[client]'", name=_missing.name

@@ -211,7 +211,7 @@ class Positions(Value):
         revision: the hull's revision.
         positions: (n, 2) a position in each row, NaN for a missing key.
         present: (n,) whether the hull has the key.
-        times: (n,) the event time of each key as datetime64[us] in UTC, 1970-01-01 for a key without one; None if the
+        times: (n,) the event time of each key as datetime64[us] in UTC; 1970-01-01 for a key without one; None if the
             hull has no times.
     """
 

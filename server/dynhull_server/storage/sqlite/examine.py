@@ -200,7 +200,8 @@ class _Examination:
                 self._findings.damaged.add(row.number)
                 self._findings.fatal.append(f"the row of hull {row.number}, {row.name!r}, is damaged")
             *_, renewed = values(row)
-            self._renewed += renewed - hull.checksum
+            if hull.whole:
+                self._renewed += renewed - hull.checksum
             rows = self._ledger.hulls[row.number] = HullRows(row, renewed)
             self._hulls[row.number] = _Scanned(rows)
 
