@@ -128,10 +128,8 @@ def test_a_wrong_server_is_found_out(tmp_path, monkeypatch):
     done = dynhull("demo", "--points", points, "--time", "t", "--out", picture)
     assert done.exit_code == 1
     *_, compared, difference = done.stdout.splitlines()
-    assert (
-        compared
-        == "Compared after each batch: the live hull with Chan's recomputation, its points with those sent, the watcher's copy with the live hull: 0 batches"
-    )
+    assert compared.startswith("Compared after each batch: ")
+    assert compared.endswith(": 0 batches")
     assert difference.startswith("DIFFERENT at 1: the live hull differs from Chan's recomputation: ")
     assert "VERIFIED" not in done.stdout
     assert not picture.exists()
