@@ -57,7 +57,7 @@ format: .venv/.check  ## format the Python, C++ and proto files
 check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp)
+	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp tests/kernel/*.hpp)
 	$(BIN)/mypy
 	$(STUB) -o build/_kernel.pyi
 	diff build/_kernel.pyi dynhull/_kernel.pyi || (echo 'run `make stub`'; exit 1)

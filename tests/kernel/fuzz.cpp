@@ -6,14 +6,13 @@
 // its points and `changed` flags against a std::map and a monotone chain, and queries are asked of the tree and, by
 // their definitions, of the monotone chain. Some allocations fail on purpose: then the
 // hull has to be as it was. Compile with -DDYNHULL_LEAF=4 to split, merge and rotate all the time.
-#include <chrono>
-#include <cstdio>
 #include <cstring>
 #include <map>
 #include <random>
 
 #include "../../dynhull/kernel/check.hpp"
 #include "../../dynhull/kernel/query/queries.hpp"
+#include "fuzz_lives.hpp"
 
 namespace {
 
@@ -340,35 +339,8 @@ class Life {
   std::vector<Point> chains_[2];
 };
 
-bool survives(std::uint64_t seed) {
-  try {
-    Life(seed).live();
-    return true;
-  } catch (const std::exception& error) {
-    std::printf("seed %llu: %s\n", static_cast<unsigned long long>(seed), error.what());
-    return false;
-  }
-}
-
 }  // namespace
 
 int main(int count, char** words) {
-  double seconds = 10;
-  std::vector<std::uint64_t> seeds;
-  for (int i = 1; i < count; ++i) {
-    if (std::strcmp(words[i], "--seconds") == 0 && i + 1 < count)
-      seconds = std::atof(words[++i]);
-    else
-      seeds.push_back(std::strtoull(words[i], nullptr, 10));
-  }
-  for (std::uint64_t seed : seeds)
-    if (!survives(seed)) return 1;
-  if (!seeds.empty()) return 0;
-  std::random_device entropy;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  unsigned lives = 0;
-  for (; std::chrono::steady_clock::now() < end; ++lives)
-    if (!survives((std::uint64_t{entropy()} << 32) | entropy())) return 1;
-  std::printf("%u lives, leaves of %u\n", lives, LEAF);
-  return 0;
+  return fuzz_lives(count, words, "lives", LEAF, [](std::uint64_t seed) { Life(seed).live(); });
 }

@@ -5,13 +5,11 @@
 // Without seeds, random ones until the time is up. A window is checked against a vector that is searched from one end
 // to the other; some allocations fail on purpose: then tree and window have to be as they were. A wheel holds numbers
 // of slots whose times grow meanwhile, as a window of keys does.
-#include <chrono>
-#include <cstdio>
-#include <cstring>
 #include <random>
 
 #include "../../dynhull/kernel/check.hpp"
 #include "../../dynhull/kernel/window/expiry.hpp"
+#include "fuzz_lives.hpp"
 
 namespace {
 
@@ -323,36 +321,11 @@ class WheelLife {
   Wheel<std::uint32_t, BySlot> wheel_;
 };
 
-bool survives(std::uint64_t seed) {
-  try {
-    WindowLife(seed).live();
-    WheelLife(seed).live();
-    return true;
-  } catch (const std::exception& error) {
-    std::printf("seed %llu: %s\n", static_cast<unsigned long long>(seed), error.what());
-    return false;
-  }
-}
-
 }  // namespace
 
 int main(int count, char** words) {
-  double seconds = 10;
-  std::vector<std::uint64_t> seeds;
-  for (int i = 1; i < count; ++i) {
-    if (std::strcmp(words[i], "--seconds") == 0 && i + 1 < count)
-      seconds = std::atof(words[++i]);
-    else
-      seeds.push_back(std::strtoull(words[i], nullptr, 10));
-  }
-  for (std::uint64_t seed : seeds)
-    if (!survives(seed)) return 1;
-  if (!seeds.empty()) return 0;
-  std::random_device entropy;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  unsigned lives = 0;
-  for (; std::chrono::steady_clock::now() < end; ++lives)
-    if (!survives((std::uint64_t{entropy()} << 32) | entropy())) return 1;
-  std::printf("%u lives of windows, leaves of %u\n", lives, LEAF);
-  return 0;
+  return fuzz_lives(count, words, "lives of windows", LEAF, [](std::uint64_t seed) {
+    WindowLife(seed).live();
+    WheelLife(seed).live();
+  });
 }

@@ -71,7 +71,7 @@ def counts(stub: HullServiceStub, names: list[str]) -> list[tuple[int, int]]:
 
 def test_each_hull_gets_its_batch_as_one_revision(stub: HullServiceStub, fleet: list[str]) -> None:
     a, b, c = fleet
-    many = insert(*range(2000))  # so many that they are applied beside the event loop
+    many = insert(*range(2000))  # enough to be applied beside the event loop
     answer = stub.ApplyTogether(together((c, many), (a, delete(9, 9)), (b, insert(9, 9))))
     results = [(each.revision, each.inserted, each.deleted, each.point_count) for each in answer.results]
     assert results == [(1, 1000, 0, 1000), (2, 0, 1, 1), (1, 1, 0, 1)]

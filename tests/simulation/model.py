@@ -358,7 +358,7 @@ class Model:
         """The keys of the points with these x were read."""
         kept = self._uids[uid].keys[revision]
         if list(map(kept.get, seen)) != list(keys):
-            raise self.finds(f"at revision {revision} the keys of {seen} were told as {keys}, and are {kept}")
+            raise self.finds(f"at revision {revision} the keys of {seen} were sent as {keys}, and are {kept}")
 
     def recalled(self, uid: str, revision: int, seen: Content) -> None:
         """An earlier revision was read."""

@@ -114,7 +114,7 @@ def blocks(chunks: Iterable[Rows], size: int) -> Iterator[Rows]:
 
 
 def _ends(rows: Rows, room: int, size: int, known: set[Key]) -> Iterator[int]:
-    """The rows before which a block ends, when there is room for so many more rows in the first one."""
+    """The rows before which a block ends; `room` is the number of rows that the first block still takes."""
     if rows.keys is None:
         yield from range(room, len(rows) + 1, size)
         return

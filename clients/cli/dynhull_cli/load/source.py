@@ -76,7 +76,7 @@ class Source:
             return False
 
     def done(self) -> int:
-        """Bytes read so far, of `size`."""
+        """The number of the `size` bytes that have been read; 0 for a pipe."""
         return 0 if self.size is None else self.compressed.tell()
 
     def digest(self) -> str | None:
