@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from decimal import Decimal
+from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ._sources import LARGEST_EXACT_INTEGER
-from .arrays import as_array
+from .arrays import as_array, finite_times
 
 if TYPE_CHECKING:
+    import numpy as np
     import numpy.typing as npt
 
 NO_TIME = math.nan
@@ -34,15 +33,7 @@ def as_times(times: npt.ArrayLike, name: str = "times", *, or_none: bool = False
     array = as_array(times, name)
     if array.ndim != 1:
         raise ValueError(f"{name} must have shape (k,), got {array.shape}")
-    if not _converts_exactly(array):
-        array = np.array(
-            [as_time(time, f"{name} row {row}", or_none=or_none) for row, time in enumerate(array.tolist())]
-        )
-    doubles = array.astype(np.float64) + 0.0
-    bad = np.flatnonzero(np.isinf(doubles) if or_none else ~np.isfinite(doubles))
-    if bad.size:
-        raise ValueError(f"{name} row {bad[0]} is {doubles[bad[0]]}: times must be finite")
-    return doubles
+    return finite_times(array, name, partial(as_time, or_none=or_none), or_none=or_none)
 
 
 def as_time(time: Any, name: str = "time", *, or_none: bool = False) -> float:
@@ -60,9 +51,3 @@ def as_time(time: Any, name: str = "time", *, or_none: bool = False) -> float:
     if double != time:
         raise ValueError(f"{name} is {time!r}: no double has this value")
     return double + 0.0
-
-
-def _converts_exactly(array: npt.NDArray[Any]) -> bool:
-    if array.dtype.kind in "iu":
-        return not array.size or (array.min() >= -LARGEST_EXACT_INTEGER and array.max() <= LARGEST_EXACT_INTEGER)
-    return array.dtype in (np.float64, np.float32, np.float16)

@@ -2,7 +2,8 @@
 
 import math
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from itertools import chain
 from numbers import Number
 from typing import Any
@@ -182,16 +183,7 @@ def as_times(times: Any, rows: int) -> npt.NDArray[np.float64]:
         raise ValueError(f"times must have shape ({rows},) like the points, got {array.shape}")
     if array.dtype.kind in "USVMm":
         raise TypeError(f"times must be real numbers, got {array.dtype}")
-    whole = array.dtype.kind in "iu"
-    if array.dtype not in (np.float64, np.float32, np.float16) and not (whole and _all_exact(array)):
-        array = np.array(
-            [_as_double_scalar(value, f"times row {row}", "times") for row, value in enumerate(array.tolist())]
-        )
-    doubles = array.astype(np.float64) + 0.0
-    strange = np.flatnonzero(~np.isfinite(doubles))
-    if strange.size:
-        raise ValueError(f"times row {strange[0]} is {doubles[strange[0]]}: times must be finite")
-    return doubles
+    return finite_times(array, "times", partial(_as_double_scalar, kind="times"))
 
 
 def as_time(value: Any, name: str) -> float:
@@ -202,9 +194,26 @@ def as_time(value: Any, name: str) -> float:
     return double + 0.0
 
 
-def _all_exact(integers: npt.NDArray[Any]) -> bool:
-    """Whether all integers are small enough that each is a double."""
-    return bool(np.all((integers <= LARGEST_EXACT_INTEGER) & (integers >= -LARGEST_EXACT_INTEGER)))
+def finite_times(
+    array: npt.NDArray[Any], name: str, one: Callable[[Any, str], float], *, or_none: bool = False
+) -> npt.NDArray[np.float64]:
+    """Return an array of times as new finite doubles without negative zeros.
+
+    Where numpy might round, `one` converts each value; it also gets the name of its row. `or_none` allows NaN.
+    """
+    if not _converts_exactly(array):
+        array = np.array([one(value, f"{name} row {row}") for row, value in enumerate(array.tolist())])
+    doubles = array.astype(np.float64) + 0.0
+    strange = np.flatnonzero(np.isinf(doubles) if or_none else ~np.isfinite(doubles))
+    if strange.size:
+        raise ValueError(f"{name} row {strange[0]} is {doubles[strange[0]]}: times must be finite")
+    return doubles
+
+
+def _converts_exactly(array: npt.NDArray[Any]) -> bool:
+    if array.dtype.kind in "iu":
+        return not array.size or (array.min() >= -LARGEST_EXACT_INTEGER and array.max() <= LARGEST_EXACT_INTEGER)
+    return array.dtype in (np.float64, np.float32, np.float16)
 
 
 def _as_pairs(xy: npt.ArrayLike, name: str) -> Points:
