@@ -16,7 +16,7 @@ import numpy as np
 from ._times import NO_TIME, as_time, as_times
 from ._tree import HullTree
 from .arrays import as_coordinate, as_points, as_tuples
-from .keys import PackedKeys, as_key, as_keys
+from .keys import PackedKeys, as_key, as_keys, key_list
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -211,13 +211,13 @@ class Entities(HullTree):
     def positions(self, keys: Any) -> Points:
         """The place of each key, NaN where it is missing. O(1) a row."""
         nowhere = (math.nan, math.nan), NO_TIME
-        places = [self._held.get(key, nowhere)[0] for key in _listed(as_keys(keys, self.key_type))]
+        places = [self._held.get(key, nowhere)[0] for key in key_list(as_keys(keys, self.key_type))]
         return np.array(places, dtype=np.float64).reshape(len(places), 2)
 
     def times(self, keys: Any) -> npt.NDArray[np.float64]:
         """The time of each key, NaN where the key or its time is missing. O(1) a row."""
         none = None, NO_TIME
-        return np.array([self._held.get(key, none)[1] for key in _listed(as_keys(keys, self.key_type))], np.float64)
+        return np.array([self._held.get(key, none)[1] for key in key_list(as_keys(keys, self.key_type))], np.float64)
 
     def entities(self) -> tuple[Keys, Points, npt.NDArray[np.float64]]:
         """Keys in order, places and times. O(n log n)."""
@@ -288,7 +288,7 @@ def checked_puts(
 
 def distinct(keys: Keys) -> list[Any]:
     """The keys of a batch as a list. Raises DuplicateKeyError for the first row whose key came before. O(k)."""
-    listed = _listed(keys)
+    listed = key_list(keys)
     if len(set(listed)) < len(listed):
         rows: dict[Key, int] = {}
         for row, key in enumerate(listed):
@@ -296,7 +296,3 @@ def distinct(keys: Keys) -> list[Any]:
             if first != row:
                 raise DuplicateKeyError(key, (first, row))
     return listed
-
-
-def _listed(keys: Keys) -> list[Any]:
-    return list(keys) if isinstance(keys, PackedKeys) else keys.tolist()

@@ -13,7 +13,7 @@ from .arrays import refuse_masked
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-__all__ = ["KeyType", "Keys", "PackedKeys", "as_key", "as_keys"]
+__all__ = ["KeyType", "Keys", "PackedKeys", "as_key", "as_keys", "key_list", "take_keys"]
 
 KeyType = Literal["str", "int"]
 """The kind of a hull's keys."""
@@ -190,6 +190,16 @@ def as_key(key: Any, key_type: KeyType, name: str = "key") -> str | int:
         TypeError: the key is of another kind.
     """
     return str(_as_bytes_of_key(key, name), "utf-8") if _is_str(key_type) else _as_integer(key, name)
+
+
+def key_list(keys: Keys) -> list[Any]:
+    """The keys as a list of `str` or of `int`. O(size of the keys)."""
+    return list(keys) if isinstance(keys, PackedKeys) else keys.tolist()
+
+
+def take_keys(keys: Keys, rows: npt.NDArray[np.intp]) -> Keys:
+    """The keys of some rows, in the order of `rows`. O(size of the keys)."""
+    return PackedKeys.pack([keys[row] for row in rows.tolist()]) if isinstance(keys, PackedKeys) else keys[rows]
 
 
 def _is_str(key_type: KeyType) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.keys import PackedKeys
+from dynhull.keys import PackedKeys, key_list
 
 from .state.records import FOREVER, NO_TIME, Contents, Times
 from .storage.port import Progress
@@ -24,7 +24,7 @@ def write_csv(file: Path, contents: Contents, progress: Progress) -> None:
         for part in _parts(contents, progress):
             columns: list[list[str]] = []
             if part.keys is not None:
-                columns.append(list(map(_quoted if isinstance(part.keys, PackedKeys) else str, _listed(part.keys))))
+                columns.append(list(map(_quoted if isinstance(part.keys, PackedKeys) else str, key_list(part.keys))))
             columns += [list(map(repr, axis)) for axis in part.points.T.tolist()]
             columns += [_texts(times) for times in (part.times, part.deadlines) if times is not None]
             out.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
@@ -80,7 +80,7 @@ def _parts(contents: Contents, progress: Progress) -> Iterator[Contents]:
 
 def _features(part: Contents) -> Iterator[dict[str, Any]]:
     points = part.points.tolist()
-    ids = [{}] * len(points) if part.keys is None else [{"id": _json_key(key)} for key in _listed(part.keys)]
+    ids = [{}] * len(points) if part.keys is None else [{"id": _json_key(key)} for key in key_list(part.keys)]
     times, expires = ([""] * len(points) if each is None else _texts(each) for each in (part.times, part.deadlines))
     for point, of_key, *dates in zip(points, ids, times, expires, strict=True):
         properties = {name: text for name, text in zip(("time", "expires"), dates, strict=True) if text}
@@ -96,10 +96,6 @@ def _quoted(text: str) -> str:
 def _json_key(key: str | int) -> str | int:
     """Integers as strings where some readers of JSON would round them."""
     return str(key) if isinstance(key, int) and key > LARGEST_JSON_INTEGER else key
-
-
-def _listed(keys: PackedKeys | npt.NDArray[np.uint64]) -> list[Any]:
-    return list(keys) if isinstance(keys, PackedKeys) else keys.tolist()
 
 
 def _dates(times: Times) -> npt.NDArray[np.datetime64]:

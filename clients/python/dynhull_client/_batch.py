@@ -8,9 +8,10 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dynhull.arrays import as_points
+from dynhull.keys import take_keys
 from dynhull_proto.v1 import batch_pb2
 
-from ._keys import checked_keys, decode_keys, encode_keys, plain_keys, rows_of
+from ._keys import checked_keys, decode_keys, encode_keys, plain_keys
 from ._messages import encode_points
 from ._times import encode_duration, encode_times
 
@@ -167,7 +168,7 @@ def keep_last_rows(batch: batch_pb2.Batch) -> None:
     rows = np.array(sorted({key: row for row, key in enumerate(plain_keys(keys))}.values()), np.intp)
     if len(rows) == len(keys):
         return
-    batch.puts.keys.CopyFrom(encode_keys(rows_of(keys, rows)))
+    batch.puts.keys.CopyFrom(encode_keys(take_keys(keys, rows)))
     for packed, width in ((batch.puts.points, BYTES_PER_POINT), (batch.puts.times, BYTES_PER_TIME)):
         packed.packed = np.frombuffer(packed.packed, f"V{width}")[rows].tobytes() if packed.packed else b""
 

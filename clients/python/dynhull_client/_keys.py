@@ -4,9 +4,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from dynhull.keys import Keys, KeyType, PackedKeys, as_keys
+from dynhull.keys import Keys, KeyType, PackedKeys, as_keys, key_list
 from dynhull_proto.v1 import points_pb2
 
 KeyTuple = tuple[str, ...] | tuple[int, ...]
@@ -46,7 +45,7 @@ def decode_names(message: points_pb2.Keys) -> KeyTuple:
 
 def plain_keys(keys: Keys) -> KeyTuple:
     """Keys as strings or integers."""
-    return tuple(keys) if isinstance(keys, PackedKeys) else tuple(keys.tolist())
+    return tuple(key_list(keys))
 
 
 def join_keys(parts: Sequence[Keys]) -> Keys:
@@ -55,14 +54,6 @@ def join_keys(parts: Sequence[Keys]) -> Keys:
     if len(packed) < len(parts):
         return np.concatenate([part for part in parts if not isinstance(part, PackedKeys)])
     return PackedKeys(b"".join(part.lengths for part in packed), b"".join(part.data for part in packed))
-
-
-def rows_of(keys: Keys, rows: npt.NDArray[np.intp]) -> Keys:
-    """The keys of these rows."""
-    if not isinstance(keys, PackedKeys):
-        return keys[rows]
-    strings = list(keys)
-    return PackedKeys.pack([strings[row] for row in rows.tolist()])
 
 
 def _key_type(keys: Any, name: str) -> KeyType:

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Checked, Points
+from dynhull.keys import take_keys
 
-from ..state.contents.keyed import Found, Keyed, take_keys
+from ..state.contents.keyed import Found, Keyed
 from ..state.contents.live import AnyHull
 from ..state.errors import HullEmptyError
 from ..state.hull_state import Counts, HullState, VertexKeys

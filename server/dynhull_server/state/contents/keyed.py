@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -10,16 +9,15 @@ import numpy.typing as npt
 
 from dynhull import DuplicateKeyError, KeyedHull, Put
 from dynhull.arrays import Points
-from dynhull.keys import PackedKeys
+from dynhull.keys import PackedKeys, key_list
 
 from ..admission import GREATEST_TIME, Admission, admit, server_clock, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
 from ..records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
 from .deadlines import Deadlines, Key
+from .live import REPLAYED_TOGETHER
 
-# Changes are replayed as one of up to this many rows, which is many times faster.
-REPLAYED_TOGETHER = 65_536
 REMOVED = -1
 # Beyond twice the number of keys, deadlines of keys that have left are dropped.
 MOST_SPARE_DEADLINES = 1024
@@ -213,7 +211,7 @@ class Keyed:
     def stored(self) -> Contents:
         """The points in the order of their keys. O(n log n)."""
         keys, points, times = self.hull.entities()
-        deadlines = self._deadlines.of(_listed(keys)) if len(self._deadlines) else None
+        deadlines = self._deadlines.of(key_list(keys)) if len(self._deadlines) else None
         return Contents(points, keys, stored_times(times) if self.timed else None, deadlines)
 
     def find(self, keys: Keys) -> Found:
@@ -232,7 +230,7 @@ class Keyed:
         if stored.times is not None:
             self._note_times(stored.times)
         if stored.deadlines is not None:
-            for key, deadline in zip(_listed(keys), stored.deadlines.tolist(), strict=True):
+            for key, deadline in zip(key_list(keys), stored.deadlines.tolist(), strict=True):
                 self._deadlines.set(key, deadline)
 
     def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
@@ -273,10 +271,10 @@ class Keyed:
 
     def _set_deadlines(self, rows: KeyRows, written: npt.NDArray[np.bool_]) -> None:
         deadlines = [FOREVER] * len(rows.keys) if rows.deadlines is None else rows.deadlines.tolist()
-        for key, deadline, was_written in zip(_listed(rows.keys), deadlines, written.tolist(), strict=True):
+        for key, deadline, was_written in zip(key_list(rows.keys), deadlines, written.tolist(), strict=True):
             if was_written:
                 self._deadlines.set(key, deadline)
-        for key in _listed(rows.removes):
+        for key in key_list(rows.removes):
             self._deadlines.drop(key)
         if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE_DEADLINES:
             keys = self._deadlines.keys()
@@ -339,7 +337,7 @@ class Keyed:
             there &= ~(self.hull.times(keys) <= until)
         first = self._deadlines.first
         if first is not None and first <= clock:
-            there &= self._deadlines.of(_listed(keys)) > clock
+            there &= self._deadlines.of(key_list(keys)) > clock
         return there
 
     def _number(self, clock: int | None) -> int:
@@ -380,19 +378,14 @@ def select_keys(keys: Keys, which: npt.NDArray[np.bool_]) -> Keys:
     return PackedKeys(lengths[which], np.frombuffer(keys.data, np.uint8)[np.repeat(which, lengths)])
 
 
-def take_keys(keys: Keys, rows: npt.NDArray[np.intp]) -> Keys:
-    """The keys of some rows, in their order."""
-    return PackedKeys.pack([keys[row] for row in rows.tolist()]) if isinstance(keys, PackedKeys) else keys[rows]
-
-
 def _refuse_repeated(rows: KeyRows) -> None:
     """Raise KeyRepeatedError if a key comes twice among the puts and removes. O(k)."""
-    keys = [*_listed(rows.keys), *_listed(rows.removes)]
+    keys = [*key_list(rows.keys), *key_list(rows.removes)]
     if len(set(keys)) == len(keys):
         return
     puts = len(rows.keys)
     seen: dict[Key, int] = {}
-    for number, key in enumerate(chain(keys)):
+    for number, key in enumerate(keys):
         first = seen.setdefault(key, number)
         if first != number:
             places = [("puts.keys", each) if each < puts else ("removes", each - puts) for each in (first, number)]
@@ -406,9 +399,9 @@ def _merged(group: list[KeyRows]) -> KeyRows:
     last: dict[Key, int] = {}  # the row of the last put, REMOVED after a removal
     number = 0
     for rows in group:
-        for key in _listed(rows.removes):
+        for key in key_list(rows.removes):
             last[key] = REMOVED
-        for key in _listed(rows.keys):
+        for key in key_list(rows.keys):
             last[key] = number
             number += 1
     put = [key for key, row in last.items() if row != REMOVED]
@@ -423,10 +416,6 @@ def _merged(group: list[KeyRows]) -> KeyRows:
 
 def _of_kind(keys: list[Any], kind: Keys) -> Keys:
     return PackedKeys.pack(keys) if isinstance(kind, PackedKeys) else np.array(keys, np.uint64)
-
-
-def _listed(keys: Keys) -> list[Any]:
-    return list(keys) if isinstance(keys, PackedKeys) else keys.tolist()
 
 
 def _key(keys: Keys, row: int) -> Key:

@@ -10,6 +10,9 @@ from ..records import Contents, Expiry, Record, Rows
 
 AnyHull = DynamicHull | KeyedHull | WindowHull
 
+# Changes are replayed as one of up to this many rows, which is many times faster.
+REPLAYED_TOGETHER = 65_536
+
 
 class LiveContents(Protocol):
     """The points of a hull. A batch is admitted, then applied; `Admitted` batches belong to the class that made them.

@@ -10,9 +10,7 @@ from dynhull import DynamicHull, MissingPointError
 from ..batch import Applied, Batch, KeyedBatch
 from ..errors import LimitExceededError, MisfitError, PointMissingError
 from ..records import Contents, Expiry, PointRows, Record
-
-# Batches are replayed as one set of up to this many points, which is many times faster.
-REPLAYED_TOGETHER = 65_536
+from .live import REPLAYED_TOGETHER
 
 NO_KEYS = "has points without keys, which a batch inserts and deletes"
 

@@ -15,7 +15,8 @@ from ..admission import GREATEST_TIME, admit, too_old
 from ..batch import Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, LimitExceededError, MisfitError
 from ..records import Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
-from .multiset import NO_KEYS, REPLAYED_TOGETHER, apply_points, missing_point
+from .live import REPLAYED_TOGETHER
+from .multiset import NO_KEYS, apply_points, missing_point
 
 UNLIMITED = 2**63 - 1
 
