@@ -143,8 +143,8 @@ async def one_by_one(address: str, todo: list[list[bytes]]) -> list[float]:
 
 
 def used(data: Path) -> int:
-    """Bytes of the folder of a server that has stopped: the log is in the database."""
-    return sum(file.stat().st_size for file in data.iterdir())
+    """Bytes of the folder of a server that has stopped and left no log beside its database."""
+    return sum(file.stat().st_size for file in data.rglob("*") if file.is_file())
 
 
 def wait_for_snapshot(data: Path) -> None:

@@ -1,12 +1,19 @@
-"""Moves of entities in a keyed hull, beside the same moves without keys: delete and insert as one batch.
+"""Moves of entities in a keyed hull, beside the same moves without keys, and through a server beside Redis.
 
     nice python benchmarks/entities.py --sizes 1e5 1e6
     python benchmarks/entities.py --works moves --batches 8192 --repeat 9
     python benchmarks/entities.py --works names memory reference
+    python benchmarks/entities.py --works server --sizes 1e6 --batches 64 8192 --repeat 7
 
+moves, names, memory and reference measure the library. Without keys, a move is a delete and an insert in one batch.
 Every hull moves the same entities to the same places, batch by batch, and with each batch another hull begins, so that
 ratios compare neighbours in time. Columns: the median, the least and the greatest over the batches, and the median of
 the ratios to the unkeyed hull.
+
+server measures `dynhull serve --durability sync` with a keyed hull beside Redis 7 with GEOADD and `appendfsync always`,
+which is started for the run (Debian: `apt-get install redis-server`). The two take the same moves in turn, 8 batches
+under way. Redis keeps no hull, and truncates coordinates to a geohash of 52 bits. Columns: moves a second, median,
+least and greatest of the runs; the median of the ratios to Redis; the growth of the data on the disk.
 """
 
 import argparse
@@ -21,6 +28,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import served_entities
 
 import dynhull
 from dynhull import DynamicHull, KeyedHull
@@ -165,12 +173,16 @@ def memory(n: int, kind: str) -> Iterator[tuple[str, float]]:
 
 
 WORKS = {"moves": moves, "names": names, "reference": reference, "memory": None}
+SERVER = "server"
+PARTS = [*WORKS, SERVER]
 
 
-def measure(arguments: argparse.Namespace) -> None:
-    for work in arguments.works:
+def measure(arguments: argparse.Namespace, works: list[str]) -> None:
+    print("| work | input | n | batch | who | median | least | greatest | of unkeyed |")
+    print("| --- | --- | ---: | ---: | --- | ---: | ---: | ---: | ---: |")
+    for work in works:
         for kind in arguments.inputs:
-            for n in (int(float(size)) for size in arguments.sizes):
+            for n in arguments.sizes:
                 if work == "memory":
                     for who, size in memory(n, kind):
                         print(f"| {work} | {kind} | {n:,} | | {who} | {size:.1f} bytes | | | |", flush=True)
@@ -193,11 +205,18 @@ def measure(arguments: argparse.Namespace) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", nargs="+", default=["1e5", "1e6"])
-    parser.add_argument("--batches", nargs="+", type=int, default=[64, 8192, 65536])
-    parser.add_argument("--inputs", nargs="+", default=["uniform"], choices=INPUTS)
-    parser.add_argument("--works", nargs="+", default=list(WORKS), choices=WORKS)
-    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument(
+        "--sizes", nargs="+", type=number, default=[10**5, 10**6], help="numbers of entities (default 1e5 1e6)"
+    )
+    parser.add_argument(
+        "--batches", nargs="+", type=int, default=[64, 8192, 65536], help="moves in a batch (default 64 8192 65536)"
+    )
+    parser.add_argument(
+        "--inputs", nargs="+", default=["uniform"], choices=INPUTS, help="where the points are (default uniform)"
+    )
+    parser.add_argument("--works", nargs="+", default=PARTS, choices=PARTS, help="what to measure (default all)")
+    parser.add_argument("--repeat", type=int, default=3, help="repetitions, and runs of each server (default 3)")
+    parser.add_argument("--folder", type=Path, default=Path(), help="where the servers put their data (default here)")
     parser.add_argument("--measure-memory", nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.measure_memory:
@@ -206,12 +225,20 @@ def main() -> None:
         return
     if dynhull.KERNEL != "cpp":
         sys.exit("the kernel is not built")
+    if SERVER in arguments.works:
+        served_entities.require_redis()
     print(
         f"dynhull {dynhull.KERNEL}, Python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}\n"
     )
-    print("| work | input | n | batch | who | median | least | greatest | of unkeyed |")
-    print("| --- | --- | ---: | ---: | --- | ---: | ---: | ---: | ---: |")
-    measure(arguments)
+    if works := [work for work in arguments.works if work != SERVER]:
+        measure(arguments, works)
+    if SERVER in arguments.works:
+        inputs = {kind: INPUTS[kind] for kind in arguments.inputs}
+        served_entities.measure(arguments.folder, inputs, arguments.sizes, arguments.batches, arguments.repeat)
+
+
+def number(text: str) -> int:
+    return int(float(text))
 
 
 if __name__ == "__main__":
