@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
     from .keys import Keys, KeyType
 
 
-@dataclass(frozen=True, slots=True)
-class Put:
+class Put(NamedTuple):
     """What a batch of puts did: the number of its rows of each kind, which add up to the batch.
 
     Attributes:
@@ -143,7 +141,7 @@ class KeyedHull(Hull):
         Raises:
             DuplicateKeyError: a key comes twice.
         """
-        return Put(*self._tree.update(keys, xy, times, _known(only)))
+        return Put._make(self._tree.update(keys, xy, times, _known(only)))
 
     def remove(self, key: str | int) -> bool:
         """Remove an entity. Returns whether the hull changed. O(log² n).
@@ -169,16 +167,18 @@ class KeyedHull(Hull):
         return self._tree.remove_many(keys, missing == "ignore")
 
     def expire(self, until: float) -> int:
-        """Remove every entity whose time is at most `until`, as one batch. Returns their number. O(n).
+        """Remove every entity whose time is at most `until`, as one batch. Returns their number. O(log² n) each.
 
-        Entities without a time stay.
+        Entities without a time stay. The first call of `expire`, `evict` or `oldest` takes O(n); from then on updates
+        keep the order of times. The implementation in Python keeps none: O(n) each time.
         """
         return self._tree.expire(until)
 
     def evict(self, count: int) -> int:
-        """Remove the `count` oldest entities, or all if there are fewer, as one batch. Returns their number. O(n).
+        """Remove the `count` oldest entities, or all if there are fewer, as one batch. Returns their number.
 
-        Those without a time come first; among equal times the least key does.
+        Those without a time come first; among equal times the least key does. O(log² n) each, and O(n) at the first
+        call, like `expire`; O(n) at each call while an entity has no time.
 
         Raises:
             ValueError: the count is negative.
@@ -230,7 +230,7 @@ class KeyedHull(Hull):
         return self._tree.entities()
 
     def oldest(self) -> float | None:
-        """The least time of an entity; None if none has a time. O(n)."""
+        """The least time of an entity; None if none has a time. O(1), and O(n) at the first call, like `expire`."""
         return self._tree.oldest()
 
     def vertex_keys(self) -> list[str] | list[int]:

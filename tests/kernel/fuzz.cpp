@@ -342,5 +342,6 @@ class Life {
 }  // namespace
 
 int main(int count, char** words) {
-  return fuzz_lives(count, words, "lives", LEAF, [](std::uint64_t seed) { Life(seed).live(); });
+  return fuzz_lives(count, words, "lives, leaves of " + std::to_string(LEAF),
+                    [](std::uint64_t seed) { Life(seed).live(); });
 }

@@ -12,7 +12,6 @@
 
 #include "../../dynhull/kernel/check.hpp"
 #include "../../dynhull/kernel/keyed/entities.hpp"
-#include "../../dynhull/kernel/keyed/expiry.hpp"
 #include "fuzz_lives.hpp"
 
 namespace {
@@ -51,21 +50,25 @@ class Life {
         strings_(below(2) == 0),
         ordered_(below(3) == 0),
         kind_(below(5)),
+        times_(below(4)),
+        always_timed_(ordered_ || below(2) == 0),
         keys_(1 + below(below(2) == 0 ? 12 : 800)),
         entities_(std::make_unique<Entities>(strings_, ordered_)) {}
 
   void live() {
     const int steps = 10 + static_cast<int>(below(60));
     for (int step = 0; step < steps; ++step) {
-      switch (below(10)) {
+      ++now_;
+      switch (below(12)) {
         case 0: put(1); break;
         case 1: put(below(12)); break;
         case 2: put(below(40)); break;
         case 3: put(below(300)); break;
         case 4: remove(below(20)); break;
         case 5: remove(below(300)); break;
-        case 6: below(3) == 0 ? expire() : evict(); break;
-        case 7: below(8) == 0 ? clear() : copy(); break;
+        case 6: expire(); break;
+        case 7: evict(); break;
+        case 8: below(8) == 0 ? clear() : copy(); break;
         default: name(); break;
       }
       check();
@@ -105,6 +108,22 @@ class Life {
       }
       default: return {coordinate(), coordinate()};
     }
+  }
+
+  // Few times, many, those of a clock with stragglers, and those of a clock that one device has far ahead.
+  double time() {
+    switch (times_) {
+      case 0: return static_cast<double>(below(20));
+      case 1: return static_cast<double>(below(1'000'000)) / 7;
+      case 2: return static_cast<double>(now_) - (below(8) == 0 ? static_cast<double>(below(40)) : 0);
+      default: return static_cast<double>(now_) + (below(50) == 0 ? 1e300 : static_cast<double>(below(100)) / 99);
+    }
+  }
+  // A time before which a part of the entities is.
+  double some_time() {
+    if (model_.empty() || below(8) == 0) return time();
+    const double chosen = std::next(model_.begin(), static_cast<long>(below(model_.size())))->second.time;
+    return std::isnan(chosen) ? time() : chosen;
   }
 
   // Different keys, now and then with one twice.
@@ -167,9 +186,9 @@ class Life {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto held = model_.find(rows[i]);
       places[i] = held != model_.end() && below(6) == 0 ? held->second.place : point();
-      times[i] = static_cast<double>(below(20));
+      times[i] = time();
     }
-    const bool timed = ordered_ || below(2) == 0;
+    const bool timed = always_timed_ || below(2) == 0;
     const auto only = static_cast<Only>(below(3));
     Model after = model_;
     Counts expected;
@@ -231,23 +250,28 @@ class Life {
   }
 
   void expire() {
-    const auto until = static_cast<double>(below(12));
-    with_failures([&] { entities_->remove(tree_, expired(entities_->slots(), until)); });
-    std::erase_if(model_, [&](const auto& entry) { return entry.second.time <= until; });
-    double least = INFINITE;
+    const double until = std::min(some_time(), some_time());
+    std::size_t left = 0;
+    with_failures([&] { left = entities_->expire(tree_, until); });
+    require(left == std::erase_if(model_, [&](const auto& entry) { return entry.second.time <= until; }),
+            "an expiry miscounted");
+    if (below(2) == 0) return;
+    double least = INFINITE, oldest = NO_TIME;
     for (const auto& [key, entity] : model_)
       if (entity.time < least) least = entity.time;
-    const double oldest = oldest_time(entities_->slots());
+    with_failures([&] { oldest = entities_->oldest(); });
     require(std::isnan(oldest) ? least == INFINITE : oldest == least, "the oldest time is wrong");
   }
 
   void evict() {
-    const std::size_t count = below(10);
-    with_failures([&] { entities_->remove(tree_, oldest(entities_->slots(), count)); });
+    const std::size_t count = below(2) == 0 ? below(10) : below(model_.size() + 2);
+    std::size_t left = 0;
+    with_failures([&] { left = entities_->evict(tree_, count); });
     std::vector<std::pair<double, std::string>> ages;
-    for (const auto& [key, entity] : model_) ages.emplace_back(std::isnan(entity.time) ? -1 : entity.time, key);
+    for (const auto& [key, entity] : model_) ages.emplace_back(std::isnan(entity.time) ? -INFINITE : entity.time, key);
     std::sort(ages.begin(), ages.end());
-    for (std::size_t i = 0; i < std::min(count, ages.size()); ++i) model_.erase(ages[i].second);
+    require(left == std::min(count, ages.size()), "an eviction miscounted");
+    for (std::size_t i = 0; i < left; ++i) model_.erase(ages[i].second);
   }
 
   void clear() {
@@ -305,14 +329,18 @@ class Life {
 
   std::mt19937_64 random_;
   bool strings_, ordered_;
-  std::uint64_t kind_, keys_;
+  std::uint64_t kind_, times_;
+  bool always_timed_;
+  std::uint64_t keys_;
   HullTree tree_;
   std::unique_ptr<Entities> entities_;
   Model model_;
+  std::uint64_t now_ = 0;
 };
 
 }  // namespace
 
 int main(int count, char** words) {
-  return fuzz_lives(count, words, "lives of entities", LEAF, [](std::uint64_t seed) { Life(seed).live(); });
+  return fuzz_lives(count, words, "lives of entities, leaves of " + std::to_string(LEAF),
+                    [](std::uint64_t seed) { Life(seed).live(); });
 }

@@ -8,12 +8,13 @@
 #include <cstring>
 #include <exception>
 #include <random>
+#include <string>
 #include <vector>
 
 // Calls `live` with each seed; an exception is a fault, and ends the run with the seed that repeats it. Returns the
 // exit code. `what` names the lives in the last line.
 template <class Live>
-int fuzz_lives(int count, char** words, const char* what, unsigned leaf, Live live) {
+int fuzz_lives(int count, char** words, const std::string& what, Live live) {
   const auto survives = [&](std::uint64_t seed) {
     try {
       live(seed);
@@ -39,6 +40,6 @@ int fuzz_lives(int count, char** words, const char* what, unsigned leaf, Live li
   unsigned lives = 0;
   for (; std::chrono::steady_clock::now() < end; ++lives)
     if (!survives((std::uint64_t{entropy()} << 32) | entropy())) return 1;
-  std::printf("%u %s, leaves of %u\n", lives, what, leaf);
+  std::printf("%u %s\n", lives, what.c_str());
   return 0;
 }

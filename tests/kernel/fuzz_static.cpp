@@ -5,15 +5,13 @@
 // Without seeds, random ones until the time is up. Every hull, with the filter and two threads on and off, and Chan's,
 // must equal that of a std::set and a monotone chain. Some allocations fail on purpose.
 #include <atomic>
-#include <chrono>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <random>
 #include <set>
 
 #include "../../dynhull/kernel/static/chan.hpp"
 #include "../../dynhull/kernel/static/static_hull.hpp"
+#include "fuzz_lives.hpp"
 
 namespace {
 
@@ -158,35 +156,8 @@ class Input {
   double spread_;
 };
 
-bool survives(std::uint64_t seed) {
-  try {
-    Input(seed).run();
-    return true;
-  } catch (const std::exception& error) {
-    std::printf("seed %llu: %s\n", static_cast<unsigned long long>(seed), error.what());
-    return false;
-  }
-}
-
 }  // namespace
 
 int main(int count, char** words) {
-  double seconds = 10;
-  std::vector<std::uint64_t> seeds;
-  for (int i = 1; i < count; ++i) {
-    if (std::strcmp(words[i], "--seconds") == 0 && i + 1 < count)
-      seconds = std::atof(words[++i]);
-    else
-      seeds.push_back(std::strtoull(words[i], nullptr, 10));
-  }
-  for (std::uint64_t seed : seeds)
-    if (!survives(seed)) return 1;
-  if (!seeds.empty()) return 0;
-  std::random_device entropy;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  unsigned inputs = 0;
-  for (; std::chrono::steady_clock::now() < end; ++inputs)
-    if (!survives((std::uint64_t{entropy()} << 32) | entropy())) return 1;
-  std::printf("%u inputs\n", inputs);
-  return 0;
+  return fuzz_lives(count, words, "inputs", [](std::uint64_t seed) { Input(seed).run(); });
 }

@@ -253,7 +253,8 @@ class WheelLife {
     for (std::uint64_t step = 0; step < steps; ++step) {
       if (random_.below(2) == 0) push(random_.below(80));
       grow();
-      if (random_.below(2) == 0) pop_until(base_ + static_cast<double>(random_.below(100)));
+      const double until = base_ + static_cast<double>(random_.below(random_.below(10) == 0 ? 3000 : 100));
+      if (random_.below(2) == 0) random_.below(2) == 0 ? pop_until(until) : take_until(until);
       std::size_t visited = 0;
       wheel_.for_each([&](std::uint32_t) { ++visited; });
       require(visited == present_.size() && wheel_.size() == visited, "an item is missing");
@@ -265,8 +266,15 @@ class WheelLife {
  private:
   struct BySlot {
     const std::vector<double>* times;
+    struct Entry {
+      double time;
+      std::uint32_t slot;
+    };
     double time(std::uint32_t slot) const { return (*times)[slot]; }
-    static bool before(std::uint32_t a, std::uint32_t b) { return a < b; }
+    Entry entry(std::uint32_t slot) const { return {time(slot), slot}; }
+    static std::uint32_t item(const Entry& entry) { return entry.slot; }
+    bool current(const Entry& entry) const { return time(entry.slot) == entry.time; }
+    static bool before(const Entry& a, const Entry& b) { return a.slot < b.slot; }
   };
 
   void push(std::size_t count) {
@@ -294,7 +302,7 @@ class WheelLife {
   void pop_until(double time) {
     for (;;) {
       allocations_left = static_cast<long>(random_.below(3));
-      const std::uint32_t* front = nullptr;
+      const BySlot::Entry* front = nullptr;
       try {
         front = wheel_.front();
       } catch (const std::bad_alloc&) {
@@ -303,15 +311,30 @@ class WheelLife {
       }
       allocations_left = -1;
       require((front == nullptr) == present_.empty(), "the wheel is empty, or is not");
-      if (front == nullptr || times_[*front] > time) break;
+      if (front == nullptr || front->time > time) break;
       const auto least = std::min_element(present_.begin(), present_.end(), [&](std::uint32_t a, std::uint32_t b) {
         return times_[a] == times_[b] ? a < b : times_[a] < times_[b];
       });
-      require(*front == *least, "the first item is not the oldest");
+      require(front->slot == *least, "the first item is not the oldest");
       present_.erase(least);
       wheel_.pop_front();
     }
     if (time < INFINITE) base_ = std::max(base_, time);
+  }
+
+  void take_until(double time) {
+    std::vector<std::uint32_t> taken;
+    wheel_.take_until(time, [&](std::uint32_t slot) { taken.push_back(slot); });
+    std::sort(taken.begin(), taken.end());
+    std::vector<std::uint32_t> due;
+    std::erase_if(present_, [&](std::uint32_t slot) {
+      if (times_[slot] > time) return false;
+      due.push_back(slot);
+      return true;
+    });
+    std::sort(due.begin(), due.end());
+    require(taken == due, "other items were taken than those that are old");
+    base_ = std::max(base_, time);
   }
 
   Random random_;
@@ -324,7 +347,7 @@ class WheelLife {
 }  // namespace
 
 int main(int count, char** words) {
-  return fuzz_lives(count, words, "lives of windows", LEAF, [](std::uint64_t seed) {
+  return fuzz_lives(count, words, "lives of windows, leaves of " + std::to_string(LEAF), [](std::uint64_t seed) {
     WindowLife(seed).live();
     WheelLife(seed).live();
   });

@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+FLAGS = ["-std=c++20", "-O0", "-ffp-contract=off", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 
 def test_random_inputs(compiler, tmp_path):

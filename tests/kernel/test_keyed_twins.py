@@ -82,6 +82,41 @@ def test_a_fleet(kind, key_type, ordered):
         both.agree()
 
 
+CLOCKS = {
+    "in order": lambda now, size, random: now + np.sort(random.random(size)),
+    "stragglers": lambda now, size, random: now - random.exponential(3, size),
+    "one time a batch": lambda now, size, _: np.full(size, now),
+    "one device far ahead": lambda now, size, random: np.where(random.random(size) < 0.01, 1e300, now),
+    "backwards": lambda now, size, random: -now - random.random(size),
+}
+
+
+@pytest.mark.parametrize("key_type", ["str", "int"])
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_the_oldest_leave(clock, key_type):
+    """Entities come, move, leave and come again while the oldest leave, by time and by number."""
+    random = np.random.default_rng(11)
+    both = Both(key_type)
+    for step in range(15):
+        keys = random.permutation(1500)[: (400, 40, 1)[step % 3]].astype(np.uint64)
+        if key_type == "str":
+            keys = [f"{key:040}" for key in keys.tolist()]
+        times = CLOCKS[clock](float(step), len(keys), random)
+        both("update", keys, cloud("uniform", len(keys), random), times, None)
+        both("remove_many", [*keys][::5], False)
+        both("oldest")
+        if step % 2:
+            both("expire", float(np.quantile(both.reference.entities()[2], 0.2)))
+        else:
+            both("evict", step)
+        if step % 5 == 4:
+            both("update", [*keys], cloud("uniform", len(keys), random), None, None)
+            both("evict", 1)
+        both.agree()
+    both("expire", 1e300)
+    both.agree()
+
+
 def test_names_while_the_hull_shrinks_and_grows():
     """The vertices leave again and again, then entities come from far away."""
     random = np.random.default_rng(3)
@@ -172,5 +207,17 @@ def test_memory_of_those_who_left_is_used_again():
         if day:
             hull.remove_many([f"{'flight' * 20}{day - 1} {i}" for i in range(1000)])
         if day == 9:
+            early = hull._tree.memory[1]
+    assert hull._tree.memory[1] <= 1.5 * early
+
+
+def test_times_that_shrink_do_not_fill_memory():
+    """The order of times forgets where an entity was before."""
+    hull = KeyedHull("int")
+    keys = np.arange(1000, dtype=np.uint64)
+    for step in range(300):
+        hull.put_many(keys, cloud("uniform", 1000, np.random.default_rng(step)), np.full(1000, -float(step)))
+        assert hull.oldest() == -step
+        if step == 20:
             early = hull._tree.memory[1]
     assert hull._tree.memory[1] <= 1.5 * early

@@ -98,7 +98,8 @@ def test_large_by_chan(cloud):
 
 @pytest.mark.parametrize("cloud", ["uniform", "gaussian", "circle", "grid", "clusters"])
 def test_huge(cloud):
-    xy = CLOUDS[cloud](np.random.default_rng(18), HUGE)
+    n = HUGE if cloud != "circle" else HUGE // 5  # all of them are vertices
+    xy = CLOUDS[cloud](np.random.default_rng(18), n)
     before = xy.copy()
     vertices = convex_hull(xy)
     assert tuples(vertices) == tuples(static.chan(xy)) == tuples(DynamicHull(xy).vertices())

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "ages.hpp"
 #include "keys.hpp"
 #include "names.hpp"
 #include "puts.hpp"
@@ -91,6 +92,7 @@ class Entities {
     }
     batch.commit();
     rename([&] { rename_moved(batch, puts, changes, count); });
+    if (ages_) age(batch, count);
     return counts;
   }
 
@@ -110,16 +112,25 @@ class Entities {
     }
     changes.apply(tree, change, false);
     batch.commit();
+    for (std::size_t i = 0; ages_ && i < keys.size(); ++i)
+      if (batch[i].slot != NONE) ages_->remove(batch[i].time);
     forget(keys.size(), [&](std::size_t i) { return batch[i].slot; });
     return static_cast<std::int64_t>(change);
   }
 
-  // Removes the entities of these slots.
-  void remove(HullTree& tree, std::span<const std::uint32_t> slots) {
-    const Changes changes(slots.size());
-    for (std::size_t i = 0; i < slots.size(); ++i) changes.set(i, -1, slots_[slots[i]].place);
-    changes.apply(tree, slots.size(), false);
-    forget(slots.size(), [&](std::size_t i) { return slots[i]; });
+  // Removes all entities with a time of at most `until`. Returns their number. The first call of `expire`, `evict` or
+  // `oldest` is O(n), and each that follows when most of the entities have left or memory did not suffice.
+  std::size_t expire(HullTree& tree, double until) {
+    return remove_oldest(tree, [until](Ages& ages, auto& taken) { ages.take_until(until, taken); });
+  }
+  // Removes the `count` oldest entities: those without a time first, ties by key. Returns their number.
+  std::size_t evict(HullTree& tree, std::size_t count) {
+    return remove_oldest(tree, [count](Ages& ages, auto& taken) { ages.take_oldest(count, taken); });
+  }
+  // The least time; NO_TIME if no entity has one.
+  double oldest() {
+    if (!ages_) ages_ = std::make_unique<Ages>(slots_);
+    return ages_->oldest();
   }
 
   void clear(HullTree& tree) {
@@ -128,6 +139,7 @@ class Entities {
     std::swap(slots_, empty.slots_);
     table_.swap(empty.table_);
     names_.reset();
+    ages_.reset();
   }
 
   // Whether the names of all these places that are vertices are known. If not, `name` makes them known.
@@ -161,9 +173,12 @@ class Entities {
     });
     require(place == places.end(), "an entity without its point");
     if (names_) names_->check(slots_);
+    if (ages_) ages_->check();
   }
 
-  std::size_t bytes() const { return slots_.bytes() + table_.bytes() + (names_ ? names_->bytes() : 0); }
+  std::size_t bytes() const {
+    return slots_.bytes() + table_.bytes() + (names_ ? names_->bytes() : 0) + (ages_ ? ages_->bytes() : 0);
+  }
 
  private:
   static constexpr std::size_t TOGETHER = 16;   // keys whose cache misses overlap
@@ -229,7 +244,7 @@ class Entities {
 
     void enter(const Keys& keys) {
       if (absent_ == 0) return;
-      entities_.slots_.reserve(absent_, bytes_);
+      if (entities_.slots_.reserve(absent_, bytes_)) entities_.ages_.reset();
       entities_.table_.reserve(absent_);
       for (std::size_t i = 0; i < keys.size(); ++i) {
         if (rows_[i].slot != NONE) continue;
@@ -293,9 +308,47 @@ class Entities {
     }
   }
 
+  // Updates the order of times. If memory does not suffice it is dropped, like the names.
+  template <class Rows>
+  void age(Rows& batch, std::size_t count) {
+    try {
+      ages_->reserve(count);
+    } catch (const std::bad_alloc&) {
+      return ages_.reset();
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (batch[i].slot == NONE) continue;
+      if (batch[i].entered)
+        ages_->push(batch[i].slot);
+      else
+        ages_->put(batch[i].slot, batch[i].time);
+    }
+    if (ages_->stale()) ages_.reset();
+  }
+
+  template <class Take>
+  std::size_t remove_oldest(HullTree& tree, Take take) {
+    if (!ages_) ages_ = std::make_unique<Ages>(slots_);
+    std::vector<Ages::Taken> taken;
+    try {
+      take(*ages_, taken);
+      const Changes changes(taken.size());
+      for (std::size_t i = 0; i < taken.size(); ++i) changes.set(i, -1, slots_[taken[i].slot].place);
+      changes.apply(tree, taken.size(), false);
+    } catch (...) {
+      for (const Ages::Taken& each : taken) slots_[each.slot].time = each.time;
+      ages_.reset();
+      throw;
+    }
+    for (const Ages::Taken& each : taken) ages_->remove(each.time);
+    forget(taken.size(), [&](std::size_t i) { return taken[i].slot; });
+    return taken.size();
+  }
+
   Slots slots_;
   SlotTable table_;
   std::unique_ptr<Names> names_;
+  std::unique_ptr<Ages> ages_;  // none until the oldest are asked for
 };
 
 }  // namespace dynhull

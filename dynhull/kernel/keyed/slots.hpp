@@ -31,15 +31,20 @@ class Slots {
   const Slot& operator[](std::uint32_t slot) const { return pool_[slot]; }
   const Arena& arena() const { return arena_; }
 
-  // Makes room for `extra` more entities, whose strings have `bytes` in all.
-  void reserve(std::size_t extra, std::size_t bytes) {
+  bool free(std::uint32_t slot) const { return std::isnan(pool_[slot].place.y); }
+  std::uint32_t end() const { return pool_.end(); }  // greater than every slot
+
+  // Makes room for `extra` more entities, whose strings have `bytes` in all. Returns whether strings have moved.
+  bool reserve(std::size_t extra, std::size_t bytes) {
     pool_.reserve(extra);
-    if (arena_.worth_compacting(bytes)) {
+    const bool compacts = arena_.worth_compacting(bytes);
+    if (compacts) {
       Arena fresh = arena_.compacted(bytes);
       for_each([&](std::uint32_t slot) { pool_[slot].key = fresh.add(arena_[pool_[slot].key]); });
       arena_.swap(fresh);
     }
     arena_.reserve(bytes);
+    return compacts;
   }
 
   // A new entity with the key of a batch's row.
@@ -60,14 +65,13 @@ class Slots {
   }
 
   // The order of keys, by number or bytewise.
-  bool less(std::uint32_t a, std::uint32_t b) const {
-    return strings_ ? arena_[pool_[a].key] < arena_[pool_[b].key] : pool_[a].key < pool_[b].key;
-  }
+  bool less(std::uint32_t a, std::uint32_t b) const { return key_less(pool_[a].key, pool_[b].key); }
+  bool key_less(std::uint64_t a, std::uint64_t b) const { return strings_ ? arena_[a] < arena_[b] : a < b; }
 
   template <class Visit>
   void for_each(Visit visit) const {
     for (std::uint32_t slot = 0; slot < pool_.end(); ++slot)
-      if (!std::isnan(pool_[slot].place.y)) visit(slot);
+      if (!free(slot)) visit(slot);
   }
 
   // All slots in the order of their keys.

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "../keyed/entities.hpp"
-#include "../keyed/expiry.hpp"
 #include "hull.hpp"
 #include "keys.hpp"
 
@@ -95,11 +94,11 @@ class KeyedHull : public Hull {
   std::size_t expire(const nb::object& until) {
     const double time = nb::cast<double>(nb::module_::import_("dynhull._times").attr("as_time")(until, "until"));
     const WriteLock lock(lock_);
-    return remove_slots(expired(entities_.slots(), time));
+    return entities_.expire(tree_, time);
   }
   std::size_t evict(std::size_t count) {
     const WriteLock lock(lock_);
-    return remove_slots(oldest(entities_.slots(), count));
+    return entities_.evict(tree_, count);
   }
 
   void clear() { entities_.clear(writable()); }
@@ -151,8 +150,8 @@ class KeyedHull : public Hull {
   }
 
   std::optional<double> oldest_of_all() {
-    const ReadLock lock(lock_);
-    const double time = oldest_time(entities_.slots());
+    const WriteLock lock(lock_);
+    const double time = entities_.oldest();
     return std::isnan(time) ? std::nullopt : std::optional(time);
   }
 
@@ -233,12 +232,6 @@ class KeyedHull : public Hull {
     } catch (const DuplicateKey&) {
       duplicate(keys);
     }
-  }
-
-  // Called with the lock held.
-  std::size_t remove_slots(const std::vector<std::uint32_t>& slots) {
-    entities_.remove(tree_, slots);
-    return slots.size();
   }
 
   std::uint32_t slot_of(const GivenKeys& given) {

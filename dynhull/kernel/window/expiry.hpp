@@ -23,7 +23,11 @@ inline bool operator<(const Dated& a, const Dated& b) {
 }
 
 struct OldestFirst {
+  using Entry = Dated;
   static double time(const Dated& item) { return item.time; }
+  static Dated entry(const Dated& item) { return item; }
+  static Dated item(const Dated& entry) { return entry; }
+  static bool current(const Dated&) { return true; }
   static bool before(const Dated& a, const Dated& b) { return a.arrival < b.arrival; }
 };
 

@@ -14,42 +14,51 @@
 
 namespace dynhull {
 
-// `Order` has two functions: time(item), and before(a, b) for items of equal times. Times may grow meanwhile (not
-// shrink): an item that proves younger when its turn comes is filed again. Only `reserve`, `front` and the copy
-// constructor throw, and leave every item in its place.
+// `Order` knows the items. Its type `Entry` has what the order depends on: the time, as `time`, and what else decides
+// between equal times. Functions:
+//
+//     time(item)     its present time; NaN if the item has left, and the wheel drops it
+//     entry(item)    its present entry
+//     item(entry)    the inverse
+//     current(entry) whether the item still has this entry
+//     before(a, b)   the order of two entries of equal times
+//
+// Times may grow meanwhile: an item that proves younger when its turn comes is filed again. An item whose time shrinks
+// must be pushed again; from then on it may come twice. Only `reserve`, `front`, `take_until` and the copy constructor
+// throw; all but `take_until` leave every item in its place.
 template <class Item, class Order>
 class Wheel {
  public:
+  using Entry = typename Order::Entry;
+
   explicit Wheel(Order order = {}) : order_(order) { buckets_.fill(NOWHERE); }
 
   std::size_t size() const { return size_; }
 
   // Makes room for `extra` more items.
   void reserve(std::size_t extra) {
-    const std::size_t heap = heap_.size() + popped_ + extra;
+    const bool no_span = end_ == -INFINITE;  // the items will be in the list
+    const std::size_t heap = no_span ? 0 : heap_.size() + popped_ + extra;
     if (heap > heap_.capacity()) heap_.reserve(std::max(heap, heap_.capacity() + heap_.capacity() / 2));
     reserve_chunks(extra);
   }
 
   void push(const Item& item) {
     ++size_;
-    file(item, order_.time(item));
+    file(item);
   }
 
-  // The first item, valid until the next call; nullptr if there is none.
-  const Item* front() {
+  // The entry of the first item, valid until the next call; nullptr if there is none.
+  const Entry* front() {
     for (;;) {
       if (heap_.empty()) {
         if (size_ == 0) return nullptr;
         open_next();
         continue;
       }
-      const Entry first = heap_.front();
-      const double time = order_.time(first.item);
-      if (time == first.time) return &heap_.front().item;
+      if (order_.current(heap_.front())) return &heap_.front();
       reserve_chunks(1);
-      remove_first();
-      file(first.item, time);
+      file_first_again();
     }
   }
 
@@ -61,13 +70,40 @@ class Wheel {
   }
   void settle() { popped_ = 0; }
 
+  // Removes and visits all items with times of at most `until`, in no order. An item of a bucket that ends before
+  // `until` does not pass the heap. If this throws, items are lost.
+  template <class Visit>
+  void take_until(double until, Visit visit) {
+    for (;;) {
+      while (!heap_.empty() && heap_.front().time <= until) {
+        if (!order_.current(heap_.front())) {
+          reserve_chunks(1);
+          file_first_again();
+          continue;
+        }
+        visit(order_.item(heap_.front()));
+        remove_first();
+        --size_;
+      }
+      if (!heap_.empty() || size_ == 0) return;
+      const int next = next_bucket(), last = until < end_ ? static_cast<int>(columns_(until)) : BUCKETS;
+      if (next == BUCKETS ? later_least_ > until : next > last) return;
+      if (next == BUCKETS || next == last)
+        open_next();
+      else
+        take_bucket(next, until, visit);
+    }
+  }
+
   // Visits all items, in no order.
   template <class Visit>
   void for_each(Visit visit) const {
-    for (const Entry& entry : heap_) visit(entry.item);
+    for (const Entry& entry : heap_) visit(order_.item(entry));
     for_each_of(later_, visit);
     for (Number bucket : buckets_) for_each_of(bucket, visit);
   }
+
+  std::size_t bytes() const { return sizeof *this + heap_.capacity() * sizeof(Entry) + chunks_.reserved_bytes(); }
 
  private:
   using Number = std::uint32_t;
@@ -82,15 +118,14 @@ class Wheel {
     Number size, next;
   };
 
-  // The time is a copy, so that the heap stays in order while the item's time grows.
-  struct Entry {
-    double time;
-    Item item;
-  };
-
   void reserve_chunks(std::size_t items) { chunks_.reserve(items / CHUNK + std::min<std::size_t>(items, BUCKETS + 1)); }
 
-  void file(const Item& item, double time) {
+  void file(const Item& item) {
+    const double time = order_.time(item);
+    if (std::isnan(time)) {
+      --size_;
+      return;
+    }
     if (time > end_) {
       later_least_ = std::min(later_least_, time);
       later_greatest_ = std::max(later_greatest_, time);
@@ -100,7 +135,7 @@ class Wheel {
     }
     const int bucket = static_cast<int>(columns_(time));
     if (bucket > open_ && time >= start_) return append(buckets_[bucket], item);
-    heap_.push_back({time, item});
+    heap_.push_back(order_.entry(item));
     std::push_heap(heap_.begin(), heap_.end(), after());
   }
 
@@ -114,9 +149,15 @@ class Wheel {
     chunk.items[chunk.size++] = item;
   }
 
-  void open_next() {
+  // The next bucket that has items; BUCKETS if none has.
+  int next_bucket() const {
     int next = open_ + 1;
     while (next < BUCKETS && buckets_[next] == NOWHERE) ++next;
+    return next;
+  }
+
+  void open_next() {
+    const int next = next_bucket();
     if (next == BUCKETS) return lay_buckets();
     std::size_t count = 0;
     for_each_of(buckets_[next], [&](const Item&) { ++count; });
@@ -142,7 +183,28 @@ class Wheel {
     while (list != NOWHERE) {
       for (Number i = 0; i < chunks_[list].size; ++i) {
         const Item item = chunks_[list].items[i];
-        file(item, order_.time(item));
+        file(item);
+      }
+      chunks_.give_back(std::exchange(list, chunks_[list].next));
+    }
+  }
+
+  // Opens a bucket whose items were filed under times of at most `until`.
+  template <class Visit>
+  void take_bucket(int bucket, double until, Visit& visit) {
+    std::size_t count = 0;
+    for_each_of(buckets_[bucket], [&](const Item&) { ++count; });
+    reserve_chunks(count);
+    open_ = bucket;
+    for (Number list = std::exchange(buckets_[bucket], NOWHERE); list != NOWHERE;) {
+      for (Number i = 0; i < chunks_[list].size; ++i) {
+        const Item item = chunks_[list].items[i];
+        if (order_.time(item) <= until) {
+          visit(item);
+          --size_;
+        } else {
+          file(item);
+        }
       }
       chunks_.give_back(std::exchange(list, chunks_[list].next));
     }
@@ -158,11 +220,14 @@ class Wheel {
     std::pop_heap(heap_.begin(), heap_.end(), after());
     heap_.pop_back();
   }
+  void file_first_again() {
+    const Item item = order_.item(heap_.front());
+    remove_first();
+    file(item);
+  }
 
   auto after() const {
-    return [this](const Entry& a, const Entry& b) {
-      return a.time == b.time ? order_.before(b.item, a.item) : a.time > b.time;
-    };
+    return [this](const Entry& a, const Entry& b) { return a.time == b.time ? order_.before(b, a) : a.time > b.time; };
   }
 
   Order order_;
