@@ -110,6 +110,27 @@ def wait_for_watchers(metrics: str, count: int) -> None:
     wait_until(lambda: scrape(metrics)["dynhull_watchers"] == count)
 
 
+def wait_for_labels(page: Page, name: str, labels: list[str]) -> None:
+    """Wait until the vertices have these names beside them."""
+    page.wait_for_function(
+        """([name, labels]) => JSON.stringify(labels) == JSON.stringify(
+            Bokeh.documents[0]?.get_model_by_name("plane")?.renderers
+                .find(each => each.data_source.name == `vertices of ${name}`)?.data_source.data.label)""",
+        arg=[name, labels],
+    )
+
+
+def wait_for_ring(page: Page, places: list[list[float]]) -> None:
+    """Wait until the rings around the key are at these places."""
+    page.wait_for_function(
+        """places => {
+            const {x, y} = Bokeh.documents[0].get_model_by_name("found").data
+            return JSON.stringify(places) == JSON.stringify(Array.from(x, (each, row) => [each, y[row]]))
+        }""",
+        arg=places,
+    )
+
+
 def place_of(page: Page, x: float, y: float) -> list[float]:
     """Where a point is on the screen."""
     place: list[float] = page.evaluate(
@@ -155,15 +176,61 @@ def test_vertices_have_the_names_of_their_keys(browser: Browser, url: str, clien
     client.create_hull(name, keyed="str")
     client.put(name, ["LH400", "UA17", "AF84", "<b>BA2"], SQUARE)
     with opened(browser, url, name) as page:
-        wait_for_vertices(page, name, SQUARE)
-        labels = """name => Bokeh.documents[0].get_model_by_name("plane").renderers
-            .find(each => each.data_source.name == `vertices of ${name}`).data_source.data.label"""
-        assert page.evaluate(labels, name) == ["LH400", "UA17", "AF84", "<b>BA2"]
+        wait_for_labels(page, name, ["LH400", "UA17", "AF84", "<b>BA2"])
         page.mouse.move(*place_of(page, 0, 4))
         expect(page.locator(".bk-Tooltip")).to_contain_text(f"<b>BA2: a vertex of {name}")
         client.put(name, ["a"], [[0, 0]])  # of two at one place the least is named
         client.remove(name, ["LH400"])
-        page.wait_for_function(f"name => ({labels})(name)[0] == 'a'", arg=name)
+        wait_for_labels(page, name, ["a", "UA17", "AF84", "<b>BA2"])
+        client.put(name, ["close"], [[4.001, 0.001]])
+        # Names do not overlap: the one that was there before stays.
+        wait_for_labels(page, name, ["a", "UA17", "", "AF84", "<b>BA2"])
+
+
+def test_a_key_is_found_and_followed(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    fleet, numbered = f"{name}/fleet", f"{name}/numbered"
+    client.create_hull(fleet, keyed="str")
+    client.put(fleet, ["LH400", "UA17", "AF84", "<b>BA2"], SQUARE)
+    client.create_hull(numbered, keyed="int")
+    client.put(numbered, [2**64 - 1], [[8, 8]])
+    client.create_hull(name)
+    client.apply(name, insert=SQUARE)
+    with opened(browser, url, fleet, numbered, name) as page:
+        wait_for_vertices(page, fleet, SQUARE)
+        field, found = page.get_by_label("Find a key"), page.get_by_role("list", name="Where the key is").locator("li")
+        field.press_sequentially("UA")
+        assert page.locator("#keys option").evaluate_all("all => all.map(each => each.value)") == ["UA17"]
+        field.press_sequentially("17")
+        field.press("Enter")
+        expect(found).to_have_text(
+            [
+                f"UA17 is a vertex of {fleet}: x 4, y 0, revision 1",
+                f"{numbered} has no key UA17",
+                f"The points of {name} have no keys",
+            ]
+        )
+        wait_for_ring(page, [[4, 0]])
+        client.put(fleet, ["corner", "UA17"], [[4, 0], [1, 1]])
+        expect(found.first).to_have_text(f"UA17 is inside {fleet}: x 1, y 1, revision 2")
+        wait_for_ring(page, [[1, 1]])
+        client.put(fleet, ["UA17"], [[2, 0]])
+        expect(found.first).to_have_text(
+            f"UA17 is on the boundary of {fleet}, between two vertices: x 2, y 0, revision 3"
+        )
+        client.remove(fleet, ["UA17"])
+        expect(found.first).to_have_text(f"UA17 has left {fleet}. Last position: x 2, y 0, revision 3")
+        wait_for_ring(page, [])
+        field.fill("<b>nobody")
+        field.press("Enter")
+        expect(found.first).to_have_text(f"{fleet} has no key <b>nobody")
+        field.fill(f"{2**64 - 1}")
+        field.press("Enter")
+        expect(found.nth(1)).to_have_text(f"{2**64 - 1} is a vertex of {numbered}: x 8, y 8, revision 1")
+        wait_for_ring(page, [[8, 8]])
+        client.delete_hull(numbered)
+        expect(found.nth(1)).to_have_text(f"There is no hull {numbered}")
+        field.fill("")
+        expect(found).to_have_count(0)
 
 
 def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullClient, hull: str) -> None:
@@ -382,7 +449,7 @@ def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullC
         client.apply(hull, insert=[[0, 2984], [2985, 2984]])
         area = page.locator("td[data-heading^=Area]")
         expect(area).to_contain_text("4,459,588")
-        assert area.evaluate(GAP) >= 4
+        page.wait_for_function(f"cell => ({GAP})(cell) >= 4", arg=area.element_handle())  # once it is laid out
 
 
 def test_light_and_dark(browser: Browser, url: str, hull: str) -> None:

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from playwright.sync_api import Browser, Page
 from server_process import COMMAND, PATIENCE
 
-PATIENCE_OF_BROWSER = 15_000  # milliseconds
+PATIENCE_OF_BROWSER = 30_000  # milliseconds
 LOUD = "warning", "error"
 VERTICES = """name => {
     const {renderers} = Bokeh.documents[0]?.get_model_by_name("plane") ?? {renderers: []}

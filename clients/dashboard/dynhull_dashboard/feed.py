@@ -25,6 +25,7 @@ from dynhull_client import (
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
 from .outline import Box, apart, drawn
+from .search import KeySearch
 
 MAX_RATE = 10.0
 PROGRESS_SECONDS = 0.5
@@ -33,6 +34,7 @@ TICK_SECONDS = 1.0
 SAMPLE_SIZE = 2_000
 # A few points are sampled as often as the hull is drawn; among many, no viewer misses one that is late.
 FEW_POINTS_SECONDS, MANY_POINTS_SECONDS = 0.1, 2.0
+SEARCH_SECONDS = 0.2
 VERIFY_SECONDS = 30.0
 # Samples and verifications cost the server time in proportion to the points. A pause of this many times their duration
 # keeps them below a twentieth of it.
@@ -65,10 +67,13 @@ class HullFeed:
         verified: the last verification; None before the first.
         rate: batches per second, over the last second.
         history: one row per second.
+        keyed: whether the points have keys; True until that is known.
+        search: finds keys in the hull.
     """
 
     def __init__(self, client: AsyncHullClient, name: str) -> None:
         self.name = name
+        self.search = KeySearch(client, name)
         self._reset()
         self.rate = math.nan
         self.history = History("time", "points", "vertices", "area", "rate")
@@ -88,7 +93,9 @@ class HullFeed:
         self._outline = Drawing(vertices_of(self.name), 0, NO_POINTS)
         self._inner = Drawing(points_of(self.name), 0, NO_POINTS)
         self.verified: Verified | None = None
-        self._keyed = True  # until the server says otherwise
+        self.keyed = True  # until the server says otherwise
+        self._copy = HullCopy()
+        self.search.forget()
 
     def drawings(self) -> tuple[Drawing, Drawing]:
         """The vertices, and a sample of the other points."""
@@ -109,6 +116,7 @@ class HullFeed:
             tasks.create_task(self._count())
             tasks.create_task(self._repeat(self._sample, self._sample_pause, asyncio.Event()))
             tasks.create_task(self._repeat(self._verify, lambda: VERIFY_SECONDS, self._verify_now))
+            tasks.create_task(self._repeat(self._find, lambda: SEARCH_SECONDS, self.search.asked))
 
     @property
     def trouble(self) -> DynhullError | None:
@@ -123,7 +131,7 @@ class HullFeed:
     async def _follow(self) -> None:
         """Watch the hull. A watch survives lost connections, but ends when the hull is deleted: then start another."""
         while True:
-            copy = HullCopy()
+            self._copy = copy = HullCopy()
             try:
                 async with self._client.watch(
                     self.name,
@@ -131,12 +139,12 @@ class HullFeed:
                     progress_interval=PROGRESS_SECONDS,
                     measures=True,
                     copy=copy,
-                    keys=self._keyed,
+                    keys=self.keyed,
                 ) as self._watch:
                     async for event in self._watch:
                         self._take(event, copy)
             except HullUnsuitableError:
-                self._keyed = False
+                self.keyed = False
                 continue
             except DynhullError as error:
                 self._failure = error
@@ -174,10 +182,13 @@ class HullFeed:
 
     async def _sample(self) -> None:
         if self._inner.revision != self.revision:
-            sampled = await self._client.sample_points(self.name, SAMPLE_SIZE, keys=self._keyed and self.followed)
+            sampled = await self._client.sample_points(self.name, SAMPLE_SIZE, keys=self.keyed and self.followed)
             inner = apart(sampled.points, self._outline.points)
             keys = None if sampled.keys is None else [sampled.keys[row] for row in np.flatnonzero(inner)]
             self._inner = Drawing(points_of(self.name), sampled.revision, sampled.points[inner], keys)
+
+    async def _find(self) -> None:
+        await self.search.ask(self._copy)
 
     def _sample_pause(self) -> float:
         return FEW_POINTS_SECONDS if self.points <= SAMPLE_SIZE else MANY_POINTS_SECONDS

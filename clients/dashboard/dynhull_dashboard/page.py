@@ -11,7 +11,7 @@ from jinja2 import Template
 
 from .advice import about_metrics, about_picture, about_server
 from .cards import key, table
-from .describe import describe
+from .describe import describe, describe_key
 from .feed import HullFeed
 from .hub import Hub
 from .looks import LOOKS, MEAN, PERCENTILE, Look
@@ -22,8 +22,15 @@ from .timelines import Lines, time_plots
 TICK_MILLISECONDS = 100
 # Text changes slower than the picture: nobody reads ten times a second.
 TICKS_OF_TEXT = 5
-TEMPLATE = Template(Path(__file__).with_name("page.html").read_text("utf-8"))
-STYLE = Path(__file__).with_name("widgets.css").read_text("utf-8")
+
+
+def _read(name: str) -> str:
+    return Path(__file__).with_name(name).read_text("utf-8")
+
+
+TEMPLATE = Template(_read("page.html"))
+STYLE = _read("widgets.css")
+SCRIPTS = _read("labels.js") + _read("page.js")
 
 HULL_COLUMNS = ("points", "vertices", "area", "rate")
 MOST_LABELS = 24  # vertices with a name beside them; of more, hovering shows the name
@@ -46,15 +53,17 @@ class Page:
         document: the document to fill.
         hub: the source of the hulls.
         picked: the hulls to begin with; if empty, the largest one.
+        sought: the key to look for to begin with; empty for none.
     """
 
-    def __init__(self, document: Document, hub: Hub, picked: list[str]) -> None:
+    def __init__(self, document: Document, hub: Hub, picked: list[str], sought: str) -> None:
         self._hub = hub
         self._shown: dict[str, Shown] = {}
         self._ticks = 0
+        self._sought = sought
         self._models = document.models
         same_scale = hub.units.same
-        self._model = PageModel(name="page", same_scale=same_scale)
+        self._model = PageModel(name="page", same_scale=same_scale, sought=sought)
         self._verify = Button(name="verify", label="Verify now", stylesheets=[STYLE])
         self._table = Div(name="table", stylesheets=[STYLE], sizing_mode="stretch_width")
         self._plane = Plane(hub.units, same_scale)
@@ -67,6 +76,7 @@ class Page:
         self._show(picked or hub.server.largest())
         self._model.on_change("picked", self._picked)
         self._model.on_change("same_scale", lambda _attribute, _old, new: self._plane.set_same_scale(new))
+        self._model.on_change("sought", self._seek)
         self._verify.on_click(self._verify_now)
         self._tick()
         document.title = "dynhull"
@@ -79,6 +89,7 @@ class Page:
             most_labels=MOST_LABELS,
             mean=key(MEAN),
             percentile=key(PERCENTILE),
+            scripts=SCRIPTS,
         )
         document.config.notify_connection_status = False  # the page has a banner of its own
         with self._models.freeze():  # otherwise Bokeh walks all models at each change
@@ -123,9 +134,21 @@ class Page:
 
     def _tick(self) -> None:
         self._plane.update()
+        self._find()
         if self._ticks % TICKS_OF_TEXT == 0:
             self._update_text()
         self._ticks += 1
+
+    def _seek(self, _attribute: str, _old: str, new: str) -> None:
+        self._sought = new
+        self._find()
+
+    def _find(self) -> None:
+        """Show where the key is that the viewer looks for."""
+        key = self._sought
+        sightings = [(shown.feed.search.find(key), shown) for shown in self._shown.values()] if key else []
+        self._plane.mark(key, [(sighting, shown.look) for sighting, shown in sightings])
+        self._model.update(found=[describe_key(key, shown.feed, sighting) for sighting, shown in sightings])
 
     def _update_text(self) -> None:
         """Update the text, the figures and the time lines."""

@@ -13,4 +13,6 @@ class PageModel(DataModel):
     same_scale = Bool(help="Whether x and y are drawn to one scale; the script changes it.")
     banner = String(help="Why the figures are out of date, and what to do; empty while they are not.")
     note = String(help="Why the picture is empty, and what to do; empty while it is not.")
+    sought = String(help="The key that the viewer looks for, empty for none; the script changes it.")
+    found = List(List(String), help="For each hull shown, where the key is: a sentence, and the coordinates.")
     description = String(help="The picture in words, for screen readers.")

@@ -1,5 +1,7 @@
 """The picture of the hulls."""
 
+from collections.abc import Iterable
+
 from bokeh.models import (
     BoxZoomTool,
     ColumnDataSource,
@@ -16,6 +18,8 @@ from .drawing import points_of, vertices_of
 from .feed import HullFeed
 from .looks import Look
 from .outline import Box, frame_around
+from .rings import Rings
+from .search import Sighting
 from .styles import LABEL_WIDTH, bare, compact_ticks
 from .units import Units, axis_label
 
@@ -95,6 +99,7 @@ class Plane:
         corners = self.plot.scatter(source=self._corners, alpha=0)
         x.renderers = [corners]
         y.renderers = [corners]
+        self._rings = Rings(self.plot)
 
     def show(self, feed: HullFeed, look: Look) -> None:
         """Add a hull."""
@@ -113,6 +118,10 @@ class Plane:
         self._same_scale = self.plot.match_aspect = self._box_zoom.match_aspect = same_scale
         self._frame = None
         self.update()
+
+    def mark(self, key: str, sightings: Iterable[tuple[Sighting, Look]]) -> None:
+        """Draw a ring around the key in each hull that holds it."""
+        self._rings.draw(key, sightings, self._frame or EMPTY_FRAME)
 
     def update(self) -> None:
         """Adjust the frame to the hulls."""
@@ -134,5 +143,5 @@ def _corners(frame: Box) -> dict[str, list[float]]:
 def _source(name: str) -> ColumnDataSource:
     """An empty data source. It is not synced: the page must not send back what the socket sent it."""
     return ColumnDataSource(
-        {"x": [], "y": [], "revision": [], "title": [], "label": [], "side": []}, name=name, syncable=False
+        {"x": [], "y": [], "revision": [], "title": [], "key": [], "label": [], "side": []}, name=name, syncable=False
     )

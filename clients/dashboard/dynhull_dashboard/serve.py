@@ -62,5 +62,5 @@ def _show(hub: Hub, document: Document) -> None:
     assert isinstance(context, BokehSessionContext)
     assert context.request is not None
     arguments = context.request.arguments
-    picked = dict.fromkeys(name.decode(errors="replace") for name in arguments.get("hull", []))
-    Page(document, hub, list(picked))
+    picked, keys = ([each.decode(errors="replace") for each in arguments.get(name, [])] for name in ("hull", "key"))
+    Page(document, hub, list(dict.fromkeys(picked)), keys[0] if keys else "")
