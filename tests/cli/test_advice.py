@@ -62,6 +62,11 @@ LOADS = [
         "--time-unit is given with --time",
         "load {name} points.csv --key x --time y --time-unit s",
     ),
+    (
+        "load {name} points.csv --expires y",
+        "--expires is given with --key",
+        "load {name} points.csv --key x --expires y",
+    ),
     ("query loaded vertices --keys", "leave out --keys", "query loaded vertices"),
     ("insert {name} 1,2", "`dynhull list`", "list"),
     ("insert {name} 1,2", "`dynhull create`", "create {name}; insert {name} 1,2"),
@@ -75,7 +80,7 @@ FOLLOWED_ELSEWHERE = {
     "--token": "test_commands.py: test_tokens",
     "--tls": "test_commands.py: test_tls",
     "--tls-ca": "test_commands.py: test_tls",
-    "--out": "test_demo.py: test_a_day_of_flights",
+    "--out": "test_demo.py: test_hours_of_flights",
     "--client-cert": "test_commands.py: test_tls",
     "--client-key": "test_commands.py: test_tls",
     "dynhull serve": "every test with a server",
@@ -84,7 +89,7 @@ FOLLOWED_ELSEWHERE = {
     "--keys-of": "test_keyed.py: test_integer_keys_and_another_hull",
     "--window": "test_demo.py: test_the_positions_of_the_last_half_hour",
     "--points": "test_demo.py: test_points_of_ones_own",
-    "--day": "test_demo.py: test_a_day_of_flights",
+    "--day": "test_demo.py: test_hours_of_flights",
     "pip install": "by hand: needs an index of packages",
 }
 ADVICE = re.compile(r"--[a-z][a-z-]+|dynhull (?:list|create|serve|load)|pip install|iconv|gunzip")

@@ -3,12 +3,11 @@
 import json
 import re
 import shutil
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 
 import pytest
+from command_line import dynhull
 from killers import KILLERS
 from PIL import Image
 from playwright.sync_api import expect, sync_playwright
@@ -27,8 +26,7 @@ ALGORITHMS = ["graham_scan", "jarvis_march", "chan", "monotone_chain"]
 
 
 def explain(*arguments):
-    command = [sys.executable, "-m", "dynhull_cli", "explain", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return dynhull("explain", *arguments)
 
 
 @pytest.fixture
@@ -49,7 +47,7 @@ def steps_in(page, style="chain"):
 
 def test_sheet(example, tmp_path):
     done = explain("graham_scan", example, "--out", tmp_path / "sheet.png")
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"5 vertices, 13 steps: {tmp_path / 'sheet.png'}"
     with Image.open(tmp_path / "sheet.png") as sheet:
         assert sheet.format == "PNG"
@@ -58,7 +56,7 @@ def test_sheet(example, tmp_path):
 
 def test_vector_sheet(example, tmp_path):
     """The SVG holds text as text, and equal points give equal files."""
-    assert explain("graham_scan", example, "--out", tmp_path / "a.svg").returncode == 0
+    assert explain("graham_scan", example, "--out", tmp_path / "a.svg").exit_code == 0
     drawing = ET.fromstring((tmp_path / "a.svg").read_text(encoding="utf-8"))
     words = {element.text for element in drawing.iter("{http://www.w3.org/2000/svg}text")}
     assert {"graham_scan: example.csv", "13/13  the hull: 5 vertices"} <= words
@@ -70,7 +68,7 @@ def test_animation(tmp_path):
     square = tmp_path / "square.csv"
     square.write_text("x,y\n0,0\n4,0\n4,4\n0,4\n")
     done = explain("chan", square, "--out", tmp_path / "animation.gif")
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     steps = int(re.search(r"(\d+) steps", done.stdout)[1])
     with Image.open(tmp_path / "animation.gif") as animation:
         assert animation.format == "GIF"
@@ -79,7 +77,7 @@ def test_animation(tmp_path):
 
 def test_page(example, tmp_path):
     done = explain("graham_scan", example, "--out", tmp_path / "page.html")
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     data, chains = steps_in(tmp_path / "page.html")
     assert data["count"] == len(chains) == 13
     assert chains[-2] == ["(0.0, 0.0)", "(4.0, 0.0)", "(5.0, 2.0)", "(4.0, 4.0)"]
@@ -87,13 +85,13 @@ def test_page(example, tmp_path):
 
 
 def test_the_beginning_of_a_name_is_enough(example, tmp_path):
-    assert explain("graham", example, "--out", tmp_path / "page.html").returncode == 0
+    assert explain("graham", example, "--out", tmp_path / "page.html").exit_code == 0
     assert steps_in(tmp_path / "page.html")[0]["title"] == "graham_scan: example.csv"
 
 
 def test_the_tree_of_the_example(tmp_path):
     done = explain("tree", "--out", tmp_path / "page.html")
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     assert done.stdout == f"8 updates, 30 steps: {tmp_path / 'page.html'}\n"
     data, bridges = steps_in(tmp_path / "page.html", "new bridge")
     captions = [step["caption"] for step in data["steps"]]
@@ -110,7 +108,7 @@ def test_the_page_in_a_browser(tmp_path):
     """Keys move through the steps; a point shows its coordinates; the console stays empty."""
     chromium = shutil.which("chromium")
     assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
-    assert explain("tree", "--out", tmp_path / "page.html").returncode == 0
+    assert explain("tree", "--out", tmp_path / "page.html").exit_code == 0
     said = []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
@@ -156,7 +154,7 @@ def test_the_tree_shows_the_hull_of_its_points(count):
 def test_a_name_cannot_end_the_script(tmp_path):
     path = tmp_path / "<script>.csv"
     path.write_text("x,y\n0,0\n1,1\n")
-    assert explain("chan", path, "--out", tmp_path / "page.html").returncode == 0
+    assert explain("chan", path, "--out", tmp_path / "page.html").exit_code == 0
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.count("<script>") == 1
     assert steps_in(tmp_path / "page.html")[0]["title"] == "chan: <script>.csv"
@@ -193,7 +191,7 @@ def test_what_cannot_be_drawn_is_refused(example, tmp_path, arguments, message):
     more.write_text("x,y\n" + "".join(f"{i},{i * i}\n" for i in range(2001)))
     files = {"FILE": str(example), "MANY": str(many), "MORE": str(more)}
     done = explain(*[files.get(argument, argument) for argument in arguments])
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert message.replace("FILE", str(example)) in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -255,4 +253,4 @@ def test_one_point_and_points_on_a_line(tmp_path, text):
     path = tmp_path / "line.csv"
     path.write_text(text)
     done = explain("jarvis_march", path, "--collinear", "keep", "--out", tmp_path / "sheet.png")
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr

@@ -68,6 +68,25 @@ def test_integer_keys_and_another_hull(served, name):
     assert entities(served, fleet)[0] == {7: [0.5, 0.5], 8: [1, 1]}
 
 
+def test_the_largest_integer_keys_of_json_are_exact(served, name, tmp_path):
+    keys = 2**63, 2**64 - 1, 2**64, 1.5, 2**53 + 1
+    features = [{"type": "Feature", "id": key, "geometry": {"type": "Point", "coordinates": [0.1, 2]}} for key in keys]
+    rows = [{"id": key, "x": 0.1, "y": 2} for key in keys]
+    for place, file, text in (
+        ("feature", "a.geojson", json.dumps({"type": "FeatureCollection", "features": features})),
+        ("item", "a.json", json.dumps(rows)),
+        ("line", "a.ndjson", "\n".join(map(json.dumps, rows))),
+    ):
+        (tmp_path / file).write_text(text)
+        hull = f"{name}/{place}"
+        dynhull("create", hull, "--keyed", "int")
+        done = dynhull("load", hull, tmp_path / file, "--key", "id")
+        assert done.exit_code == 0, done.stderr
+        assert f"  {place} 3: id is 18446744073709551616: a key is from 0 to 2**64 - 1\n" in done.stderr
+        assert f"  {place} 4: id is 1.5, not an integer" in done.stderr
+        assert entities(served, hull)[0] == {key: [0.1, 2.0] for key in (2**63, 2**64 - 1, 2**53 + 1)}
+
+
 def test_a_watch_names_who_joins_and_leaves_the_corners(served, name):
     with HullClient(served) as client:
         client.create_hull(name, keyed="str")
@@ -94,7 +113,8 @@ def test_a_watch_names_who_joins_and_leaves_the_corners(served, name):
         (["remove", "HULL", "1,2", "--key", "a"], "give either points or --key"),
         (["query", "HULL", "count", "--keys", "a"], "count is about points: --keys is for"),
         (["query", "HULL", "vertices", "--keys-of", "b"], "--keys-of is given with --keys"),
-        (["load", "HULL", "--time-unit", "s"], "--time-unit is given with --time"),
+        (["load", "HULL", "--time-unit", "s"], "--time-unit is given with --time or --expires"),
+        (["load", "HULL", "--expires", "until"], "--expires is given with --key"),
     ],
     ids=lambda value: "-".join(value[:1] + value[2:]) if isinstance(value, list) else "",
 )
@@ -138,6 +158,27 @@ def test_numbers_are_times_in_a_unit_that_is_printed(served, name, number, unit)
     done = dynhull("load", name, "--key", "id", "--time", "ts", input=f"id,ts,x,y\na,{number},1,1\n")
     assert f"ts: times are {unit} since 1970, the first is 2026-03-01T12:00:00" in done.stderr
     assert entities(served, name)[1][0].startswith("2026-03-01T12:00:00")
+
+
+def test_a_row_with_a_bad_time_is_named(served, name):
+    dynhull("create", name, "--keyed", "str")
+    rows = [
+        "a,,2100-01-01T00:00:00Z",
+        "b,1e30,",
+        "c,1000-01-01T00:00:00Z,",
+        "d,2026-03-01T12:00:00Z,later",
+        "e,2026-03-01T12:00:00Z,",
+        "f,2026-03-01T12:00:00Z,2100-01-01T00:00:00Z",
+    ]
+    table = "\n".join(["id,seen,until,x,y", *(f"{row},1,1" for row in rows)])
+    done = dynhull("load", name, "--key", "id", "--time", "seen", "--expires", "until", input=table)
+    assert done.stderr.partition("4 bad rows left out:\n")[2].splitlines() == [
+        "  line 2: seen is missing",
+        "  line 3: seen is '1e30' nanoseconds, not from the years 1685 to 2255",
+        "  line 4: seen is '1000-01-01T00:00:00Z', not from the years 1685 to 2255",
+        "  line 5: until is 'later', neither ISO 8601 with a time zone nor a number",
+    ]
+    assert entities(served, name)[0] == {"e": [1, 1], "f": [1, 1]}
 
 
 def test_the_unit_of_times_may_be_given(served, name):

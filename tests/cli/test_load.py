@@ -104,7 +104,7 @@ BAD_LINES = """{"x": 1, "y": 2}
 """
 BAD_LINES_REASONS = [
     ("line 2", 'x is "1", not a number'),
-    ("line 3", "Expecting ',' delimiter: line 2 column 1 (char 8)"),
+    ("line 3", "not valid JSON at column 9: Expecting ',' delimiter"),
     ("line 4", "neither an object nor an array"),
     ("line 5", "x is missing"),
     ("line 6", "its geometry is Polygon, not a Point (--vertices takes the vertices of every geometry)"),
@@ -150,7 +150,15 @@ def test_bad_rows_of_parquet(tmp_path, name):
         ("a.csv", "a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
         ("a.csv", "a,b\n1,2\n", ["--x", "a", "--y", "c"], "has no column 'c' (--y); it has a, b"),
         ("a.geojson", '{"type": "FeatureCollection", "features": []}', [], "has no points"),
-        ("a.geojson", '{"features": [', [], "a.geojson is not valid JSON"),
+        ("a.geojson", '{"features": [', [], "error: a.geojson is not valid JSON after 0 features: premature EOF\n"),
+        (
+            "a.json",
+            '[{"x": 1, "y": 2}, {"x": nope}]',
+            [],
+            "error: a.json is not valid JSON after 1 item: invalid string in json text, near [{",
+        ),
+        ("a.json", f"[[1e400, 1], [{'9' * 5000}, 1]]", [], "  item 1: x is 1E+400, not finite\n  item 2: x is 999"),
+        ("a.ndjson", '{"x": 1, "y": }\n\n', [], "  line 1: not valid JSON at column 15: Expecting value\n"),
         ("a.parquet", "x,y\n1,2\n", [], "a.parquet is not a Parquet file"),
         ("a.xls", "", [], "the name must end in .csv, .tsv, .parquet, .json, .geojson, .ndjson, .txt, .jsonl"),
         ("a.csv", "x,y\n1,2\n", ["--resume", "--again"], "give one"),

@@ -109,6 +109,8 @@ def test_the_help_of_each_command() -> None:
         done = dynhull(entry.name, "-h")
         assert (done.exit_code, f" dynhull {entry.name} " in done.stdout.replace(" root ", " dynhull ")) == (0, True)
         assert f"│ {entry.name} " in listed
+        assert "<bool>" not in done.stdout, "a flag takes no value"
+    assert "Another name for dynhull load." in dynhull("import", "-h").stdout
 
 
 def test_the_version() -> None:

@@ -240,6 +240,33 @@ def test_a_writer_may_keep_the_last_position_only(client: HullClient, name: str)
         client.writer(name, coalesce="first")
 
 
+def test_a_writer_begins_a_batch_for_keys_of_another_kind(client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str")
+    with client.writer(name, linger=60) as writer:
+        good = [writer.put(keys=["a"], points=[[0, 0]])]
+        bad = [writer.put(keys=[5], points=[[1, 1]]), writer.put(insert=[[5, 5]])]
+        good.append(writer.put(keys=["b"], points=[[2, 2]]))
+        with pytest.raises(HullUnsuitableError):
+            writer.flush()
+    assert [each.result().revision for each in good] == [1, 2]
+    assert [each.exception().field for each in bad] == ["batch.puts.keys", "batch.inserts"]
+    assert list(client.entities(name).keys) == ["a", "b"]
+
+
+def test_a_writer_sends_the_times_at_which_keys_leave(client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str", max_age=timedelta(days=1), clock="data")
+    soon, late = NOON + timedelta(seconds=1), NOON + timedelta(hours=1)
+    with client.writer(name, linger=60, coalesce="last") as writer:
+        leaving = writer.put(
+            keys=["a", "b", "a"], points=[[0, 0], [1, 1], [2, 2]], times=[NOON] * 3, expire_times=[soon, soon, late]
+        )
+        staying = writer.put(keys=["c"], points=[[3, 3]], times=[NOON])
+        writer.put(keys=["d"], points=[[4, 4]], times=[NOON + timedelta(seconds=2)])
+        writer.flush()
+    assert [each.result().revision for each in (leaving, staying)] == [1, 3], "that b leaves is a revision, too"
+    assert list(client.entities(name).keys) == ["a", "c", "d"]
+
+
 def test_every_position_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:
     """Three servers, one after another, on the same data; the first two are killed in the middle of batches."""
     rng = np.random.default_rng(8)

@@ -4,6 +4,7 @@ A package brings its own commands, so that no client has to import the server to
 """
 
 import ast
+import inspect
 from collections.abc import Callable
 from functools import cache, wraps
 from importlib.metadata import EntryPoint, entry_points, version
@@ -28,7 +29,23 @@ OTHERS = "More"
 PACKAGES: dict[str | None, str | None] = {"google": "protobuf", "grpc": "grpcio"}  # of modules with other names
 
 
-class InstalledCommands(TyperGroup):
+class Flags:
+    """Shows flags in the help without a type: they take no value."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """The parameters, those of flags with an empty type."""
+        params = super().get_params(ctx)  # type: ignore[misc]  # of the class that this one is mixed into
+        for param in params:
+            if getattr(param, "is_flag", False):
+                param.metavar = ""
+        return params
+
+
+class Command(Flags, TyperCommand):
+    """A command."""
+
+
+class InstalledCommands(Flags, TyperGroup):
     """A group whose commands are the installed entry points."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
@@ -50,7 +67,7 @@ class Deferred(TyperCommand):
 
     def __init__(self, entry: EntryPoint) -> None:
         panel = next((panel for panel, names in PANELS.items() if entry.name in names), OTHERS)
-        super().__init__(entry.name, help=_docstring(entry), rich_help_panel=panel)
+        super().__init__(entry.name, help=_described(entry, _docstring(entry)), rich_help_panel=panel)
         self._entry = entry
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
@@ -73,12 +90,21 @@ def _docstring(entry: EntryPoint) -> str | None:
     return None
 
 
+def _described(entry: EntryPoint, text: str | None) -> str | None:
+    """The help of a command; of a second name for it, with the first."""
+    first = _installed().get(entry.attr)
+    if first is None or first.name == entry.name or first.value != entry.value:
+        return text
+    return f"Another name for `dynhull {first.name}`. {text}"
+
+
 def _imported(entry: EntryPoint) -> Any:
     command = typer.Typer(add_completion=False, rich_markup_mode="markdown")
     try:
         function = entry.load()
         settings = getattr(function, "context_settings", None)
-        command.command(entry.name, context_settings=settings)(_explaining(entry, function))
+        text = _described(entry, inspect.getdoc(function))
+        command.command(entry.name, cls=Command, help=text, context_settings=settings)(_explaining(entry, function))
     except ModuleNotFoundError as error:
         anything = {"allow_extra_args": True, "ignore_unknown_options": True}
         command.command(entry.name, context_settings=anything)(_not_installed(entry, error))

@@ -16,6 +16,8 @@ class TimeUnit(StrEnum):
 
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+LARGEST_TIME = 2**53  # microseconds: the years 1685 to 2255
+LARGEST_EXPONENT = 30  # of a number: far beyond these years in any unit
 MICROSECONDS = {
     TimeUnit.SECONDS: Decimal(1_000_000),
     TimeUnit.MILLISECONDS: Decimal(1000),
@@ -62,27 +64,36 @@ class TimeReader:
             return self._of_text(text)
         if not number.is_finite() or "_" in text:
             raise ValueError(f"{self._name} is {text!r}, not a time")
+        return self._of_number(number, text)
+
+    def _of_number(self, number: Decimal, text: str) -> int:
+        unit = unit_of(number) if self.unit is None else self.unit
+        if number.adjusted() > LARGEST_EXPONENT or abs(number) * MICROSECONDS[unit] > LARGEST_TIME:
+            raise ValueError(f"{self._name} is {text!r} {NAMES[unit]}, not from the years 1685 to 2255")
+        micros = int((number * MICROSECONDS[unit]).to_integral_value("ROUND_FLOOR"))
         if self.unit is None:
-            self.unit = unit_of(number)
-            first = EPOCH + timedelta(microseconds=int(number * MICROSECONDS[self.unit]))
+            self.unit = unit
             self.note = (
-                f"{self._name}: times are {NAMES[self.unit]} since 1970, the first is {first.isoformat()}; "
-                "--time-unit reads them in another unit"
+                f"{self._name}: times are {NAMES[unit]} since 1970, the first is "
+                f"{(EPOCH + timedelta(microseconds=micros)).isoformat()}; --time-unit reads them in another unit"
             )
-        return int((number * MICROSECONDS[self.unit]).to_integral_value("ROUND_FLOOR"))
+        return micros
 
     def _of_text(self, text: str) -> int:
         try:
             return self._of_datetime(datetime.fromisoformat(text), text)
         except ValueError as error:
-            if "time zone" in str(error):
+            if str(error).startswith(self._name):
                 raise
             raise ValueError(f"{self._name} is {text!r}, neither ISO 8601 with a time zone nor a number") from None
 
     def _of_datetime(self, value: datetime, text: str) -> int:
         if value.tzinfo is None:
             raise ValueError(f"{self._name} is {text!r}, without a time zone: add Z for UTC, or an offset")
-        return (value - EPOCH) // timedelta(microseconds=1)
+        micros = (value - EPOCH) // timedelta(microseconds=1)
+        if abs(micros) > LARGEST_TIME:
+            raise ValueError(f"{self._name} is {text!r}, not from the years 1685 to 2255")
+        return micros
 
 
 def unit_of(number: Decimal) -> TimeUnit:

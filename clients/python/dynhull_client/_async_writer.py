@@ -58,6 +58,7 @@ class AsyncWriter:
         keys: Any = None,
         points: npt.ArrayLike | None = None,
         times: Any = None,
+        expire_times: Any = None,
     ) -> asyncio.Future[Applied]:
         """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
 
@@ -65,7 +66,9 @@ class AsyncWriter:
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
-        return await self._add(put_parts(insert, delete, move, keys, points, times, writing.missing, coalesce=coalesce))
+        return await self._add(
+            put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
+        )
 
     async def remove(self, keys: Any) -> asyncio.Future[Applied]:
         """Remove keys, as `Writer.remove` does."""

@@ -169,7 +169,9 @@ def keep_last_rows(batch: batch_pb2.Batch) -> None:
     if len(rows) == len(keys):
         return
     batch.puts.keys.CopyFrom(encode_keys(take_keys(keys, rows)))
-    for packed, width in ((batch.puts.points, BYTES_PER_POINT), (batch.puts.times, BYTES_PER_TIME)):
+    puts = batch.puts
+    columns = (puts.points, BYTES_PER_POINT), (puts.times, BYTES_PER_TIME), (puts.expire_times, BYTES_PER_TIME)
+    for packed, width in columns:
         packed.packed = np.frombuffer(packed.packed, f"V{width}")[rows].tobytes() if packed.packed else b""
 
 

@@ -33,12 +33,16 @@ class Part:
         rows: their number.
         latest: the last time of each key that is put, UNTIMED without times; None for a key that is removed.
         timed: whether the rows to put or insert have times; None if there are none.
+        expiring: whether the keys to put have times at which they leave; None if there are none.
+        kind: str or int for such keys, None for points without keys.
     """
 
     message: batch_pb2.Batch
     rows: int
     latest: dict[Key, int | None] = field(default_factory=dict)
     timed: bool | None = None
+    expiring: bool | None = None
+    kind: type[Key] | None = None
 
 
 def put_parts(
@@ -48,6 +52,7 @@ def put_parts(
     keys: Any,
     points: npt.ArrayLike | None,
     times: Any,
+    expire_times: Any,
     missing: Missing | None,
     *,
     coalesce: bool,
@@ -58,22 +63,24 @@ def put_parts(
     """
     options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move}
     if keys is None or points is None:
-        message = Batch(**options, keys=keys, points=points, times=times).message
+        message = Batch(**options, keys=keys, points=points, times=times, expire_times=expire_times).message
         return [Part(message, batch_rows(message), timed=None if insert is None else times is not None)]
     checked, xy = checked_keys(keys), as_points(points, "points")
     micros = None if times is None else as_microseconds(times, len(xy), "times")
-    whole = Batch(**options, keys=checked, points=xy, times=micros)
+    ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
+    columns: dict[str, Any] = {"keys": checked, "points": xy, "times": micros, "expire_times": ends}
+    whole = Batch(**options, **columns)
     names = plain_keys(checked)
     stamps = [UNTIMED] * len(names) if micros is None else micros.tolist()
     parts = []
     for rows in _runs(names, stamps, coalesce):
         batch = whole
         if rows.stop - rows.start < len(names):
-            batch = Batch(
-                **options, keys=checked[rows], points=xy[rows], times=None if micros is None else micros[rows]
-            )
+            of_rows = {name: None if each is None else each[rows] for name, each in columns.items()}
+            batch = Batch(**options, **of_rows)
         latest: dict[Key, int | None] = dict(zip(names[rows], stamps[rows], strict=True))
-        parts.append(Part(batch.message, rows.stop - rows.start, latest, timed=micros is not None))
+        timed, expiring = micros is not None, ends is not None
+        parts.append(Part(batch.message, rows.stop - rows.start, latest, timed, expiring, _kind(names)))
     return parts
 
 
@@ -82,7 +89,12 @@ def remove_parts(keys: Any, missing: Missing | None) -> list[Part]:
     checked = checked_keys(keys)
     names = plain_keys(checked)
     return [
-        Part(Batch(remove=checked[rows], missing=missing).message, rows.stop - rows.start, dict.fromkeys(names[rows]))
+        Part(
+            Batch(remove=checked[rows], missing=missing).message,
+            rows.stop - rows.start,
+            dict.fromkeys(names[rows]),
+            kind=_kind(names),
+        )
         for rows in _runs(names, [UNTIMED] * len(names), coalesce=False)
     ]
 
@@ -100,10 +112,14 @@ class Gathering:
         self._messages: list[batch_pb2.Batch] = []
         self._latest: dict[Key, int | None] = {}
         self._timed: bool | None = None
+        self._expiring: bool | None = None
+        self._kind: type[Key] | None = None
 
     def admits(self, part: Part) -> bool:
         """Whether the part may go into the same batch."""
-        if self._timed is not None and part.timed is not None and self._timed != part.timed:
+        if self._messages and part.kind is not self._kind:  # the server refuses one of them, for the hull has one kind
+            return False
+        if _differ(self._timed, part.timed) or _differ(self._expiring, part.expiring):
             return False
         if self._latest.keys().isdisjoint(part.latest):
             return True
@@ -112,9 +128,11 @@ class Gathering:
     def add(self, part: Part) -> None:
         """Add a part."""
         self._messages.append(part.message)
+        self._kind = part.kind
         self._latest.update(part.latest)
         self.rows += part.rows
         self._timed = part.timed if self._timed is None else self._timed
+        self._expiring = part.expiring if self._expiring is None else self._expiring
 
     def joined(self) -> batch_pb2.Batch:
         """The parts as one batch."""
@@ -122,6 +140,14 @@ class Gathering:
         if self._coalesce and joined.HasField("puts"):
             keep_last_rows(joined)
         return joined
+
+
+def _kind(names: Sequence[Key]) -> type[Key] | None:
+    return type(names[0]) if names else None
+
+
+def _differ(one: bool | None, other: bool | None) -> bool:
+    return one is not None and other is not None and one != other
 
 
 def _runs(names: Sequence[Key], stamps: Sequence[int], coalesce: bool) -> Iterator[slice]:

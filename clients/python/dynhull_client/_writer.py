@@ -69,6 +69,7 @@ class Writer:
         keys: Any = None,
         points: npt.ArrayLike | None = None,
         times: Any = None,
+        expire_times: Any = None,
     ) -> Future[Applied]:
         """Add points to the next batch; waits while too many are not acknowledged.
 
@@ -83,6 +84,7 @@ class Writer:
             keys: n keys to put, in a keyed hull; as for `HullClient.put`.
             points: (n, 2) positions of the keys.
             times: (n,) event times of the keys or of the points to insert.
+            expire_times: (n,) the times at which the keys leave; as for `HullClient.put`.
 
         Returns:
             The effect of the batch, or of the last one of several, once it is acknowledged; or the error of a refused
@@ -96,7 +98,9 @@ class Writer:
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
-        return self._add(put_parts(insert, delete, move, keys, points, times, writing.missing, coalesce=coalesce))
+        return self._add(
+            put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
+        )
 
     def remove(self, keys: Any) -> Future[Applied]:
         """Remove keys in the next batch, as `put` adds points. Removing a key that was put before is a new batch."""

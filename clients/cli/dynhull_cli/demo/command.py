@@ -26,6 +26,7 @@ def demo(
             help="The day of 2013 to replay. 2013-03-08 had snow and the worst delays of the year.",
         ),
     ] = DEFAULT_DAY,
+    hours: Annotated[int, typer.Option(min=1, max=24, help="The hours of the day to replay, from midnight.")] = 24,
     points: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="Replay this CSV file instead.")
     ] = None,
@@ -72,7 +73,7 @@ def demo(
     console = Console(highlight=False, soft_wrap=True)
     try:
         check_out(out, [".png"])
-        scene = _scene(day, points, x, y, identity, time, batches, duration(window, "--window"))
+        scene = _scene(day, hours, points, x, y, identity, time, batches, duration(window, "--window"))
         verified = show(console, scene, out)
     except (ValueError, OSError, RuntimeError, DynhullError) as error:
         message = Text.assemble(("error: ", "red"), str(error))
@@ -84,6 +85,7 @@ def demo(
 
 def _scene(
     day: str,
+    hours: int,
     points: Path | None,
     x: str | None,
     y: str | None,
@@ -104,7 +106,7 @@ def _scene(
         raise ValueError(f"--day {day!r} is not a day such as {DEFAULT_DAY}") from None
     from .flights import Flights  # pandas and pyproj, which a CSV file does not need
 
-    flights = Flights(date)
+    flights = Flights(date, hours)
     if max_age is None:
         return flights
     from .window import RecentPositions

@@ -13,7 +13,8 @@ from pyproj import Geod, Transformer
 
 from .scene import Frame, Points
 
-MINUTES = 24 * 60
+HOURS = 24
+MINUTES = HOURS * 60
 
 # The data set flies to these four airports and leaves them out of its table of airports.
 MISSING_AIRPORTS = {
@@ -32,6 +33,10 @@ class Flights:
 
     A flight starts at its departure (New York time) and takes its recorded air time: the data set has no time of
     taxiing. Flights that left the evening before are in the air at midnight.
+
+    Args:
+        day: the day.
+        hours: how many hours of it, from midnight.
     """
 
     keyed = True
@@ -40,9 +45,9 @@ class Flights:
     step = "minutes"
     length_unit = "km"
     area_unit = "km²"
-    length = MINUTES
 
-    def __init__(self, day: date) -> None:
+    def __init__(self, day: date, hours: int = HOURS) -> None:
+        self.length = hours * 60
         if day.year != 2013:
             raise ValueError(f"--day is {day}: the data set has the days of 2013")
         self.title = f"Flights from New York, {day:%d %B %Y}"
@@ -65,7 +70,7 @@ class Flights:
         origin, destination = (airports.loc[flown[column]].to_numpy() for column in ("origin", "dest"))
         self._latitude, self._longitude = origin.T
         self._geod = Geod(ellps="WGS84")
-        self._azimuth, _, self._length = self._geod.inv(*origin.T[::-1], *destination.T[::-1])
+        self._azimuth, _, self._distance = self._geod.inv(*origin.T[::-1], *destination.T[::-1])
         self._project = Transformer.from_crs("EPSG:4326", PROJECTION, always_xy=True).transform
         served = airports.loc[sorted(set(flights["origin"]) | set(flights["dest"]))]
         self.background = np.stack(self._project(served["lon"], served["lat"]), axis=1)
@@ -73,7 +78,7 @@ class Flights:
     def frames(self) -> Iterator[Frame]:
         """One frame per minute: every airborne flight is put where it is, and those that have landed are removed."""
         before: list[str] = []
-        for minute in range(MINUTES):
+        for minute in range(self.length):
             airborne = np.flatnonzero((self._start <= minute) & (minute < self._end))
             positions = self._positions(airborne, minute)
             names = [self._names[i] for i in airborne]
@@ -94,7 +99,7 @@ class Flights:
         if not airborne.size:
             return np.empty((0, 2))
         start, end = self._start[airborne], self._end[airborne]
-        flown = self._length[airborne] * (minute - start) / (end - start)
+        flown = self._distance[airborne] * (minute - start) / (end - start)
         longitude, latitude, _ = self._geod.fwd(
             self._longitude[airborne], self._latitude[airborne], self._azimuth[airborne], flown
         )

@@ -1,7 +1,7 @@
 """Points as they are read: a chunk of good rows at a time, and what is wrong with the bad ones."""
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from typing import Any, TypeVar
 
@@ -33,18 +33,37 @@ class Rows:
         points: (n, 2) finite points.
         keys: the key of each; None without a column of keys.
         times: the time of each in microseconds since 1970; None without a column of times.
+        expires: the time at which each leaves, None for never; None where none leaves.
     """
 
     points: Points
     keys: list[Key] | None = None
     times: list[int] | None = None
+    expires: list[int | None] | None = None
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __getitem__(self, rows: slice) -> "Rows":
-        keys, times = self.keys, self.times
-        return Rows(self.points[rows], None if keys is None else keys[rows], None if times is None else times[rows])
+        keys, times, expires = self.keys, self.times, self.expires
+        return Rows(
+            self.points[rows],
+            None if keys is None else keys[rows],
+            None if times is None else times[rows],
+            None if expires is None else expires[rows],
+        )
+
+    def by_expiry(self) -> "list[Rows]":
+        """The rows that stay, and those that leave: a batch has such a time for each of its keys, or for none."""
+        if self.expires is None or None not in self.expires:
+            return [self]
+        stay = [row for row, time in enumerate(self.expires) if time is None]
+        leave = [row for row, time in enumerate(self.expires) if time is not None]
+        return [replace(self._at(stay), expires=None), self._at(leave)]
+
+    def _at(self, rows: list[int]) -> "Rows":
+        columns: list[Any] = [self.keys, self.times, self.expires]
+        return Rows(self.points[rows], *(None if each is None else [each[row] for row in rows] for each in columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +75,7 @@ class Chunk:
 
 
 Chunks = Generator[Chunk, None, None]
-Labels = tuple[Key | None, int | None]
+Labels = tuple[Key | None, int | None, int | None]
 
 
 def picked(
@@ -67,25 +86,25 @@ def picked(
 ) -> Chunk:
     """Make a chunk from rows with their places.
 
-    `positions` returns the points of a row, and `labels` their key and time; they raise ValueError if it has none.
+    `positions` returns the points of a row, and `labels` their key, time and time to leave; they raise ValueError if it
+    has none.
     `text` returns its text for messages.
     """
     points: list[Position] = []
-    keys: list[Any] = []
-    times: list[Any] = []
+    columns: tuple[list[Any], ...] = [], [], []
     bad = []
     for place, row in rows:
         try:
             found = positions(row)
-            key, time = (None, None) if labels is None else labels(row)
+            of_row = () if labels is None else labels(row)
         except ValueError as reason:
             bad.append(BadRow(place, str(reason), text(row)))
             continue
         points.extend(found)
-        keys.extend([key] * len(found))
-        times.extend([time] * len(found))
-    keyed, timed = (column if column and column[0] is not None else None for column in (keys, times))
-    return Chunk(Rows(np.array(points, np.float64).reshape(-1, 2), keyed, timed), bad)
+        for column, label in zip(columns, of_row, strict=False):
+            column.extend([label] * len(found))
+    known: Iterable[Any] = (column if any(each is not None for each in column) else None for column in columns)
+    return Chunk(Rows(np.array(points, np.float64).reshape(-1, 2), *known), bad)
 
 
 def cut(rows: Iterable[Row], size: int) -> Iterator[list[Row]]:
@@ -130,4 +149,7 @@ def _ends(rows: Rows, room: int, size: int, known: set[Key]) -> Iterator[int]:
 def _joined(parts: list[Rows]) -> Rows:
     keys = None if parts[0].keys is None else list(chain.from_iterable(part.keys or () for part in parts))
     times = None if parts[0].times is None else list(chain.from_iterable(part.times or () for part in parts))
-    return Rows(np.concatenate([part.points for part in parts]), keys, times)
+    expires: list[int | None] | None = None
+    if any(part.expires is not None for part in parts):
+        expires = list(chain.from_iterable(part.expires or [None] * len(part) for part in parts))
+    return Rows(np.concatenate([part.points for part in parts]), keys, times, expires)

@@ -70,6 +70,10 @@ def load(
     time_unit: Annotated[
         TimeUnit | None, _input("Unit of times that are numbers. Default: by the size of the first one; printed.")
     ] = None,
+    expires: Annotated[
+        str | None,
+        _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Read everything and report it. Needs no server and changes nothing.")
     ] = False,
@@ -108,14 +112,17 @@ def load(
     """
     from .bad_rows import BadRows, open_bad_rows
     from .loading import load_points, producer_name, report_reading, require_readable
-    from .source import open_source
+    from .source import integers_of_any_size, open_source
 
     _check(decimal, replace=replace, resume=resume, again=again)
-    if time_unit is not None and time is None:
-        raise ValueError("--time-unit is given with --time")
-    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit)
+    if time_unit is not None and time is None and expires is None:
+        raise ValueError("--time-unit is given with --time or --expires")
+    if expires is not None and key is None:
+        raise ValueError("--expires is given with --key: only keys leave at times of their own")
+    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires)
     integers = not dry_run and key is not None and _has_integer_keys(client, name)
     with (
+        integers_of_any_size(),
         open_source(file, format, options, integer_keys=integers) as source,
         open_bad_rows(bad_rows, source) as bad_file,
     ):

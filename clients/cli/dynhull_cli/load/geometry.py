@@ -2,6 +2,7 @@
 
 import json
 import math
+from decimal import Decimal
 from itertools import chain
 from typing import Any
 
@@ -49,16 +50,23 @@ def number(value: Any, name: str) -> float:
     """A finite number; ValueError where it is none."""
     if value is None:
         raise ValueError(f"{name} is missing")
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
         raise ValueError(f"{name} is {json_text(value)}, not a number")
-    if not math.isfinite(value):
-        raise ValueError(f"{name} is {value}, not finite")
-    return value + 0.0
+    try:
+        rounded = float(value)
+    except OverflowError:  # of an integer
+        rounded = math.inf
+    if not math.isfinite(rounded):
+        raise ValueError(f"{name} is {_shortened(str(value))}, not finite")
+    return rounded + 0.0
 
 
 def json_text(value: Any) -> str:
     """A value as it stands in the file, shortened."""
-    text = json.dumps(value)
+    return _shortened(json.dumps(value, default=float))
+
+
+def _shortened(text: str) -> str:
     return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
 
 

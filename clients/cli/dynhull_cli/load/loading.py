@@ -79,7 +79,8 @@ def load_points(
         DynhullError: the server refused a request or did not answer.
     """
     with closing(source.chunks()) as chunks:
-        batches = blocks(bad.left_out(chunks), BATCH_POINTS)
+        parts = map(Rows.by_expiry, blocks(bad.left_out(chunks), BATCH_POINTS))
+        batches = filter(len, chain.from_iterable(parts))
         first = next(batches, None)  # before the hull is created: there may be no points at all
         if first is None:
             raise ValueError(_no_points(source, bad))
@@ -161,7 +162,7 @@ def _send(
 def _put(writer: Writer, rows: Rows) -> "Future[Applied]":
     if rows.keys is None:
         return writer.put(insert=rows.points, times=rows.times)
-    return writer.put(keys=rows.keys, points=rows.points, times=rows.times)
+    return writer.put(keys=rows.keys, points=rows.points, times=rows.times, expire_times=rows.expires)
 
 
 @contextmanager

@@ -34,6 +34,7 @@ class Options:
         key: the column or member of the keys; None for points without keys.
         time: the column or member of the times; None for points without times.
         time_unit: the unit of times that are numbers.
+        expires: the column or member of the times at which keys leave; None for points that stay.
     """
 
     x: str | None = None
@@ -46,3 +47,9 @@ class Options:
     key: str | None = None
     time: str | None = None
     time_unit: TimeUnit | None = None
+    expires: str | None = None
+
+    @property
+    def labels(self) -> tuple[tuple[str, str | None], ...]:
+        """The options that name the columns of keys, times and times to leave, and these columns."""
+        return ("--key", self.key), ("--time", self.time), ("--expires", self.expires)

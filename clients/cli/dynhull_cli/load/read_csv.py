@@ -27,19 +27,17 @@ def read_csv(source: Source) -> Chunks:
 
 
 def _labels(source: Source, table: CsvTable) -> Callable[[list[str]], Labels] | None:
-    """Reads the key and the time of a row; None if there is no column of either."""
+    """Reads the labels of a row; None if there are no columns of them."""
     read = label_reader(source)
     if read is None:
         return None
-    options = source.options
     places = [
         None if column is None else column_index(source.name, table.names, option, column)
-        for option, column in (("--key", options.key), ("--time", options.time))
+        for option, column in source.options.labels
     ]
 
     def labels(row: list[str]) -> Labels:
-        key, time = (None if place is None or place >= len(row) else row[place] for place in places)
-        return read(key, time)
+        return read(*(None if place is None or place >= len(row) else row[place] for place in places))
 
     return labels
 

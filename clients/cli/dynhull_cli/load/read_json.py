@@ -2,7 +2,7 @@
 
 import codecs
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import IO, Any
 
@@ -10,6 +10,7 @@ import ijson
 
 from ..columns import coordinate_columns
 from ..peek import peek
+from ..plural import plural
 from .chunks import CHUNK_ROWS, Chunks, Labels, Position, cut, picked
 from .geometry import json_text, number, position, positions
 from .labels import label_reader
@@ -51,12 +52,30 @@ def read_ndjson(source: Source) -> Chunks:
 
 def _read_items(source: Source, path: str, place: str, read: Callable[[Any], list[Position]]) -> Chunks:
     labels = _labels(source)
-    items: Iterable[tuple[int, Any]] = enumerate(ijson.items(source.file, path, use_float=True), start=1)
+    items = _numbered_items(source, path, place)
+    for rows in cut(((f"{place} {i}", item) for i, item in items), CHUNK_ROWS):
+        yield picked(rows, read, json_text, labels)
+
+
+def _numbered_items(source: Source, path: str, place: str) -> Iterator[tuple[int, Any]]:
+    """The items with their numbers from 1; ValueError on one line where the file is not JSON.
+
+    Integers of any size are exact, other numbers are Decimals.
+    """
+    read = 0
     try:
-        for rows in cut(((f"{place} {i}", item) for i, item in items), CHUNK_ROWS):
-            yield picked(rows, read, json_text, labels)
+        for read, item in enumerate(ijson.items(source.file, path), start=1):
+            yield read, item
     except ijson.JSONError as error:
-        raise ValueError(f"{source.name} is not valid JSON: {error}") from None
+        raise ValueError(f"{source.name} is not valid JSON after {plural(read, place)}: {_cause(error)}") from None
+
+
+def _cause(error: ijson.JSONError) -> str:
+    """The message of ijson's parser on one line: what is wrong, and the text before and after it."""
+    message = error.args[0]
+    problem, *context = (message.decode(errors="replace") if isinstance(message, bytes) else message).splitlines()
+    near = context[0].strip() if context else ""
+    return problem.partition(": ")[2].rstrip(".") + (f", near {near}" if near else "")
 
 
 class _Line:
@@ -67,7 +86,10 @@ class _Line:
 
     @cached_property
     def value(self) -> Any:
-        return json.loads(self._line)
+        try:
+            return json.loads(self._line)
+        except json.JSONDecodeError as error:
+            raise ValueError(f"not valid JSON at column {error.pos + 1}: {error.msg}") from None
 
     @property
     def text(self) -> str:
@@ -75,18 +97,18 @@ class _Line:
 
 
 def _labels(source: Source) -> Callable[[Any], Labels] | None:
-    """Reads the key and the time of a row from its members or, of a feature, from its id and properties."""
+    """Reads the labels of a row from its members or, of a feature, from its id and properties."""
     read = label_reader(source)
     if read is None:
         return None
-    options = source.options
+    names = [name for _, name in source.options.labels]
 
     def labels(value: Any) -> Labels:
         if not isinstance(value, dict):
             raise ValueError("an array has no key and no time")
         if value.get("type") == "Feature":
             value = {"id": value.get("id"), **(value.get("properties") or {})}
-        return read(value.get(options.key), value.get(options.time))
+        return read(*(None if name is None else value.get(name) for name in names))
 
     return labels
 

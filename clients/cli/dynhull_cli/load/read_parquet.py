@@ -52,23 +52,25 @@ def _of_columns(source: Source, parquet: Any) -> Chunks:
         first += len(batch)
 
 
-def _label_columns(source: Source, names: list[str]) -> tuple[list[str | None], Callable[[Any, Any], Labels] | None]:
-    """The columns of the keys and times, None where there is none, and what reads them."""
-    given = (("--key", source.options.key), ("--time", source.options.time))
+def _label_columns(
+    source: Source, names: list[str]
+) -> tuple[list[str | None], Callable[[Any, Any, Any], Labels] | None]:
+    """The columns of the labels, None where there is none, and what reads them."""
     columns = [
-        None if name is None else names[column_index(source.name, names, option, name)] for option, name in given
+        None if name is None else names[column_index(source.name, names, option, name)]
+        for option, name in source.options.labels
     ]
     return columns, label_reader(source)
 
 
 def _labels_of(
-    batch: Any, columns: list[str | None], read: Callable[[Any, Any], Labels] | None
+    batch: Any, columns: list[str | None], read: Callable[[Any, Any, Any], Labels] | None
 ) -> Callable[[int], Labels] | None:
-    """Reads the key and the time of a row of the batch, given by its number."""
+    """Reads the labels of a row of the batch, given by its number."""
     if read is None:
         return None
-    keys, times = ([None] * len(batch) if name is None else batch[name].to_pylist() for name in columns)
-    return lambda row: read(keys[row], times[row])
+    values = [[None] * len(batch) if name is None else batch[name].to_pylist() for name in columns]
+    return lambda row: read(*(column[row] for column in values))
 
 
 def _chunk(arrays: list[Any], names: list[str], first: int, labels: Callable[[int], Labels] | None) -> Chunk:

@@ -32,6 +32,7 @@ APPLIES_TO = {
     "key": set(Format),
     "time": set(Format),
     "time_unit": set(Format),
+    "expires": set(Format),
 }
 
 
@@ -122,6 +123,17 @@ def open_source(name: str, kind: Format | None, options: Options, *, integer_key
                 yield _source(name, file, size, kind, options, integer_keys)
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise ValueError(f"{name}: the compressed data is damaged: {error}") from None
+
+
+@contextmanager
+def integers_of_any_size() -> Iterator[None]:
+    """Lift Python's limit on the digits of integers: where int() refuses one, ijson's parser in C ends the process."""
+    most_digits = sys.get_int_max_str_digits()
+    sys.set_int_max_str_digits(0)
+    try:
+        yield
+    finally:
+        sys.set_int_max_str_digits(most_digits)
 
 
 def _format_of(name: str) -> Format:
