@@ -67,10 +67,10 @@ def export(
 
     CSV and Parquet have columns x and y, and those of key, time and expires that the hull has; expires is the time at
     which a point leaves the hull. In GeoJSON the key is the id of a feature, and its times are properties. Times are in
-    UTC. Another hull can read back the points, keys and times, not the column expires:
+    UTC. `dynhull load` reads the file into another hull, with an option for each of these columns that the file has:
 
         dynhull export fleet fleet.csv
-        dynhull import copy fleet.csv --key key --time time
+        dynhull load copy fleet.csv --key key --time time --expires expires
     """
     from .data_folders import export_hull
 

@@ -171,8 +171,21 @@ REFUSED_BATCHES = {
         ),
     ),
     "a missing key": (MISSING, ("KEY_MISSING", {"field": "batch.removes", "row": "1", "value": "x"})),
-    "points": (batch_pb2.Batch(inserts=points(1, 2)), ("HULL_UNSUITABLE", {})),
-    "integers": (batch_pb2.Batch(removes=keys(7)), ("HULL_UNSUITABLE", {})),
+    "points": (batch_pb2.Batch(inserts=points(1, 2)), ("HULL_UNSUITABLE", {"field": "batch.inserts"})),
+    "points to delete": (batch_pb2.Batch(deletes=points(1, 2)), ("HULL_UNSUITABLE", {"field": "batch.deletes"})),
+    "integers": (batch_pb2.Batch(removes=keys(7)), ("HULL_UNSUITABLE", {"field": "batch.removes"})),
+    "times of points": (
+        batch_pb2.Batch(puts=puts({"e": (1, 1)}).puts, insert_times=times(5)),
+        ("INVALID_FIELD", {"field": "batch.insert_times", "value": "present"}),
+    ),
+    "a life of points": (
+        batch_pb2.Batch(inserts=points(1, 2), puts=batch_pb2.Puts(ttl=duration(1))),
+        ("INVALID_FIELD", {"field": "batch.puts.ttl", "value": "present"}),
+    ),
+    "a life of centuries": (
+        puts({"e": (1, 1)}, ttl=Duration(seconds=2**53 // 10**6)),
+        ("INVALID_FIELD", {"field": "batch.puts.ttl", "value": f"{2**53 // 10**6 * 10**6} microseconds"}),
+    ),
     "points and keys": (
         batch_pb2.Batch(inserts=points(1, 2), removes=keys("a")),
         ("INVALID_FIELD", {"field": "batch", "value": "points and keys"}),
@@ -266,7 +279,7 @@ def test_a_refused_batch_of_keys_changes_nothing(stub: HullServiceStub, hull: st
     code, info, details = refusal(lambda: stub.Apply(pb.ApplyRequest(name=hull, batch=batch)))
     assert info.reason == reason
     assert code == (FAILED if reason in ("HULL_UNSUITABLE", "KEY_MISSING") else INVALID)
-    assert dict(info.metadata) == (metadata or {"value": hull})
+    assert dict(info.metadata) == {"value": hull} | metadata
     assert details
     assert stub.GetHull(pb.GetHullRequest(name=hull)).hull.revision == 1
     assert entities(stub, hull) == SQUARE
@@ -321,27 +334,28 @@ def test_settings_come_back(stub: HullServiceStub, name: str) -> None:
 
 
 QUESTIONS = {
-    "GetPositions": lambda name: pb.GetPositionsRequest(name=name, keys=keys("a")),
-    "ReadEntities": lambda name: pb.ReadEntitiesRequest(name=name),
-    "Locate": lambda name: pb.LocateRequest(name=name, keys=keys("a")),
-    "Distance": lambda name: pb.DistanceRequest(name="area", keys=keys("a"), keys_of=name),
-    "Support": lambda name: pb.SupportRequest(name=name, directions=points(1, 0), include_keys=True),
-    "SamplePoints": lambda name: pb.SamplePointsRequest(name=name, include_keys=True),
+    "GetPositions": ("keys", lambda name: pb.GetPositionsRequest(name=name, keys=keys("a"))),
+    "ReadEntities": ("name", lambda name: pb.ReadEntitiesRequest(name=name)),
+    "Locate": ("keys", lambda name: pb.LocateRequest(name=name, keys=keys("a"))),
+    "Distance": ("keys", lambda name: pb.DistanceRequest(name="area", keys=keys("a"), keys_of=name)),
+    "Support": ("include_keys", lambda name: pb.SupportRequest(name=name, directions=points(1, 0), include_keys=True)),
+    "SamplePoints": ("include_keys", lambda name: pb.SamplePointsRequest(name=name, include_keys=True)),
 }
 
 
 @pytest.mark.parametrize("method", QUESTIONS)
 def test_a_hull_without_keys_cannot_answer(stub: HullServiceStub, name: str, method: str) -> None:
+    field, question = QUESTIONS[method]
     for each in (name, "area"):
         stub.Apply(pb.ApplyRequest(name=each, batch=batch_pb2.Batch(inserts=points(1, 2))))
 
     def ask() -> None:
-        answer = getattr(stub, method)(QUESTIONS[method](name))
+        answer = getattr(stub, method)(question(name))
         if method == "ReadEntities":
             list(answer)
 
     code, info, _ = refusal(ask)
-    assert (code, info.reason, dict(info.metadata)) == (FAILED, "HULL_UNSUITABLE", {"value": name})
+    assert (code, info.reason, dict(info.metadata)) == (FAILED, "HULL_UNSUITABLE", {"field": field, "value": name})
 
 
 def test_a_hull_without_keys_has_no_names(stub: HullServiceStub, name: str) -> None:

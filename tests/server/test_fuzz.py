@@ -22,8 +22,8 @@ from dynhull_proto.v1 import batch_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-# `make fuzz` sends more.
-EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "100"))
+# `make fuzz-server` sends more.
+EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "40"))
 
 METHODS = list(pb.DESCRIPTOR.services_by_name["HullService"].methods)
 CODES = {

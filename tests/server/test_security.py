@@ -7,9 +7,10 @@ from pathlib import Path
 import grpc
 import pytest
 import trustme
+from command_line import dynhull
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from refusal import refusal
-from server_process import Server, run, server_process
+from server_process import Server, server_process
 
 from dynhull_client import (
     HullClient,
@@ -199,8 +200,8 @@ def test_tokens_are_read_again_when_they_change(tmp_path: Path) -> None:
 
 
 def test_a_new_token_and_its_entry(tmp_path: Path) -> None:
-    made = run("token", "--name", "x", "--read", "", "--write", "fleet/")
-    assert made.returncode == 0
+    made = dynhull("token", "--name", "x", "--read", "", "--write", "fleet/")
+    assert made.exit_code == 0
     tokens = tmp_path / "tokens.toml"
     tokens.write_text(made.stdout)
     token = made.stderr.removeprefix("token: ").strip()
@@ -260,8 +261,8 @@ def test_other_machines_only_with_tls_and_tokens_or_when_told(tmp_path: Path, ce
     tokens = tmp_path / "tokens.toml"
     tokens.write_text(entry("t", [""], [""]))
     for options in ([], certificate, ["--tokens", str(tokens)]):
-        refused = run("serve", "--host", "0.0.0.0", "--port", "0", *options)
-        assert refused.returncode == 2
+        refused = dynhull("serve", "--host", "0.0.0.0", "--port", "0", *options)
+        assert refused.exit_code == 2
         assert "--insecure" in refused.stderr
     for options in ([*certificate, "--tokens", str(tokens)], ["--insecure"]):
         with server_process("--host", "0.0.0.0", *options) as server:
@@ -286,8 +287,8 @@ def test_what_cannot_protect_is_refused(
     monkeypatch.chdir(tmp_path)
     if text is not None:
         Path("bad.toml").write_text(text)
-    refused = run("serve", "--port", "0", *options)
-    assert refused.returncode == 2
+    refused = dynhull("serve", "--port", "0", *options)
+    assert refused.exit_code == 2
     assert message in refused.stderr
     assert "Traceback" not in refused.stderr
 

@@ -5,15 +5,16 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from server_process import COMMAND, PATIENCE, run, server_process
+from command_line import dynhull
+from server_process import COMMAND, PATIENCE, server_process
 
 from dynhull_client import HullClient, LimitExceededError
 
 
 def shown(*arguments: str) -> dict[str, tuple[str, str]]:
     """The settings and their origins, as `dynhull config` shows them."""
-    result = run("config", *arguments)
-    assert (result.returncode, result.stderr) == (0, "")
+    result = dynhull("config", *arguments)
+    assert (result.exit_code, result.stderr) == (0, "")
     settings = {}
     for line in result.stdout.splitlines():
         setting, _, origin = line.rpartition("#")
@@ -40,7 +41,7 @@ def test_a_flag_goes_before_the_environment_and_that_before_the_file(
 
 def test_what_config_shows_is_a_file_for_config(tmp_path: Path) -> None:
     file = tmp_path / "dynhull.toml"
-    file.write_text(run("config", "--max-hulls", "7", "--create-on-write").stdout)
+    file.write_text(dynhull("config", "--max-hulls", "7", "--create-on-write").stdout)
     settings = shown("--config", str(file))
     assert settings["max_hulls"] == ("7", str(file))
     assert settings["create_on_write"] == ("true", str(file))
@@ -68,15 +69,15 @@ def test_the_server_uses_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_a_wrong_file_is_explained(tmp_path: Path, text: str, message: str) -> None:
     file = tmp_path / "settings.toml"
     file.write_text(text)
-    result = run("config", "--config", str(file))
-    assert result.returncode == 2
+    result = dynhull("config", "--config", str(file))
+    assert result.exit_code == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
 
 
 def test_help_shows_every_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "160")
-    helped = run("serve", "--help").stdout
+    helped = dynhull("serve", "--help").stdout
     for name in shown():
         assert f"--{name.replace('_', '-')}" in helped
 

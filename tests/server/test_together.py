@@ -230,9 +230,9 @@ def test_numbered_batches_are_applied_once_in_every_hull(stub: HullServiceStub, 
 
 
 def test_no_reader_sees_one_hull_without_the_other(address: str, stub: HullServiceStub, fleet: list[str]) -> None:
-    """A point travels between two hulls; their revisions grow together, and so nobody reads a smaller one later."""
+    """A point travels between two hulls, whose revisions grow together: later reads, and reads of both, show that."""
     _, b, c = fleet
-    stub.ApplyTogether(together((b, insert(1, 1)), (c, insert(5, 5))))
+    stub.ApplyTogether(together((b, insert(1, 1)), (c, insert(2, 2, 5, 5))))
     ended = threading.Event()
 
     def read(first: str, second: str) -> int:
@@ -242,6 +242,8 @@ def test_no_reader_sees_one_hull_without_the_other(address: str, stub: HullServi
             while not ended.is_set():
                 (earlier, _), (later, _) = counts(reader, [first, second])
                 assert later >= earlier, f"{second} was behind {first}"
+                both = reader.Separate(pb.SeparateRequest(name=first, other_name=second))
+                assert both.revision == both.other_revision
                 reads += 1
         return reads
 
@@ -261,7 +263,7 @@ def test_no_reader_sees_one_hull_without_the_other(address: str, stub: HullServi
         for watch in (of_b, of_c):
             while next(watch).revision <= TRAVELS:
                 pass
-    assert counts(stub, [b, c]) == [(TRAVELS + 1, 1), (TRAVELS + 1, 1)]
+    assert counts(stub, [b, c]) == [(TRAVELS + 1, 1), (TRAVELS + 1, 2)]
 
 
 def test_calls_that_name_hulls_in_any_order_all_end(address: str, stub: HullServiceStub, fleet: list[str]) -> None:

@@ -52,6 +52,10 @@ SHELL = {
 
 SWARM = (0, 1, 1, 5)
 
+# The share of the shell's plans in which a hull is recalled from the storage beside its deletion: by chance the two
+# hardly ever meet.
+RECALLS_BESIDE_DELETES = 0.1
+
 # How a commit fails: surely not done; done or not though it raised; and not decided before it is settled.
 COMMIT_FAULTS = ("nothing", "full", "lost", "ghost", "memory", "ghost memory", "later lost", "later ghost")
 # How everything else fails.
@@ -82,7 +86,7 @@ def random_plan(seed: int, layer: str) -> Plan:
         if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window
             create = {"do": "create", "name": name, "max_points": 0} | _settings(draw, name)
             lives[0]["clients"][0].insert(0, create)
-    return {
+    plan = {
         "seed": seed,
         "layer": layer,
         "storage": "immediate" if immediate else "sqlite" if layer == "sqlite" else "memory",
@@ -96,6 +100,17 @@ def random_plan(seed: int, layer: str) -> Plan:
         "lives": lives,
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
     }
+    if layer == "shell" and draw.random() < RECALLS_BESIDE_DELETES:
+        draw.choice(lives)["clients"] += _recall_beside_delete(draw, names[0])
+        plan["limits"]["history_bytes"] = 0
+    return plan
+
+
+def _recall_beside_delete(draw: random.Random, name: str) -> list[list[Operation]]:
+    """Two clients: one writes to a hull and recalls it, the other deletes it."""
+    write = {"do": "write", "name": name, "create": True, "numbered": False, "rows": 1}
+    recalls = [{"do": "recall", "name": name, "back": draw.randint(0, 1)} for _ in range(draw.randint(1, 3))]
+    return [[write, write, *recalls], [{"do": "rest", "seconds": 0.001}, {"do": "delete", "name": name}]]
 
 
 def _life(

@@ -9,6 +9,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from command_line import dynhull
 from folders import (
     DATABASE,
     LOG,
@@ -35,24 +36,18 @@ from dynhull_server.storage.sqlite import copies
 UNFINISHED = "is an unfinished copy: remove it, and copy again"
 
 
-def run(*command, **more):
-    return subprocess.run(
-        [COMMAND, *map(str, command)], capture_output=True, text=True, timeout=PATIENCE, check=False, **more
-    )
-
-
 def done(*command, says):
     """Run a command that must succeed; `says` is its last line."""
-    finished = run(*command)
-    assert finished.returncode == 0, finished.stderr
+    finished = dynhull(*command)
+    assert finished.exit_code == 0, finished.stderr
     assert finished.stdout.splitlines()[-1] == says
     return finished
 
 
 def refused(*command, says, code=2):
     """Run a command that must fail; `says` is in its error message."""
-    finished = run(*command)
-    assert finished.returncode == code
+    finished = dynhull(*command)
+    assert finished.exit_code == code
     assert says in finished.stderr
     assert "Traceback" not in finished.stderr
 
@@ -303,8 +298,8 @@ def test_check_says_what_is_damaged(paths):
     storage.close()
     content = (data / DATABASE).read_bytes()
     flip(data / DATABASE, older.tobytes())
-    finished = run("check", data)
-    assert finished.returncode == 1
+    finished = dynhull("check", data)
+    assert finished.exit_code == 1
     assert finished.stdout.splitlines() == [
         "fleet: revision 40, 20 rows of batches, snapshots at 20, 30: DAMAGED",
         "whole: revision 2, 2 rows of batches: whole",
@@ -313,8 +308,8 @@ def test_check_says_what_is_damaged(paths):
     assert finished.stderr == "hull 'fleet': the snapshot at revision 20 is damaged, and was dropped\n"
     (data / DATABASE).write_bytes(content)
     flip(data / DATABASE, record(35).rows.inserts.tobytes())
-    finished = run("check", data)
-    assert finished.returncode == 1
+    finished = dynhull("check", data)
+    assert finished.exit_code == 1
     assert finished.stdout.splitlines()[-1] == f"{data}: damaged; it cannot be served: restore a backup"
     assert "hull 'fleet': revisions 35 to 35 are damaged, and later ones exist" in finished.stderr
     (data / DATABASE).write_bytes(content)
@@ -335,8 +330,8 @@ def test_every_command_warns_of_a_commit_that_was_under_way(paths, tmp_path):
     exported = done("export", "fleet", file, "--data", crash, says=f"{file}: 24 points of fleet at revision 8")
     copied = done("backup", copy, "--data", crash, says=f"{copy}: 1 hull")
     assert all(warning in finished.stderr for finished in (exported, copied))
-    checked = run("check", crash)
-    assert checked.returncode == 1
+    checked = dynhull("check", crash)
+    assert checked.exit_code == 1
     assert warning in checked.stderr
     with server_process("--data", str(crash), complaints=warning) as server, HullClient(server.address) as client:
         assert client.get_hull("fleet").revision == 8
@@ -356,7 +351,7 @@ def test_export_and_import(tmp_path, suffix):
         done("export", "from", file, "--data", data, says=f"{file}: 20,003 points of from at revision 1")
         words = "to: 20,003 points loaded, 20,003 in the hull"
         done("import", "to", file, "--address", server.address, says=words)
-        run("export", "to", tmp_path / "again.csv", "--data", data)
+        dynhull("export", "to", tmp_path / "again.csv", "--data", data)
     again = np.loadtxt(tmp_path / "again.csv", delimiter=",", skiprows=1)
     np.testing.assert_array_equal(sorted_rows(again), sorted_rows(given))
 

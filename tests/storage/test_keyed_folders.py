@@ -166,17 +166,22 @@ def test_what_is_exported_is_imported(tmp_path, keyed, keys):
     with server_process("--data", str(tmp_path / "data")) as server, HullClient(server.address) as client:
         client.create_hull("from", keyed=keyed)
         client.put("from", keys, POINTS, times)
+        leaving = [row for row, end in enumerate(DEADLINES) if end != FOREVER]
+        ends = [DEADLINES[row] for row in leaving]
+        names = [list(keys)[row] for row in leaving]
+        client.put("from", names, [POINTS[row] for row in leaving], times[leaving], expire_times=ends)
         first = exported(tmp_path / "data", tmp_path / "first.csv", "from")
         with first.open(encoding="utf-8", newline="") as read:
             assert list(csv.reader(read))[1:] == [
-                [str(key), repr(x + 0.0), repr(y + 0.0), text(time)]
-                for key, (x, y), time in zip(keys, POINTS, times.tolist(), strict=True)
+                [str(key), repr(x + 0.0), repr(y + 0.0), text(time), text(end)]
+                for key, (x, y), time, end in zip(keys, POINTS, times.tolist(), DEADLINES, strict=True)
             ]
         for suffix, key in ((".csv", "key"), (".geojson", "id"), (".parquet", "key")):
             file = exported(tmp_path / "data", tmp_path / f"hull{suffix}", "from")
             to = f"to{suffix}"
             client.create_hull(to, keyed=keyed)
-            done = dynhull("import", to, file, "--key", key, "--time", "time", "--address", server.address)
+            columns = "--key", key, "--time", "time", "--expires", "expires"
+            done = dynhull("import", to, file, *columns, "--address", server.address)
             assert done.stdout == f"{to}: 6 points loaded, 6 in the hull\n", done.stderr
             again = exported(tmp_path / "data", tmp_path / "again.csv", to)
             assert again.read_bytes() == first.read_bytes()

@@ -14,6 +14,7 @@ import pytest
 JAVASCRIPT = Path(__file__).parents[1] / "javascript"
 INSTALLED_BY = {
     "chromium": "Debian's package chromium",
+    "faketime": "Debian's package faketime",
     "node": "Debian's package nodejs",
     "prometheus": "Debian's package prometheus",
     "promtool": "Debian's package prometheus",

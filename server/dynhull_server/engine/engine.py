@@ -99,6 +99,8 @@ class Engine:
         self._core = Core(limits)
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
+        self._calls: deque[Callable[[], None]] = deque()
+        self._woken = False
         self._stepping = False
         self._expiries = Expiries(supervisor)
         self._idle: asyncio.Event | None = None
@@ -394,7 +396,23 @@ class Engine:
         return None if self._storage.row(number) is None else load(self._storage.read(number))
 
     def _from_thread(self, function: Callable[[], None]) -> None:
-        self._loop.call_soon_threadsafe(function)
+        """Call a function on the event loop. The functions that are passed until it wakes share one wake-up."""
+        self._calls.append(function)
+        if not self._woken:
+            self._wake()
+
+    def _wake(self) -> None:
+        self._woken = True
+        self._loop.call_soon_threadsafe(self._take_calls)
+
+    def _take_calls(self) -> None:
+        self._woken = False  # first, so that a function that is passed meanwhile is not left behind
+        try:
+            while self._calls:
+                self._calls.popleft()()
+        finally:
+            if self._calls:  # one of them has failed
+                self._wake()
 
     def _commit_reported(self, error: BaseException | None) -> None:
         if error is None:

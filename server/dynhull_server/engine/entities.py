@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dynhull.arrays import Checked, Points
 from dynhull.keys import take_keys
 
+from ..state.batch import NO_POINTS
 from ..state.contents.keyed import Found, Keyed
 from ..state.contents.live import AnyHull
 from ..state.errors import HullEmptyError
@@ -60,19 +61,20 @@ async def ask_of_keys(
     hull: LiveHull, min_revision: int, owner: LiveHull, owner_min_revision: int, keys: Keys, question: Question
 ) -> KeyAnswers:
     """Ask a hull about the positions of keys that it has itself, or another one."""
-    if owner is hull:
 
-        def ask(state: HullState) -> tuple[Found, npt.NDArray[Any]]:
-            found = _keyed(state).find(keys)
-            return found, question(state.hull, _known(found))
+    def ask(state: HullState, keyed: HullState) -> tuple[Found, npt.NDArray[Any] | None, Points]:
+        found = _keyed(keyed).find(keys)
+        if len(keys) > BLOCK:
+            return found, None, state.vertices()
+        return found, question(state.hull, _known(found)), NO_POINTS
 
-        counts, (found, rows) = await hull.read(ask, len(keys), max(min_revision, owner_min_revision))
-        return KeyAnswers(counts, rows, ~found.present, None)
-    await hull.reached(min_revision)  # beforehand, so that the positions are not older than need be
-    owner_counts, found = await positions(owner, keys, owner_min_revision)
-    xy = _known(found)
-    counts, rows = await hull.ask_rows(lambda live, block: question(live, xy[block]), len(xy), min_revision)
-    return KeyAnswers(counts, rows, ~found.present, owner_counts)
+    counts, owner_counts, (found, answers, vertices) = await hull.read_beside(
+        owner, ask, len(keys), min_revision, owner_min_revision
+    )
+    if answers is None:
+        xy = _known(found)
+        answers = await hull.ask_vertices(vertices, lambda live, block: question(live, xy[block]), len(xy))
+    return KeyAnswers(counts, answers, ~found.present, None if owner is hull else owner_counts)
 
 
 def _known(found: Found) -> Checked:

@@ -23,7 +23,7 @@ from ..state.errors import (
     HullUnsuitableError,
     RevisionForgottenError,
 )
-from ..state.events import ReadHull
+from ..state.events import ReadHull, ReadTogether
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
 from ..state.records import HullSettings, Keys
@@ -106,17 +106,17 @@ class LiveHull:
         """Whether the points have keys."""
         return self.settings.identity != "multiset"
 
-    def require_keys(self) -> None:
-        """Raise HullUnsuitableError if the points have no keys."""
+    def require_keys(self, field: str) -> None:
+        """Raise HullUnsuitableError if the points have no keys; `field` is that of the request which asks for them."""
         if not self.keyed:
-            raise HullUnsuitableError(self.name, "has points without keys")
+            raise HullUnsuitableError(self.name, "has points without keys", field=field)
 
     def keys(self, keys: Keys | None) -> Keys:
         """The keys of a question, which may be none; raise HullUnsuitableError if the hull has none of their kind."""
-        self.require_keys()
+        self.require_keys("keys")
         none: Keys = PackedKeys(b"", b"") if self.settings.identity == "str" else np.empty(0, np.uint64)
         if keys is not None and type(keys) is not type(none):
-            raise HullUnsuitableError(self.name, f"has keys that are {KINDS[self.settings.identity]}")
+            raise HullUnsuitableError(self.name, f"has keys that are {KINDS[self.settings.identity]}", field="keys")
         return none if keys is None else keys
 
     # Reads
@@ -129,6 +129,31 @@ class LiveHull:
             counts, result = await self._engine.ask(ReadHull(Waiter(), self._hull, function, rows=rows))
             if counts.revision >= min_revision:
                 return counts, result
+
+    async def read_beside(
+        self,
+        other: "LiveHull",
+        function: Callable[[HullState, HullState], T],
+        rows: int = 0,
+        min_revision: int = 0,
+        other_min_revision: int = 0,
+    ) -> tuple[Counts, Counts, T]:
+        """Call `function` with the states of this hull and another one, of one moment; both may be the same.
+
+        No batch over both hulls has been applied to one of them only.
+        """
+        if other is self:
+            least = max(min_revision, other_min_revision)
+            counts, result = await self.read(lambda state: function(state, state), rows, least)
+            return counts, counts, result
+        parts = [self._hull, other._hull]
+        while True:
+            await self.reached(min_revision)
+            await other.reached(other_min_revision)
+            request = ReadTogether(Waiter(), parts, lambda states: function(*states), rows=rows)
+            (counts, other_counts), result = await self._engine.ask(request)
+            if counts.revision >= min_revision and other_counts.revision >= other_min_revision:
+                return counts, other_counts, result
 
     async def vertices(self, min_revision: int = 0) -> tuple[Counts, Points]:
         """The vertices; the same array object while the hull has not changed."""
@@ -150,8 +175,13 @@ class LiveHull:
         if rows <= BLOCK:  # delays later writes by some milliseconds only
             return await self.read(lambda state: question(state.hull, slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision)
+        return counts, await self.ask_vertices(vertices, question, rows)
+
+    async def ask_vertices(self, vertices: Points, question: Callable[[AnyHull, slice], T], rows: int) -> T:
+        """Answer such a query for these vertices of the hull, outside of the trips."""
         outline = await self.outline(vertices)
-        return counts, await in_blocks(self._engine.aside, partial(question, outline), rows)
+        answers: T = await in_blocks(self._engine.aside, partial(question, outline), rows)
+        return answers
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
         """The multiplicity of each of some points."""

@@ -88,7 +88,7 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
     if len(packed) % BYTES_PER_POINT:
         problem = f"a point has {BYTES_PER_POINT} bytes, so the number of bytes must be a multiple of that"
         raise InvalidFieldError(f"{field}.packed", f"{len(packed)} bytes", problem)
-    if len(coordinates) % 2:
+    if not packed and len(coordinates) % 2:
         problem = "a point has two coordinates, so their number must be even"
         raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
     xy = packed_points(packed) if packed else plain_points(np.array(coordinates, float).reshape(-1, 2))

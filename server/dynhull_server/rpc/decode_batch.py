@@ -1,6 +1,9 @@
 """Conversion of batches, their keys and times."""
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, points_pb2
@@ -20,6 +23,7 @@ CONDITIONS: dict[int, Condition | None] = {
     batch_pb2.PUT_CONDITION_IF_PRESENT: "present",
 }
 BYTES_PER_NUMBER = 8
+SIGNED, UNSIGNED = np.dtype("<i8"), np.dtype("<u8")
 MOST_KEY_BYTES = 255
 NANOSECONDS_PER_SECOND = 1_000_000_000
 NO_STRINGS, NO_INTEGERS = PackedKeys(b"", b""), np.empty(0, np.uint64)
@@ -27,19 +31,23 @@ NO_STRINGS, NO_INTEGERS = PackedKeys(b"", b""), np.empty(0, np.uint64)
 
 def decode_batch(batch: batch_pb2.Batch) -> Batch | KeyedBatch:
     """A batch of keys, or one of points, whose moves have equally many origins and destinations."""
-    if batch.HasField("puts") or batch.HasField("removes"):
+    has = batch.HasField
+    if has("puts") or has("removes"):
         keyed = _decode_keyed(batch)
         if keyed is not None:
             return keyed
-    if batch.missing_points not in MISSING_POINT_POLICIES:
-        raise InvalidFieldError("batch.missing_points", batch.missing_points, "not a policy that this server supports")
-    inserts = decode_points(batch.inserts, "batch.inserts") if batch.HasField("inserts") else NO_POINTS
-    deletes = decode_points(batch.deletes, "batch.deletes") if batch.HasField("deletes") else NO_POINTS
+        if batch.puts.HasField("ttl") and (has("inserts") or has("deletes") or has("moves")):
+            raise InvalidFieldError("batch.puts.ttl", "present", "points without keys have no ttl")
+    missing_points = batch.missing_points
+    if missing_points not in MISSING_POINT_POLICIES:
+        raise InvalidFieldError("batch.missing_points", missing_points, "not a policy that this server supports")
+    inserts = decode_points(batch.inserts, "batch.inserts") if has("inserts") else NO_POINTS
+    deletes = decode_points(batch.deletes, "batch.deletes") if has("deletes") else NO_POINTS
     times = None
-    if batch.HasField("insert_times"):
+    if has("insert_times"):
         times = _decode_row_times(batch.insert_times, "batch.insert_times", len(inserts), "inserts")
     moves = 0
-    if batch.HasField("moves"):
+    if has("moves"):
         origins = decode_points(batch.moves.origins, "batch.moves.origins")
         destinations = decode_points(batch.moves.destinations, "batch.moves.destinations")
         moves = len(origins)
@@ -47,14 +55,14 @@ def decode_batch(batch: batch_pb2.Batch) -> Batch | KeyedBatch:
             problem = f"must be as many as the origins, {moves}"
             raise InvalidFieldError("batch.moves.destinations", f"{len(destinations)} points", problem)
         inserts, deletes = np.concatenate((inserts, destinations)), np.concatenate((deletes, origins))
-    count_missing = batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT
-    return Batch(inserts, deletes, moves, count_missing, times)
+    return Batch(inserts, deletes, moves, missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT, times)
 
 
 def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
     """A batch of keys; None if it names no key."""
-    if batch.missing_keys not in MISSING_KEY_POLICIES:
-        raise InvalidFieldError("batch.missing_keys", batch.missing_keys, "not a policy that this server supports")
+    has, missing_keys = batch.HasField, batch.missing_keys
+    if missing_keys not in MISSING_KEY_POLICIES:
+        raise InvalidFieldError("batch.missing_keys", missing_keys, "not a policy that this server supports")
     puts = batch.puts
     keys = decode_keys(puts.keys, "batch.puts.keys")
     points = decode_points(puts.points, "batch.puts.points")
@@ -62,21 +70,29 @@ def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
     if len(points) != rows:
         problem = f"must be as many as the keys, {rows}"
         raise InvalidFieldError("batch.puts.points", f"{len(points)} points", problem)
-    times = _decode_row_times(puts.times, "batch.puts.times", rows, "keys")
-    deadlines = _decode_row_times(puts.expire_times, "batch.puts.expire_times", rows, "keys")
-    ttl = decode_duration(puts.ttl, "batch.puts.ttl", least=1) if puts.HasField("ttl") else None
+    times = deadlines = ttl = None
+    has_of_puts = puts.HasField
+    if has_of_puts("times"):
+        times = _decode_row_times(puts.times, "batch.puts.times", rows, "keys")
+    if has_of_puts("expire_times"):
+        deadlines = _decode_row_times(puts.expire_times, "batch.puts.expire_times", rows, "keys")
+    if has_of_puts("ttl"):
+        ttl = decode_duration(puts.ttl, "batch.puts.ttl", least=1)
     if ttl is not None and deadlines is not None:
         raise InvalidFieldError("batch.puts.ttl", "ttl and expire_times", "use one or the other")
-    if puts.condition not in CONDITIONS:
-        raise InvalidFieldError("batch.puts.condition", puts.condition, "not a condition that this server supports")
-    removes = decode_keys(batch.removes, "batch.removes") if batch.HasField("removes") else None
+    condition = puts.condition
+    if condition not in CONDITIONS:
+        raise InvalidFieldError("batch.puts.condition", condition, "not a condition that this server supports")
+    removes = decode_keys(batch.removes, "batch.removes") if has("removes") else None
     known = removes if keys is None else keys
     if known is None:
         return None
-    if batch.HasField("inserts") or batch.HasField("deletes") or batch.HasField("moves"):
+    if has("inserts") or has("deletes") or has("moves"):
         raise InvalidFieldError("batch", "points and keys", "a batch has points without keys, or keys")
-    strings = isinstance(known, PackedKeys)
-    if removes is not None and isinstance(removes, PackedKeys) != strings:
+    if has("insert_times"):
+        raise InvalidFieldError("batch.insert_times", "present", "keys have their times in puts.times")
+    strings = not isinstance(known, np.ndarray)  # PackedKeys is an abstract Sequence, and slow to test for
+    if removes is not None and isinstance(removes, np.ndarray) == strings:
         raise InvalidFieldError("batch.removes", "strings and integers", "all keys of a batch are of one kind")
     none: Keys = NO_STRINGS if strings else NO_INTEGERS
     return KeyedBatch(
@@ -85,10 +101,10 @@ def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
         points,
         none if removes is None else removes,
         times,
-        CONDITIONS[puts.condition],
+        CONDITIONS[condition],
         ttl,
         deadlines,
-        batch.missing_keys == batch_pb2.MISSING_KEY_POLICY_REFUSE,
+        missing_keys == batch_pb2.MISSING_KEY_POLICY_REFUSE,
     )
 
 
@@ -106,9 +122,7 @@ def decode_keys(keys: points_pb2.Keys, field: str) -> Keys | None:
     if strings:
         return _decode_strings(list(strings), field)
     if packed_integers:
-        return np.frombuffer(_whole_numbers(packed_integers, f"{field}.packed_integers"), "<u8").astype(
-            np.uint64, copy=False
-        )
+        return _numbers(packed_integers, f"{field}.packed_integers", UNSIGNED).astype(np.uint64, copy=False)
     return np.array(integers, np.uint64) if integers else None
 
 
@@ -140,11 +154,11 @@ def _decode_strings(strings: list[str], field: str) -> PackedKeys:
     return PackedKeys.pack(strings)
 
 
-def _whole_numbers(packed: bytes, field: str) -> bytes:
+def _numbers(packed: bytes, field: str, kind: np.dtype[Any]) -> npt.NDArray[Any]:
     if len(packed) % BYTES_PER_NUMBER:
         problem = f"a number has {BYTES_PER_NUMBER} bytes, so the number of bytes must be a multiple of that"
         raise InvalidFieldError(field, f"{len(packed)} bytes", problem)
-    return packed
+    return np.frombuffer(packed, kind)
 
 
 # Times
@@ -163,7 +177,7 @@ def decode_times(times: points_pb2.Times, field: str) -> Times | None:
     if times.packed and times.timestamps:
         raise InvalidFieldError(field, "packed and timestamps", "use one encoding or the other")
     if times.packed:
-        decoded = np.frombuffer(_whole_numbers(times.packed, f"{field}.packed"), "<i8").astype(np.int64, copy=False)
+        decoded = _numbers(times.packed, f"{field}.packed", SIGNED).astype(np.int64, copy=False)
     elif times.timestamps:
         return _decode_timestamps(times, field)
     else:

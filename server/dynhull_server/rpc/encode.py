@@ -147,26 +147,32 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
     Most batches have none of the later counts.
     """
     result.revision = applied.revision
-    result.inserted = applied.inserted
-    result.deleted = applied.deleted
-    result.missing = applied.missing
-    result.hull_changed = applied.hull_changed
     result.point_count = applied.points
-    result.duplicate = applied.duplicate
+    if applied.inserted:
+        result.inserted = applied.inserted
+    if applied.deleted:
+        result.deleted = applied.deleted
+    if applied.missing:
+        result.missing = applied.missing
+    if applied.hull_changed:
+        result.hull_changed = True
+    if applied.duplicate:
+        result.duplicate = True
     if applied.moved:
         result.moved = applied.moved
     if applied.stale:
         result.stale = applied.stale
-    if applied.late:
-        result.late = applied.late
     if applied.skipped:
         result.skipped = applied.skipped
+    if applied.clock is None:  # nothing is late, clamped or evicted without a clock
+        return
+    if applied.late:
+        result.late = applied.late
     if applied.clamped:
         result.clamped = applied.clamped
     if applied.evicted:
         result.evicted = applied.evicted
-    if applied.clock is not None:
-        result.clock_time.FromMicroseconds(applied.clock)
+    result.clock_time.FromMicroseconds(applied.clock)
 
 
 def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_service_pb2.WatchResponse:

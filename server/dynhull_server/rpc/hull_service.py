@@ -135,7 +135,9 @@ class HullService:
             while await streamed.more():
                 for sequence, applied in streamed.applied():
                     call.batches += 1
-                    response = pb.StreamResponse(sequence=sequence)
+                    response = pb.StreamResponse()
+                    if sequence:
+                        response.sequence = sequence
                     encode.encode_applied(applied, response.result)
                     await call.write(response)
 
@@ -180,7 +182,7 @@ class HullService:
     async def ReadEntities(self, request: pb.ReadEntitiesRequest, call: Call) -> None:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        hull.require_keys()
+        hull.require_keys("name")
         with call.cutoff():
             counts, contents = await entities.entities(hull, request.min_revision)
         for first in range(0, max(len(contents), 1), ENTITIES_A_PART):
@@ -196,7 +198,7 @@ class HullService:
         if not request.include_keys:
             counts, extremes = await hull.support(directions, request.min_revision)
             return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
-        hull.require_keys()
+        hull.require_keys("include_keys")
         counts, extremes, keys = await entities.support(hull, directions, request.min_revision, self._engine.aside)
         return pb.SupportResponse(
             revision=counts.revision,
@@ -274,17 +276,18 @@ class HullService:
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
         encoding = decode.decode_encoding(request.encoding)
-        # If both are the same hull, it is read once.
-        wanted = {hull: request.min_revision}
-        wanted[other] = max(request.other_min_revision, wanted.get(other, 0))
-        for each, revision in wanted.items():  # wait for both before reading one
-            await each.reached(revision)
-        found = {each: await each.vertices(revision) for each, revision in wanted.items()}
-        for each, (_, vertices) in found.items():
-            if not len(vertices):
+        counts, other_counts, (vertices, other_vertices) = await hull.read_beside(
+            other,
+            lambda state, beside: (state.vertices(), beside.vertices()),
+            (hull.vertex_count + other.vertex_count) // 2,
+            request.min_revision,
+            request.other_min_revision,
+        )
+        for each, found in ((hull, vertices), (other, other_vertices)):
+            if not len(found):
                 raise HullEmptyError(each.name)
         response: pb.SeparateResponse = await self._engine.aside(
-            lambda: answers.separation(*found[hull], *found[other], encoding)
+            lambda: answers.separation(counts, vertices, other_counts, other_vertices, encoding)
         )
         return response
 
@@ -321,7 +324,7 @@ class HullService:
         encoding = decode.decode_encoding(request.encoding)
         size = decode.decode_sample_size(request.sample_size)
         if request.include_keys:
-            hull.require_keys()
+            hull.require_keys("include_keys")
             counts, points, keys = await entities.sample(hull, size, request.min_revision, self._engine.aside)
             return pb.SamplePointsResponse(
                 revision=counts.revision,
@@ -338,7 +341,7 @@ class HullService:
         resume = decode.decode_resume(request)
         keys = request.include_keys
         if keys:
-            hull.require_keys()
+            hull.require_keys("include_keys")
         view: View
         if directions is not None:
             view = SketchView(hull, directions, vertices=request.include_measures, keys=keys)

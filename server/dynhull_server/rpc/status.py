@@ -142,7 +142,8 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
             failure = PreconditionFailure()
             failure.violations.add(type="HULL_UNSUITABLE", subject=error.name, description=str(error))
             point = {} if error.point is None else {"point": str(error.point)}
-            metadata = {"value": error.name, **point, **where}
+            unsuitable = {"field": within + error.field} if error.field else {}
+            metadata = {**unsuitable, "value": error.name, **point, **where}
             return _status(code.FAILED_PRECONDITION, str(error), "HULL_UNSUITABLE", metadata, failure)
         case RevisionForgottenError():
             metadata = {"field": "resume.revision", "value": str(error.revision)}

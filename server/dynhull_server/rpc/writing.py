@@ -136,12 +136,11 @@ class StreamedBatches:
             self._failure = failure
 
     def _take(self, message: Any) -> None:
-        if message.name not in ("", self.name):
-            raise decode.InvalidFieldError("name", message.name, f"this call writes to {self.name!r}")
-        if message.producer not in ("", self._producer):
-            raise decode.InvalidFieldError(
-                "producer", message.producer, f"the producer of this call is {self._producer!r}"
-            )
+        name, producer = message.name, message.producer
+        if name and name != self.name:
+            raise decode.InvalidFieldError("name", name, f"this call writes to {self.name!r}")
+        if producer and producer != self._producer:
+            raise decode.InvalidFieldError("producer", producer, f"the producer of this call is {self._producer!r}")
         if not message.HasField("batch"):
             if message.sequence:
                 raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")

@@ -56,6 +56,11 @@ class KeyedBatch:
     deadlines: Times | None = None
     refuse_missing: bool = False
 
+    @property
+    def field(self) -> str:
+        """The path of its keys in the batch."""
+        return "puts.keys" if len(self.keys) else "removes"
+
 
 @dataclass(slots=True)
 class Applied:

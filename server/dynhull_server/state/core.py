@@ -44,12 +44,14 @@ from .events import (
     Gone,
     NotExamined,
     ReadHull,
+    ReadTogether,
     Reply,
     Request,
     Retried,
     Retry,
     Stopping,
     Tick,
+    Together,
     WriteBatch,
     WriteTogether,
 )
@@ -62,12 +64,15 @@ from .trip import Leg, Place, Trip, write
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-# Requests for at most this many points together run at once: a tenth of a millisecond.
+# A request for at most this many points runs at once: a tenth of a millisecond. It holds the GIL anyway.
 SMALL = 128
+# Small requests for at most this many points together run at once, too: a thread would begin them later than that.
+SMALL_TRIP = 1024
 # The most points that the requests of one trip read or write together, unless a single request exceeds it.
 TRIP_ROWS = 2**18
 # Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+READS = ReadHull | ReadTogether
 
 
 class _Queue:
@@ -131,6 +136,7 @@ class Core:
             WriteBatch: self._asked,
             WriteTogether: self._asked_together,
             ReadHull: self._asked,
+            ReadTogether: self._asked_together,
             CreateHull: self._asked,
             DeleteHull: self._asked,
             Gone: self._gone,
@@ -215,7 +221,7 @@ class Core:
         queue.waiting.append(request)
         self._go_on([queue], effects)
 
-    def _asked_together(self, request: WriteTogether, effects: list[Effect]) -> None:
+    def _asked_together(self, request: Together, effects: list[Effect]) -> None:
         queues = [self._queue(part.name) for part in request.parts]
         for queue in queues:
             queue.waiting.append(request)
@@ -261,10 +267,10 @@ class Core:
 
     def _gone(self, event: Gone, effects: list[Effect]) -> None:
         event.what.leave()
-        if type(event.what) is WriteTogether:
+        if isinstance(event.what, Together):
             self._go_on(self._remove(event.what), effects)
 
-    def _remove(self, request: WriteTogether) -> list[_Queue]:
+    def _remove(self, request: Together) -> list[_Queue]:
         """Remove a request from the queues where it waits. Returns these queues: they may go on without it."""
         queues = [self._queues[part.name] for part in request.parts if part.name in self._queues]
         left = [queue for queue in queues if request in queue.waiting]
@@ -282,7 +288,7 @@ class Core:
                 left += self._refuse_waiting(queue, error, effects)
             while queue.trip is None and queue.waiting:
                 first = queue.waiting[0]
-                together = self._at(first.parts) if type(first) is WriteTogether else [queue]
+                together = self._at(first.parts) if isinstance(first, Together) else [queue]
                 if not all(each.trip is None and each.waiting and each.waiting[0] is first for each in together):
                     break  # the last of these queues that comes so far begins it
                 requests, rows = _take(queue) if len(together) == 1 else _take_together(together)
@@ -293,7 +299,7 @@ class Core:
 
     def _begin(self, queues: list[_Queue], requests: list[Request], rows: int, effects: list[Effect]) -> None:
         trip = self._new_trip(queues, requests)
-        if rows > SMALL:
+        if rows > SMALL_TRIP or (rows > SMALL and any(request.rows > SMALL for request in requests)):
             effects.append(Compute(trip))
             return
         trip.run()
@@ -316,7 +322,7 @@ class Core:
         most = self._limits.max_hulls
         return LimitExceededError("max_hulls", most) if len(self._hulls) + self._creating >= most else None
 
-    def _at(self, parts: "Sequence[Leg | WriteBatch]") -> list[_Queue]:
+    def _at(self, parts: "Sequence[Hull | Leg | WriteBatch]") -> list[_Queue]:
         """The queues of the hulls that these belong to."""
         return [self._queues[part.name] for part in parts]
 
@@ -415,7 +421,7 @@ class Core:
         refused: list[Request] = []
         streams: set[int] = set()
         for request in trip.requests:
-            if type(request) is ReadHull:
+            if isinstance(request, READS):
                 continue
             stream = request.stream if type(request) is WriteBatch else None
             answered = stream is not None and id(stream) in streams
@@ -430,12 +436,16 @@ class Core:
 
     def _again(self, trip: Trip) -> None:
         """Repeat the reads of a trip whose changes were not committed."""
-        reads = [request for request in trip.requests if type(request) is ReadHull and not request.abandoned]
+        reads = [request for request in trip.requests if isinstance(request, READS) and not request.abandoned]
         for request in reads:
             request.result = request.error = None
-        queue = self._queues[trip.legs[0].name]  # a trip with reads has one
         self._over(trip)
-        queue.waiting[:0] = reads
+        self._wait_again(trip, reads)
+
+    def _wait_again(self, trip: Trip, requests: "Sequence[Request]") -> None:
+        """Put requests of a trip before those that wait in its queues."""
+        for queue in self._at(trip.legs):
+            queue.waiting[:0] = requests
 
     # Examination of the storage
 
@@ -481,7 +491,7 @@ class Core:
         trip.ill = event.error
         if trip.unknown:
             self._refuse_changes(trip, OutcomeUnknownError(words(event.error)), effects)
-        queues[0].waiting[:0] = [request for request in trip.requests if not request.abandoned]
+        self._wait_again(trip, [request for request in trip.requests if not request.abandoned])
         trip.requests = []
         if self._stopping:
             self._over(trip)  # the next start reads the outcome from the storage
@@ -507,7 +517,7 @@ class Core:
                 stream.stopped = True
             request.error = error
             refused.append(request)
-            if type(request) is WriteTogether:
+            if isinstance(request, Together):
                 others += self._remove(request)
         effects.append(Reply(refused))
         return others
@@ -551,7 +561,7 @@ def _take(queue: _Queue) -> tuple[list[Request], int]:
         if request.abandoned or (type(request) is WriteBatch and request.stream and request.stream.stopped):
             continue
         deletes = type(request) is DeleteHull
-        if type(request) is WriteTogether or (requests and (deletes or rows + request.rows > TRIP_ROWS)):
+        if isinstance(request, Together) or (requests and (deletes or rows + request.rows > TRIP_ROWS)):
             queue.waiting = waiting[i:]
             break
         requests.append(request)
@@ -567,7 +577,7 @@ def _take_together(queues: list[_Queue]) -> tuple[list[Request], int]:
     requests: list[Request] = []
     rows = 0
     for request, *others in zip(*(queue.waiting for queue in queues), strict=False):
-        if type(request) is not WriteTogether or len(request.parts) != len(queues):
+        if not isinstance(request, Together) or len(request.parts) != len(queues):
             break
         if any(other is not request for other in others) or (requests and rows + request.rows > TRIP_ROWS):
             break

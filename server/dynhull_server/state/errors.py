@@ -140,7 +140,15 @@ class HullEmptyError(RefusedError):
 
 
 class MisfitError(Exception):
-    """A batch is not of the kind that the hull takes; the message says what the hull has."""
+    """A batch is not of the kind that the hull takes.
+
+    Attributes:
+        field: the path of the field in the batch.
+    """
+
+    def __init__(self, field: str, reason: str) -> None:
+        super().__init__(reason)
+        self.field = field
 
 
 class HullUnsuitableError(RefusedError):
@@ -149,12 +157,14 @@ class HullUnsuitableError(RefusedError):
     Attributes:
         name: the name of the hull.
         point: the coordinates of the point for which the query is undefined; None if that is not the reason.
+        field: the field of the request that does not suit the hull; empty if the request as a whole does not.
     """
 
-    def __init__(self, name: str, reason: str, point: tuple[float, float] | None = None) -> None:
+    def __init__(self, name: str, reason: str, point: tuple[float, float] | None = None, *, field: str = "") -> None:
         super().__init__(f"the hull {name!r} {reason}")
         self.name = name
         self.point = point
+        self.field = field
 
 
 class RevisionForgottenError(RefusedError):

@@ -115,6 +115,22 @@ class ReadHull(Request):
 
 
 @dataclass(slots=True, eq=False)
+class ReadTogether(Request):
+    """Read several hulls at one moment. The result is the counts of each, and the value of `function` at their states.
+
+    Attributes:
+        parts: the hulls, each once.
+    """
+
+    parts: "list[Hull]"
+    function: "Callable[[list[HullState]], Any]"
+
+
+# Requests that wait in the queues of several hulls.
+Together = WriteTogether | ReadTogether
+
+
+@dataclass(slots=True, eq=False)
 class Expire(Request):
     """Remove the points of a hull that leave at `time`, by the server's clock. The result is their number.
 

@@ -110,7 +110,7 @@ class HullState:
         try:
             return self.contents.admit(write.make(), write.arrived)
         except MisfitError as misfit:
-            raise HullUnsuitableError(write.name, str(misfit)) from None
+            raise HullUnsuitableError(write.name, str(misfit), field=f"batch.{misfit.field}") from None
 
     def checked(self, write: "WriteBatch") -> Any:
         """The batch, if it can be applied; raises the error that refuses it. O(k log n)."""
@@ -133,15 +133,17 @@ class HullState:
                 expired = self.expire(clock, records)
         self.torn = True
         try:
-            applied, rows = contents.apply(batch, self.counts.revision + 1)
+            applied = contents.apply(batch, self.counts.revision + 1)
         except RefusedError:
             self.torn = False
             raise
         if write.producer:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
-        applied.expired = expired
+        if expired:
+            applied.expired = expired
         self._applied(applied.points, "batch", hull_changed=applied.hull_changed)
         if records is not None:
+            rows = contents.rows(batch, applied)
             records.append(Record(applied.revision, rows, write.producer, write.sequence, contents.clock))
         self.torn = False
         return applied

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from .batch import Applied, Batch, KeyedBatch
 from .errors import HullExistsError, HullNotFoundError
-from .events import CreateHull, DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
+from .events import CreateHull, DeleteHull, Expire, ReadHull, ReadTogether, Request, WriteBatch, WriteTogether
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
@@ -69,7 +69,7 @@ class Trip:
     """Runs requests in order. Clients see the changes only after the trip is committed.
 
     Args:
-        legs: the hulls: one, or those of the WriteTogether that are the requests.
+        legs: the hulls: one, or those of the requests to several hulls.
         requests: the requests to run.
         now: seconds on a monotonic clock.
         place: for a hull that the trip may create, or None.
@@ -114,6 +114,8 @@ class Trip:
                     self._write(request)
                 elif type(request) is WriteTogether:
                     self._write_together(request)
+                elif type(request) is ReadTogether:
+                    request.result = self._read_together(request)
                 else:
                     request.result = self._do(request, self.legs[0])
             except Exception as error:  # any error is the answer to the caller
@@ -184,6 +186,13 @@ class Trip:
             self.torn = any(hull.state.torn for hull in hulls)
         for leg, applied in zip(ordered, request.result, strict=True):
             self._count(leg, applied)
+
+    def _read_together(self, request: ReadTogether) -> object:
+        legs = {leg.name: leg for leg in self.legs}
+        for hull in request.parts:
+            if legs[hull.name].after is not hull:
+                raise HullNotFoundError(hull.name)
+        return [hull.state.counts for hull in request.parts], request.function([hull.state for hull in request.parts])
 
     def _count(self, leg: Leg, applied: Applied) -> None:
         if not applied.duplicate:

@@ -1,21 +1,37 @@
 """The times at which keys leave."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
 
 import numpy as np
-from sortedcontainers import SortedList
 
 from ..records import FOREVER, Times
 
 Key = str | int
+# Beyond twice the number of keys, rows of keys that have another deadline by now are dropped.
+MOST_SPARE_ROWS = 1024
+
+
+@dataclass(slots=True)
+class Group:
+    """Keys that were given the same deadline, and perhaps another one since."""
+
+    deadline: int
+    keys: list[Key] = field(default_factory=list)
 
 
 class Deadlines:
-    """The deadlines of keys, in microseconds since 1970. O(log n) a change."""
+    """The deadlines of keys, in microseconds since 1970. O(1) a key, O(log d) for each of d different deadlines.
+
+    A key that leaves or gets another deadline stays in its old group until that comes first or the groups are tidied.
+    """
 
     def __init__(self) -> None:
-        self._of: dict[Key, int] = {}
-        self._order: SortedList[tuple[int, Key]] = SortedList()
+        self._of: dict[Key, Group] = {}
+        self._groups: dict[int, Group] = {}
+        self._order: list[int] = []  # a heap of the groups' deadlines
+        self._rows = 0  # of all groups
 
     def __len__(self) -> int:
         return len(self._of)
@@ -27,38 +43,61 @@ class Deadlines:
     @property
     def first(self) -> int | None:
         """The earliest deadline, None if there is none."""
-        return self._order[0][0] if self._of else None
+        return self._order[0] if self._of else None
 
-    def set(self, key: Key, deadline: int) -> None:
-        """Give a key a deadline; FOREVER for none."""
-        self.drop(key)
-        if deadline != FOREVER:
-            self._of[key] = deadline
-            self._order.add((deadline, key))
+    def set(self, keys: Iterable[Key], deadlines: Iterable[int]) -> None:
+        """Give each key its deadline; FOREVER for none."""
+        for key, deadline in zip(keys, deadlines, strict=True):
+            if deadline == FOREVER:
+                self._of.pop(key, None)
+                continue
+            group = self._groups.get(deadline)
+            if group is None:
+                group = self._groups[deadline] = Group(deadline)
+                heappush(self._order, deadline)
+            if self._of.get(key) is not group:
+                self._of[key] = group
+                group.keys.append(key)
+                self._rows += 1
+        self._tidy()
 
-    def drop(self, key: Key) -> None:
-        """Forget the deadline of a key, if it has one."""
-        known = self._of.pop(key, None)
-        if known is not None:
-            self._order.remove((known, key))
-
-    def until(self, clock: int) -> list[Key]:
-        """The keys whose deadline has come at `clock`, without any change."""
-        keys = []
-        for deadline, key in self._order:
-            if deadline > clock:
-                break
-            keys.append(key)
-        return keys
+    def drop(self, keys: Iterable[Key]) -> None:
+        """Forget the deadlines of keys, if they have any."""
+        for key in keys:
+            self._of.pop(key, None)
+        self._tidy()
 
     def pop_until(self, clock: int) -> list[Key]:
         """Remove and return the keys whose deadline has come at `clock`."""
-        keys = self.until(clock)
-        for key in keys:
-            del self._of[key]
-        del self._order[: len(keys)]
-        return keys
+        ended: list[Key] = []
+        while self._order and self._order[0] <= clock:
+            group = self._groups.pop(heappop(self._order))
+            self._rows -= len(group.keys)
+            for key in group.keys:
+                if self._of.get(key) is group:
+                    del self._of[key]
+                    ended.append(key)
+        self._tidy()
+        return ended
 
     def of(self, keys: Iterable[Key]) -> Times:
         """The deadline of each key, FOREVER for a key without one."""
-        return np.array([self._of.get(key, FOREVER) for key in keys], np.int64)
+        groups = (self._of.get(key) for key in keys)
+        return np.array([FOREVER if group is None else group.deadline for group in groups], np.int64)
+
+    def _tidy(self) -> None:
+        """Make the earliest deadline that of a key, and drop the rows of other keys if there are many."""
+        while self._order:
+            first = self._groups[self._order[0]]
+            while first.keys and self._of.get(first.keys[-1]) is not first:
+                first.keys.pop()
+                self._rows -= 1
+            if first.keys:
+                break
+            del self._groups[heappop(self._order)]
+        if self._rows > 2 * len(self._of) + MOST_SPARE_ROWS:
+            for group in self._groups.values():
+                group.keys = [key for key in dict.fromkeys(group.keys) if self._of.get(key) is group]
+            self._groups = {deadline: group for deadline, group in self._groups.items() if group.keys}
+            self._order = sorted(self._groups)
+            self._rows = sum(len(group.keys) for group in self._groups.values())

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,20 @@ from dynhull import DuplicateKeyError, KeyedHull, Put
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys, key_list
 
-from ..admission import GREATEST_TIME, Admission, admit, server_clock, too_old
+from ..admission import GREATEST_TIME, Admission, admit, server_clock, shown, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
-from ..errors import KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
-from ..records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
+from ..errors import InvalidBatchError, KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
+from ..records import NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
 from .deadlines import Deadlines, Key
 from .live import REPLAYED_TOGETHER
 
 REMOVED = -1
+# Keys whose deadline has come are removed in parts of this size: reading a list of keys keeps other threads waiting.
+REMOVED_TOGETHER = 8192
 # Beyond twice the number of keys, deadlines of keys that have left are dropped.
 MOST_SPARE_DEADLINES = 1024
 KINDS = {"str": "strings", "int": "integers"}
+NOTHING_PUT = Put(0, 0, 0, 0, 0)
 
 
 @dataclass(slots=True)
@@ -101,15 +105,17 @@ class Keyed:
         """The batch with the times of its rows, without those that are too old."""
         if isinstance(batch, KeyedBatch):
             if batch.kind != self._kind:
-                raise MisfitError(f"has keys that are {KINDS[self._kind]}, not {KINDS[batch.kind]}")
+                raise MisfitError(batch.field, f"has keys that are {KINDS[self._kind]}, not {KINDS[batch.kind]}")
         elif len(batch.inserts) or len(batch.deletes):
-            raise MisfitError(f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them")
+            field = "inserts" if len(batch.inserts) else "deletes"
+            raise MisfitError(field, f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them")
         else:  # empty
             batch = KeyedBatch(self._kind, self._no_keys(), NO_POINTS, self._no_keys())
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
         admission = admit(self._settings, batch.times, len(batch.keys), "puts.times", arrived, self.clock)
         rows.times = admission.times
-        self._admit_deadlines(batch, rows, admission, arrived)
+        if self.clock is not None or batch.ttl is not None or batch.deadlines is not None:
+            self._admit_deadlines(batch, rows, admission, arrived)
         late = 0
         if admission.young is not None:
             _refuse_repeated(rows)
@@ -139,7 +145,7 @@ class Keyed:
         old = until is not None and self._earliest is not None and self._earliest <= until
         return clock if ends or old else None
 
-    def apply(self, admitted: Admitted, revision: int) -> tuple[Applied, KeyRows]:
+    def apply(self, admitted: Admitted, revision: int) -> Applied:
         """Apply the batch, or raise KeyRepeatedError or KeyMissingError."""
         rows, hull = admitted.rows, self.hull
         if len(rows.removes) and (len(rows.keys) or admitted.refuse_missing):
@@ -151,7 +157,7 @@ class Keyed:
             part = "puts.keys" if len(rows.keys) else "removes"
             raise KeyRepeatedError(error.key, (part, error.rows[0]), (part, error.rows[1])) from None
         self.clock = admitted.clock
-        applied = Applied(
+        return Applied(
             revision,
             put.new,
             removed,
@@ -166,7 +172,10 @@ class Keyed:
             evicted=evicted,
             clock=self.clock,
         )
-        return applied, rows
+
+    def rows(self, admitted: Admitted, _: Applied) -> KeyRows:
+        """The keys of an applied batch, without those that are too old."""
+        return admitted.rows
 
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays."""
@@ -230,8 +239,7 @@ class Keyed:
         if stored.times is not None:
             self._note_times(stored.times)
         if stored.deadlines is not None:
-            for key, deadline in zip(key_list(keys), stored.deadlines.tolist(), strict=True):
-                self._deadlines.set(key, deadline)
+            self._deadlines.set(key_list(keys), stored.deadlines.tolist())
 
     def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
         """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""
@@ -240,7 +248,7 @@ class Keyed:
         written = None
         if rows.deadlines is not None or len(self._deadlines):
             written = self._written(rows)
-        put = Put(0, 0, 0, 0, 0)
+        put = NOTHING_PUT
         if len(rows.keys):  # otherwise a hull by event time would ask for times
             put = hull.update(
                 rows.keys, rows.points, None if times is None else library_times(times), only=rows.condition
@@ -270,18 +278,16 @@ class Keyed:
         return written
 
     def _set_deadlines(self, rows: KeyRows, written: npt.NDArray[np.bool_]) -> None:
-        deadlines = [FOREVER] * len(rows.keys) if rows.deadlines is None else rows.deadlines.tolist()
-        for key, deadline, was_written in zip(key_list(rows.keys), deadlines, written.tolist(), strict=True):
-            if was_written:
-                self._deadlines.set(key, deadline)
-        for key in key_list(rows.removes):
-            self._deadlines.drop(key)
+        keys = list(compress(key_list(rows.keys), written.tolist()))
+        if rows.deadlines is None:
+            self._deadlines.drop(keys)
+        else:
+            self._deadlines.set(keys, rows.deadlines[written].tolist())
+        self._deadlines.drop(key_list(rows.removes))
         if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE_DEADLINES:
             keys = self._deadlines.keys()
             there = self._has(_of_kind(keys, rows.keys))
-            for key, is_there in zip(keys, there.tolist(), strict=True):
-                if not is_there:  # evicted, or too old before its deadline
-                    self._deadlines.drop(key)
+            self._deadlines.drop(compress(keys, (~there).tolist()))  # evicted, or too old before their deadline
 
     def _expire(self, until: int | None, clock: int) -> int:
         """Remove the points that leave. Returns their number."""
@@ -292,20 +298,23 @@ class Keyed:
             oldest = hull.oldest()
             self._earliest = None if oldest is None else int(oldest)
         ended = self._deadlines.pop_until(clock)
-        return leaving + (hull.remove_many(ended, missing="ignore") if ended else 0)
+        for first in range(0, len(ended), REMOVED_TOGETHER):
+            leaving += hull.remove_many(ended[first : first + REMOVED_TOGETHER], missing="ignore")
+        return leaving
 
     # Rules
 
     def _admit_deadlines(self, batch: KeyedBatch, rows: KeyRows, admission: Admission, arrived: int) -> None:
         """Set the deadlines of the rows, and the clock of a hull that has one because of them."""
-        limited = batch.ttl is not None or batch.deadlines is not None
-        if self._settings.window is None and (limited or self.clock is not None):
+        if self._settings.window is None:
             admission.clock = server_clock(self.clock, arrived)
-        if not limited:
-            return
         if batch.ttl is not None:
             start = arrived if self.follows_server else admission.clock
-            rows.deadlines = np.full(len(batch.keys), (start or 0) + batch.ttl, np.int64)
+            deadline = (start or 0) + batch.ttl
+            if deadline > GREATEST_TIME:
+                problem = f"leads to a time after {shown(GREATEST_TIME)}, the last one that a deadline can be"
+                raise InvalidBatchError("puts.ttl", f"{batch.ttl} microseconds", problem)
+            rows.deadlines = np.full(len(batch.keys), deadline, np.int64)
         if admission.clock is not None and rows.deadlines is not None:
             there = rows.deadlines > admission.clock
             if not there.all():

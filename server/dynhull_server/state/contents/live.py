@@ -51,12 +51,15 @@ class LiveContents(Protocol):
     def expires_before(self, admitted: Any) -> int | None:
         """The clock that the batch leads to, if points leave at that time; None if none do. The hull has a clock."""
 
-    def apply(self, admitted: Any, revision: int) -> tuple[Applied, Rows]:
-        """Apply the batch as `revision`. Returns its effect, and the rows that `replay` needs.
+    def apply(self, admitted: Any, revision: int) -> Applied:
+        """Apply the batch as `revision`. Returns its effect.
 
         Raises:
             RefusedError: the batch is refused; nothing has changed.
         """
+
+    def rows(self, admitted: Any, applied: Applied) -> Rows:
+        """The rows of an applied batch that `replay` needs."""
 
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays, and None is returned."""

@@ -30,14 +30,14 @@ class Multiset:
     def __init__(self, stored: Contents, most_points: int) -> None:
         self.hull = DynamicHull(stored.points)
         self._most_points = most_points
-        self._points = len(self.hull)
+        self._points, self._changes = len(self.hull), self.hull.changes
 
     def admit(self, batch: Batch | KeyedBatch, _: int) -> Batch:
         """The batch, or raise MisfitError or LimitExceededError."""
         if isinstance(batch, KeyedBatch):
-            raise MisfitError(NO_KEYS)
+            raise MisfitError(batch.field, NO_KEYS)
         if batch.times is not None:
-            raise MisfitError("has no window, so its points have no times")
+            raise MisfitError("insert_times", "has no window, so its points have no times")
         if self._points + batch.growth > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
         return batch
@@ -54,15 +54,18 @@ class Multiset:
         """None: no points leave."""
         return None
 
-    def apply(self, batch: Batch, revision: int) -> tuple[Applied, PointRows]:
+    def apply(self, batch: Batch, revision: int) -> Applied:
         """Apply the batch, or raise PointMissingError."""
         hull = self.hull
-        to_delete, changes = len(batch.deletes), hull.changes
+        to_delete, before = len(batch.deletes), self._changes
         deleted = apply_points(hull, batch)
         missing = to_delete - deleted
-        self._points = points = len(hull)
-        applied = Applied(revision, len(batch.inserts), deleted, missing, hull.changes != changes, points)
-        return applied, PointRows(batch.inserts, batch.deletes, missing > 0)
+        self._points, self._changes = len(hull), hull.changes
+        return Applied(revision, len(batch.inserts), deleted, missing, self._changes != before, self._points)
+
+    def rows(self, batch: Batch, applied: Applied) -> PointRows:
+        """The points of an applied batch."""
+        return PointRows(batch.inserts, batch.deletes, applied.missing > 0)
 
     def expire(self, _: int) -> Expiry | None:
         """None: no points leave."""
@@ -76,7 +79,7 @@ class Multiset:
             ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
             missing: Literal["raise", "ignore"] = "ignore" if group[0].lenient else "raise"
             self.hull.apply(ops, np.concatenate([inserts, deletes]), missing)
-        self._points = len(self.hull)
+        self._points, self._changes = len(self.hull), self.hull.changes
 
     def stored(self) -> Contents:
         """The points. O(n)."""

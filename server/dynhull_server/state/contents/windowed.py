@@ -73,7 +73,7 @@ class Windowed:
     def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
         """The batch with the times of its inserts, without those that are too old."""
         if isinstance(batch, KeyedBatch):
-            raise MisfitError(NO_KEYS)
+            raise MisfitError(batch.field, NO_KEYS)
         rows, moves = len(batch.inserts), batch.moves
         if moves and not self.follows_server:
             problem = "event times drive the clock of this hull, and moves have none: delete and insert instead"
@@ -107,13 +107,13 @@ class Windowed:
         oldest = None if until is None else self.hull.oldest
         return admitted.clock if until is not None and oldest is not None and oldest <= until else None
 
-    def apply(self, admitted: Admitted, revision: int) -> tuple[Applied, PointRows]:
+    def apply(self, admitted: Admitted, revision: int) -> Applied:
         """Apply the batch, or raise PointMissingError."""
         hull, batch = self.hull, admitted.batch
         changes, evicted = hull.changes, hull.evicted
         missing = self._carry_out(batch, admitted.times)
         self.clock = admitted.clock
-        applied = Applied(
+        return Applied(
             revision,
             len(batch.inserts),
             len(batch.deletes) - missing,
@@ -125,7 +125,11 @@ class Windowed:
             evicted=hull.evicted - evicted,
             clock=self.clock,
         )
-        return applied, PointRows(batch.inserts, batch.deletes, missing > 0, admitted.times)
+
+    def rows(self, admitted: Admitted, applied: Applied) -> PointRows:
+        """The points of an applied batch, with the times of the inserts."""
+        batch = admitted.batch
+        return PointRows(batch.inserts, batch.deletes, applied.missing > 0, admitted.times)
 
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays."""

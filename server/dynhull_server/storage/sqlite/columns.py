@@ -23,9 +23,9 @@ def time_bytes(times: Times) -> bytes:
 
 def key_bytes(keys: Keys) -> bytes:
     """Integers as 8 n bytes; strings as n bytes with their lengths, then their UTF-8."""
-    if isinstance(keys, PackedKeys):
-        return keys.lengths + keys.data
-    return np.ascontiguousarray(keys, UNSIGNED).tobytes()
+    if isinstance(keys, np.ndarray):
+        return np.ascontiguousarray(keys, UNSIGNED).tobytes()
+    return keys.lengths + keys.data
 
 
 class Cursor:

@@ -8,7 +8,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator
 
-from dynhull.keys import PackedKeys
+import numpy as np
 
 from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows
 from .columns import Cursor, key_bytes, point_bytes, time_bytes
@@ -17,6 +17,8 @@ from .columns import Cursor, key_bytes, point_bytes, time_bytes
 # number; the length of the producer's name; the flags.
 HEADER = struct.Struct("<IIQHB")
 TIME = struct.Struct("<q")
+MOST_NUMBERS = 6  # in the key of a row
+NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
 KINDS = 48  # the flags with the kind of the rows
@@ -52,7 +54,7 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
 
 def checksum(payload: bytes, *keys: int) -> int:
     """CRC-32 of a payload and its keys, so that a row in the place of another is noticed too."""
-    return zlib.crc32(struct.pack(f"<{len(keys)}q", *keys), zlib.crc32(payload))
+    return zlib.crc32(NUMBERS[len(keys)].pack(*keys), zlib.crc32(payload))
 
 
 def weight(stored: int, *keys: int) -> int:
@@ -78,15 +80,17 @@ def _encoded(rows: Rows) -> tuple[int, int, int, list[bytes]]:
 
 
 def _encoded_keys(rows: KeyRows) -> tuple[int, list[bytes]]:
-    strings = isinstance(rows.keys, PackedKeys)
-    if isinstance(rows.removes, PackedKeys) != strings:
+    strings = not isinstance(rows.keys, np.ndarray)
+    if isinstance(rows.removes, np.ndarray) == strings:
         raise TypeError("the keys to put and to remove are of different kinds")
     flags = (STRINGS if strings else INTEGERS) | CONDITIONS[rows.condition]
     columns = [key_bytes(rows.keys), key_bytes(rows.removes), point_bytes(rows.points)]
-    for flag, times in ((HAS_TIMES, rows.times), (HAS_DEADLINES, rows.deadlines)):
-        if times is not None:
-            flags |= flag
-            columns.append(time_bytes(times))
+    if rows.times is not None:
+        flags |= HAS_TIMES
+        columns.append(time_bytes(rows.times))
+    if rows.deadlines is not None:
+        flags |= HAS_DEADLINES
+        columns.append(time_bytes(rows.deadlines))
     return flags, columns
 
 

@@ -37,7 +37,7 @@ class Totals(NamedTuple):
     def plus(self, hulls: int, batches: int, checksums: int) -> Self:
         """The totals after adding rows or, with negative numbers, removing them."""
         total = (self.sum + checksums) % 2**SUM_BITS
-        return self._replace(hulls=self.hulls + hulls, batches=self.batches + batches, sum=total)
+        return type(self)(self.commits, self.hulls + hulls, self.batches + batches, total, self.next_number, self.mode)
 
     @property
     def row(self) -> tuple[int, ...]:
