@@ -94,8 +94,8 @@ contract: .venv/.check  ## with a release: the contract that later ones must not
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics
 
-robustness: .venv/.test  ## kill, starve and damage servers, leave calls, flip bits, while models check every promise
-	$(BIN)/python tests/robustness/server/torture.py --faults 99
+robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, leave calls, flip bits, while models check every promise
+	$(BIN)/python tests/robustness/server/torture.py --faults 100
 	$(BIN)/python tests/robustness/server/callers.py --calls 10000 --kills 5
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What the tests talk to and pip cannot install: a real Prometheus and browser, systemd's checks, and a gRPC client in
-# another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
+# What the tests talk to and pip cannot install: a real Prometheus and browser, systemd's checks, a clock that can be
+# set back, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
 # that need what is missing are skipped, and say so.
 set -uo pipefail
 cd "$(dirname "$0")"
@@ -11,6 +11,7 @@ packages=()
 command -v prometheus >/dev/null && command -v promtool >/dev/null || packages+=(prometheus)
 command -v chromium >/dev/null || packages+=(chromium)
 command -v systemd-analyze >/dev/null || packages+=(systemd)
+command -v faketime >/dev/null || packages+=(faketime)
 command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
 if [ ${#packages[@]} -gt 0 ]; then

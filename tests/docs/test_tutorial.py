@@ -17,7 +17,7 @@ def start(program: Path, *options: str) -> "subprocess.Popen[str]":
 def test_the_fence_follows_the_fleet(take_program: Callable[[str, str], Path]) -> None:
     fly, fence = (take_program("tutorial", title) for title in ("fly.py", "fence.py"))
     with server_process() as server:
-        fleet = start(fly, "--address", server.address, "--minutes", "200", "--pause", "0.02")
+        fleet = start(fly, "--address", server.address, "--minutes", "90", "--pause", "0.02")
         assert fleet.stdout.read(3) == "\n00"  # the hull is there
         alarm = start(fence, "--address", server.address, "--events", "20")
         printed, errors = alarm.communicate(timeout=PATIENCE)

@@ -2,10 +2,12 @@
 
     python tests/robustness/server/callers.py --calls 10000 --kills 5
 
-Batches are single points, each another one on a parabola, so the count of a point says whether its batch is there.
+Batches are single points, each another one on a parabola, so the count of a point says whether its batch is there. In
+one hull the points have keys.
 
 * Of the hulls that no caller deletes: an acknowledged batch is there once, over every kill; a refused one is not; one
-  whose caller disconnected is there once or not at all, and does not change once a reader has seen it.
+  whose caller disconnected is there once or not at all, and does not change once a reader has seen it. Batches that
+  one call applies to two hulls are in both or in none.
 * Of the hulls that are created and deleted all the time: at the end each can be created, written, read and deleted.
 * Others write to another hull meanwhile: every one of their batches is acknowledged.
 """
@@ -23,13 +25,15 @@ from pathlib import Path
 
 import grpc
 import numpy as np
+from promises import BrokenPromiseError, require
 
-from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
-KEPT = ["kept/a", "kept/b", "kept/c", "kept/d"]
+KEYED = "kept/keys"
+KEPT = ["kept/a", "kept/b", "kept/c", KEYED]
 CHURNED = ["churned/a", "churned/b", "churned/c"]
 STEADY = "steady"
 CALLERS = 24
@@ -47,19 +51,16 @@ REFUSED = {
 }
 
 
-class BrokenPromiseError(AssertionError):
-    """The server did what it says it never does."""
+def batch_of(name: str, number: int) -> batch_pb2.Batch:
+    point = points_pb2.Points(packed=np.array([number, float(number) ** 2]).tobytes())
+    if name != KEYED:
+        return batch_pb2.Batch(inserts=point)
+    return batch_pb2.Batch(puts=batch_pb2.Puts(keys=points_pb2.Keys(integers=[number]), points=point))
 
 
-def require(condition: object, what: str) -> None:
-    if not condition:
-        raise BrokenPromiseError(what)
-
-
-def batch_of(number: int) -> batch_pb2.Batch:
-    batch = batch_pb2.Batch()
-    batch.inserts.packed = np.array([number, float(number) ** 2]).tobytes()
-    return batch
+def creation_of(name: str) -> pb.CreateHullRequest:
+    identity = hull_pb2.IDENTITY_INTEGER_KEYS if name == KEYED else hull_pb2.IDENTITY_MULTISET
+    return pb.CreateHullRequest(name=name, config=hull_pb2.HullConfig(identity=identity))
 
 
 class Server:
@@ -93,10 +94,17 @@ class Model:
     def __init__(self) -> None:
         self.numbers = count(1)
         self.batches: dict[str, dict[int, bool | None]] = {name: {} for name in (*KEPT, STEADY)}
+        self.together: list[tuple[str, str, int]] = []  # the same batch in two hulls
 
     def new(self, name: str) -> int:
         number = next(self.numbers)
         self.batches.get(name, {})[number] = None
+        return number
+
+    def new_together(self, one: str, other: str) -> int:
+        number = self.new(one)
+        self.batches[other][number] = None
+        self.together.append((one, other, number))
         return number
 
     def answered(self, name: str, number: int, applied: bool) -> None:
@@ -142,6 +150,8 @@ class Callers:
             self.calls += 1
             name = self._random.choice(KEPT * 2 + CHURNED * 3)
             make = self._random.choice([self._apply, self._apply, self._stream, self._create, self._read, self._watch])
+            if name in KEPT and self._random.random() < 0.15:
+                make = self._together
             if name in CHURNED and self._random.random() < 0.3:
                 make = self._delete
             doing = asyncio.create_task(make(stub, name))
@@ -162,7 +172,7 @@ class Callers:
     async def _apply(self, stub: HullServiceStub, name: str) -> None:
         number = self._model.new(name)
         try:
-            await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(number)))
+            await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(name, number)))
         except grpc.RpcError as error:
             if error.code() in REFUSED:
                 self._model.answered(name, number, applied=False)
@@ -170,12 +180,27 @@ class Callers:
         self._model.answered(name, number, applied=True)
         self.acknowledged += 1
 
+    async def _together(self, stub: HullServiceStub, name: str) -> None:
+        names = name, self._random.choice([other for other in KEPT if other != name])
+        number = self._model.new_together(*names)
+        batches = [pb.HullBatch(name=each, batch=batch_of(each, number)) for each in names]
+        try:
+            await stub.ApplyTogether(pb.ApplyTogetherRequest(batches=batches))
+        except grpc.RpcError as error:
+            if error.code() in REFUSED:
+                for each in names:
+                    self._model.answered(each, number, applied=False)
+            raise
+        for each in names:
+            self._model.answered(each, number, applied=True)
+        self.acknowledged += 1
+
     async def _stream(self, stub: HullServiceStub, name: str) -> None:
         numbers = [self._model.new(name) for _ in range(STREAMED)]
 
         async def requests():
             for number in numbers:
-                yield pb.StreamRequest(name=name, batch=batch_of(number))
+                yield pb.StreamRequest(name=name, batch=batch_of(name, number))
 
         call = stub.Stream(requests())
         try:
@@ -187,7 +212,7 @@ class Callers:
             call.cancel()
 
     async def _create(self, stub: HullServiceStub, name: str) -> None:
-        await stub.CreateHull(pb.CreateHullRequest(name=name))
+        await stub.CreateHull(creation_of(name))
 
     async def _delete(self, stub: HullServiceStub, name: str) -> None:
         await stub.DeleteHull(pb.DeleteHullRequest(name=name))
@@ -206,7 +231,7 @@ class Callers:
     async def _write_steadily(self, stub: HullServiceStub) -> None:
         while True:
             number = self._model.new(STEADY)
-            await stub.Apply(pb.ApplyRequest(name=STEADY, batch=batch_of(number)), timeout=PATIENCE)
+            await stub.Apply(pb.ApplyRequest(name=STEADY, batch=batch_of(STEADY, number)), timeout=PATIENCE)
             self._model.answered(STEADY, number, applied=True)
             self.steady += 1
 
@@ -227,6 +252,9 @@ class Callers:
                 require(known is not True or times == 1, f"{name}: batch {number} was acknowledged and is lost")
                 require(known is not False or times == 0, f"{name}: batch {number} was refused and is there")
                 batches[number] = times == 1
+        for one, other, number in self._model.together:
+            both = self._model.batches[one][number] == self._model.batches[other][number]
+            require(both, f"batch {number} of one call is there in {one} or {other}, not in both")
 
     async def _probe(self, stub: HullServiceStub) -> None:
         """No zombies: every name can be deleted, created, written, read and deleted."""
@@ -235,8 +263,8 @@ class Callers:
                 await stub.DeleteHull(pb.DeleteHullRequest(name=name), timeout=PATIENCE)
             except grpc.RpcError as error:
                 require(error.code() == grpc.StatusCode.NOT_FOUND, f"{name}: {error.details()}")
-            await stub.CreateHull(pb.CreateHullRequest(name=name), timeout=PATIENCE)
-            await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(1)), timeout=PATIENCE)
+            await stub.CreateHull(creation_of(name), timeout=PATIENCE)
+            await stub.Apply(pb.ApplyRequest(name=name, batch=batch_of(name, 1)), timeout=PATIENCE)
             hull = (await stub.GetHull(pb.GetHullRequest(name=name), timeout=PATIENCE)).hull
             require((hull.revision, hull.point_count) == (1, 1), f"{name} holds another hull's points: {hull}")
             await stub.DeleteHull(pb.DeleteHullRequest(name=name), timeout=PATIENCE)

@@ -20,7 +20,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
-from multiprocessing import Pool
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -327,7 +327,8 @@ def run(folder: Path, count: int, seed: int, processes: int, every: int = 1) -> 
     work = ((root, scratch, built[flip.folder], flip, number) for number, flip in enumerate(flips))
     counts: Counter[str] = Counter()
     faults = []
-    with Pool(processes) as pool:
+    # A forked process would wait for the threads of gRPC, which a program around this one may have started.
+    with get_context("spawn").Pool(processes) as pool:
         for flip, what, words in pool.imap_unordered(tried, work, chunksize=16):
             counts[what] += 1
             if what in FAULTS:
