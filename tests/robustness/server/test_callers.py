@@ -1,9 +1,7 @@
 """A short run of `callers.py`."""
 
-import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parent))
 from callers import callers
 
 
