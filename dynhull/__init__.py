@@ -4,6 +4,7 @@ from sys import modules as _modules
 
 from . import _hull, static
 from ._entities import DuplicateKeyError, MissingKeyError
+from ._fence_index import Crossings, FenceIndex
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
 from ._keyed import KeyedHull, Put
@@ -13,8 +14,10 @@ from .static import convex_hull
 
 __all__ = [
     "KERNEL",
+    "Crossings",
     "DuplicateKeyError",
     "DynamicHull",
+    "FenceIndex",
     "KeyedHull",
     "MissingKeyError",
     "MissingPointError",
@@ -38,6 +41,16 @@ def __getattr__(name: str) -> str:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-for _public in (DynamicHull, MissingPointError, KeyedHull, DuplicateKeyError, MissingKeyError, Put, WindowHull):
+for _public in (
+    DynamicHull,
+    MissingPointError,
+    KeyedHull,
+    DuplicateKeyError,
+    MissingKeyError,
+    Put,
+    FenceIndex,
+    Crossings,
+    WindowHull,
+):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

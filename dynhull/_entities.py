@@ -10,6 +10,7 @@ import heapq
 import math
 from collections import Counter
 from typing import TYPE_CHECKING, Any, Literal, Self
+from weakref import ref
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from .arrays import as_coordinate, as_points, as_tuples
 from .keys import PackedKeys, as_key, as_keys, key_list
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     import numpy.typing as npt
 
@@ -31,6 +32,7 @@ Key = str | int
 Only = Literal["absent", "present"]
 NEEDED_IF_ORDERED = "is None: a hull with ordered=True needs a time with every put"
 Counts = tuple[int, int, int, int, int]  # of a batch's rows: new, moved, unmoved, stale, skipped
+REMOVED, EXPIRED = 8, 16  # why an entity is gone
 
 
 class DuplicateKeyError(ValueError):
@@ -69,6 +71,28 @@ class MissingKeyError(KeyError):
         return f"{where}the key {self.key!r} is missing; nothing was changed"
 
 
+def _no_journal() -> None:
+    return None
+
+
+class Journal:
+    """What has changed since it was last cleared.
+
+    Attributes:
+        before: the place of each key then that has been put or removed since; None if it was not there.
+        gone: why each key that has been removed was removed last: REMOVED or EXPIRED.
+    """
+
+    def __init__(self) -> None:
+        self.before: dict[Key, Point | None] = {}
+        self.gone: dict[Key, int] = {}
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.before.clear()
+        self.gone.clear()
+
+
 class Entities(HullTree):
     """Entities and the convex hull of their points.
 
@@ -80,9 +104,11 @@ class Entities(HullTree):
         self.key_type: KeyType = key_type
         self.ordered = ordered
         self._held: dict[Key, tuple[Point, float]] = {}  # place and time of each key
+        self._journal_of: Callable[[], Journal | None] = _no_journal
 
     def clear(self) -> None:
         """Remove every entity."""
+        self._note_gone(self._held, REMOVED)
         super().clear()
         self._held.clear()
 
@@ -129,7 +155,9 @@ class Entities(HullTree):
     def remove(self, key: Any) -> bool:
         """Remove one entity. True if the hull changed; MissingKeyError if there is none. O(log² n)."""
         p, _ = self._entity(key)
-        del self._held[as_key(key, self.key_type)]
+        checked = as_key(key, self.key_type)
+        self._note_gone([checked], REMOVED)
+        del self._held[checked]
         return self.delete(*p)
 
     def remove_many(self, keys: Any, ignore_missing: bool) -> int:
@@ -144,12 +172,12 @@ class Entities(HullTree):
             for row, key in enumerate(rows):
                 if key not in self._held:
                     raise MissingKeyError(key, row)
-        return self._remove_all([key for key in rows if key in self._held])
+        return self._remove_all([key for key in rows if key in self._held], REMOVED)
 
     def expire(self, until: float) -> int:
         """Remove every entity with a time of at most `until`, as one batch. Returns their number. O(n)."""
         moment = as_time(until, "until")
-        return self._remove_all([key for key, (_, time) in self._held.items() if time <= moment])
+        return self._remove_all([key for key, (_, time) in self._held.items() if time <= moment], EXPIRED)
 
     def evict(self, count: int) -> int:
         """Remove the `count` oldest entities, those without a time first, ties by key. Returns their number. O(n)."""
@@ -158,7 +186,7 @@ class Entities(HullTree):
             time = self._held[key][1]
             return (False, 0.0, key) if math.isnan(time) else (True, time, key)
 
-        return self._remove_all(heapq.nsmallest(count, self._held, key=age))
+        return self._remove_all(heapq.nsmallest(count, self._held, key=age), EXPIRED)
 
     def _put_rows(self, keys: Keys, points: Points, times: npt.NDArray[np.float64] | None, only: Only | None) -> Counts:
         rows = distinct(keys)
@@ -187,18 +215,49 @@ class Entities(HullTree):
                 net[p] += 1
             changed[key] = p, time
         self._apply_net(net)
+        self._note(changed)
         self._held.update(changed)
         return new, moved, unmoved, stale, skipped
 
-    def _remove_all(self, keys: Sequence[Key]) -> int:
+    def _remove_all(self, keys: Sequence[Key], cause: int) -> int:
         """Remove the entities of different keys that are there."""
+        self._note_gone(keys, cause)
         net: Counter[Point] = Counter()
         for key in keys:
             net[self._held.pop(key)[0]] -= 1
         self._apply_net(net)
         return len(keys)
 
+    # The journal
+
+    def attach(self, journal: Journal) -> None:
+        """Write every change into a journal, as long as somebody keeps it. ValueError if there is one already."""
+        if self._journal_of() is not None:
+            raise ValueError("subjects has an index of fences already: detach it first")
+        self._journal_of = ref(journal)
+
+    def detach(self, journal: Journal) -> None:
+        """Write into this journal no longer."""
+        if self._journal_of() is journal:
+            self._journal_of = _no_journal
+
+    def _note(self, keys: Iterable[Key]) -> None:
+        """Note the places of keys that are about to change."""
+        if (journal := self._journal_of()) is not None:
+            for key in keys:
+                held = self._held.get(key)
+                journal.before.setdefault(key, None if held is None else held[0])
+
+    def _note_gone(self, keys: Iterable[Key], cause: int) -> None:
+        self._note(keys)
+        if (journal := self._journal_of()) is not None:
+            journal.gone.update(dict.fromkeys(keys, cause))
+
     # Reading
+
+    def places(self) -> dict[Key, Point]:
+        """The place of each key. O(n)."""
+        return {key: p for key, (p, _) in self._held.items()}
 
     def has(self, key: Any) -> bool:
         """Whether there is an entity of the key. O(1)."""

@@ -1,0 +1,309 @@
+"""FenceIndex: many areas against the entities of a keyed hull, and who crosses their boundaries."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._entities import Entities
+from ._fences import Fences
+from ._predicates import orient2d
+from ._rings import as_polygons
+from ._value import Value
+from .arrays import as_coordinate, as_points
+from .keys import Keys, PackedKeys, as_keys
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from ._keyed import KeyedHull
+    from .arrays import Points
+    from .keys import KeyType
+
+LEAST_FENCE, GREATEST_FENCE = -(2**63), 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Crossings(Value):
+    """Who crossed which fence between two states of a hull: n rows, in the order of fences, then of keys.
+
+    Attributes:
+        fences: (n,) numbers of fences.
+        changes: (n,) +1 entered; -1 left; 0 crossed: outside before and after, but the straight way between meets the
+            area as it is now.
+        causes: (n,) sums of `MOVED` (the subject changed its place), `AREA` (the area changed), `APPEARED` (the key is
+            new), `REMOVED` (the key was removed) and `EXPIRED` (the key left by `expire` or `evict`).
+        keys: n keys, `PackedKeys` or an array of uint64.
+        points: (n, 2) places now; NaN if the key is gone.
+        previous: (n, 2) places before; NaN if the key is new.
+        distances: (n,) distances of the places now to the area now, each the exact value rounded once: 0.0 inside and
+            on the boundary, inf from an empty area, NaN if the key is gone.
+    """
+
+    MOVED = 1
+    AREA = 2
+    APPEARED = 4
+    REMOVED = 8
+    EXPIRED = 16
+
+    fences: npt.NDArray[np.int64]
+    changes: npt.NDArray[np.int8]
+    causes: npt.NDArray[np.uint8]
+    keys: Keys
+    points: Points
+    previous: Points
+    distances: npt.NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """The number of rows."""
+        return len(self.fences)
+
+
+def _no_crossings(key_type: KeyType) -> Crossings:
+    return Crossings(
+        np.empty(0, np.int64),
+        np.empty(0, np.int8),
+        np.empty(0, np.uint8),
+        PackedKeys.pack([]) if key_type == "str" else np.empty(0, np.uint64),
+        np.empty((0, 2)),
+        np.empty((0, 2)),
+        np.empty(0),
+    )
+
+
+NO_CROSSINGS = {"str": _no_crossings("str"), "int": _no_crossings("int")}
+
+
+class FenceIndex:
+    """Fences, each a number and an area, and which subjects are inside: the entities of a keyed hull. Exact.
+
+    The hull keeps the index informed from now on: every change of the hull is seen by the next `take`, which returns
+    the crossings since the last one. Only the states before and after count. A subject enters at the area, and leaves
+    when it is farther than the fence's margin from it.
+
+    Args:
+        subjects: the hull whose entities are the subjects. A hull has one index at a time. A copy of it has none.
+
+    Raises:
+        ValueError: the hull has an index already.
+
+    A subject that stays away from all boundaries costs O(1) a move, others O(log n) for each fence nearby. A new or
+    changed area costs O(log n) for each of its edges that changed, and for each subject near those. The implementation
+    in Python looks at every changed subject for every fence.
+
+    Areas are closed (their boundary belongs to them) or open. The methods that set one take
+
+    * fence: any integer of 64 bits; the area of a fence that is there is replaced;
+    * closed: whether a subject on the boundary is inside;
+    * margin: how far outside of the area a subject that is inside has to be to leave; finite, not negative;
+    * cross: whether `take` reports subjects that pass through, outside before and after;
+    * inside: for a fence restored, the keys that are inside, in any order; those that are not there are ignored. None
+      for a new fence: a subject is inside if it is in the area, whatever the margin; and for a replaced area: the
+      subjects that were inside.
+
+    The first state of a new fence is decided at once and is no crossing. Where the keys inside are given, what
+    contradicts them is reported by the next `take`, as when an area is replaced.
+    """
+
+    __slots__ = ("_fences", "_subjects")
+
+    def __init__(self, subjects: KeyedHull) -> None:
+        tree = subjects._tree
+        if not isinstance(tree, Entities):
+            raise TypeError("subjects is a hull of the kernel: fences need DYNHULL_KERNEL=python")
+        self._subjects = subjects
+        self._fences = Fences(tree)
+
+    def detach(self) -> None:
+        """Let the hull forget the index, which sees no more of its changes."""
+        self._fences.detach()
+
+    # Areas
+
+    def set_polygons(
+        self,
+        fence: int,
+        polygons: Any,
+        *,
+        closed: bool = True,
+        margin: float = 0.0,
+        cross: bool = False,
+        inside: Any = None,
+    ) -> None:
+        """Set the area to polygons with holes, joined by "or". All rings are boundary.
+
+        Args:
+            fence: the number.
+            polygons: polygons, each a sequence of rings, the exterior first, then holes; each ring (k, 2) array-like,
+                in either direction, with or without the first corner at its end. Edges of a polygon may touch at their
+                ends, but those of a ring only its neighbours.
+            closed: see above, as the others.
+            margin: see above.
+            cross: see above.
+            inside: see above.
+
+        Raises:
+            ValueError: a ring has fewer than three corners, no area, edges that cross or overlap, or is a hole that is
+                not inside its exterior or overlaps another; a coordinate is not finite; the margin is bad. The message
+                names the polygon and the ring. Nothing has changed.
+        """
+        self._fences.set_polygons(
+            _number(fence),
+            as_polygons(polygons),
+            bool(closed),
+            _length(margin, "margin"),
+            bool(cross),
+            self._keys(inside),
+        )
+
+    def set_circle(
+        self,
+        fence: int,
+        x: float,
+        y: float,
+        radius: float,
+        *,
+        closed: bool = True,
+        margin: float = 0.0,
+        cross: bool = False,
+        inside: Any = None,
+    ) -> None:
+        """Set the area to a disk: all points whose distance from (x, y) is at most, if open below, the radius.
+
+        Raises:
+            ValueError: a coordinate is not finite, or the radius or the margin is negative. Nothing has changed.
+        """
+        self._fences.set_circle(
+            _number(fence),
+            as_coordinate(x, "x"),
+            as_coordinate(y, "y"),
+            _length(radius, "radius"),
+            bool(closed),
+            _length(margin, "margin"),
+            bool(cross),
+            self._keys(inside),
+        )
+
+    def set_hull(
+        self,
+        fence: int,
+        vertices: npt.ArrayLike,
+        *,
+        closed: bool = True,
+        margin: float = 0.0,
+        cross: bool = False,
+        without_self: bool = False,
+        inside: Any = None,
+    ) -> None:
+        """Set the area to a convex polygon. To be called again with all vertices when it has changed.
+
+        Args:
+            fence: the number.
+            vertices: (h, 2) as `vertices` of a hull returns them: counter-clockwise from the least, strictly convex.
+                No vertices: an empty area. One or two: a point or a segment, which hold what lies on them if closed.
+            closed: see above, as the others.
+            margin: see above.
+            cross: see above.
+            without_self: the area is the hull of the subjects themselves, at any time: `vertices` are not read, and
+                the fence need not be set again. A subject is compared with the hull of the others, so that one that
+                is a vertex leaves when it is farther from them than the margin, which must be positive.
+            inside: see above.
+
+        Raises:
+            ValueError: the vertices are not those of a convex polygon, or not finite; the margin is bad; or
+                `without_self` without a margin or with an open area. Nothing has changed.
+        """
+        number, corners, distance = _number(fence), as_points(vertices, "vertices"), _length(margin, "margin")
+        if without_self and not distance > 0:
+            raise ValueError(
+                "margin is 0.0: without_self needs a positive margin, as no vertex is inside of the others"
+            )
+        if without_self and not closed:
+            raise ValueError("closed is False: with without_self the area is closed")
+        if not without_self:
+            _require_convex(corners)
+        self._fences.set_hull(
+            number, corners, bool(closed), distance, bool(cross), bool(without_self), self._keys(inside)
+        )
+
+    def drop(self, fence: int) -> Keys:
+        """Remove a fence. Returns the keys that were inside, ascending, as `inside` does."""
+        return self._fences.drop(self._present(fence))
+
+    # Reading
+
+    def inside(self, fence: int) -> Keys:
+        """The keys inside at the last `take` or when the fence was set, ascending: `PackedKeys` or uint64.
+
+        Raises:
+            KeyError: there is no such fence.
+        """
+        return self._fences.inside(self._present(fence))
+
+    def count(self, fence: int) -> int:
+        """The number of keys inside, like `inside`. O(1)."""
+        return self._fences.count(self._present(fence))
+
+    def __contains__(self, fence: object) -> bool:
+        """Whether there is a fence of this number."""
+        return isinstance(fence, int | np.integer) and self._fences.has(int(fence))
+
+    def __len__(self) -> int:
+        """The number of fences."""
+        return len(self._fences)
+
+    def take(self) -> Crossings:
+        """The crossings since the last `take`: of each fence and subject what differs between then and now.
+
+        A key that was removed and put again has moved. A key that is gone leaves the fences that it was inside of.
+        O(1) if nothing has come near a boundary and no area has changed.
+
+        Raises:
+            MemoryError: memory does not suffice. No crossing is lost: the next call returns it.
+        """
+        taken = self._fences.take()
+        return NO_CROSSINGS[self._subjects.key_type] if taken is None else Crossings(*taken)
+
+    def _keys(self, inside: Any) -> Keys | None:
+        return None if inside is None else as_keys(inside, self._subjects.key_type, "inside")
+
+    def _present(self, fence: int) -> int:
+        number = _number(fence)
+        if not self._fences.has(number):
+            raise KeyError(f"there is no fence {number}")
+        return number
+
+
+def _number(fence: int) -> int:
+    number = operator.index(fence)
+    if not LEAST_FENCE <= number <= GREATEST_FENCE:
+        raise ValueError(f"fence is {number}: must be an integer of 64 bits")
+    return number
+
+
+def _length(value: float, name: str) -> float:
+    length = as_coordinate(value, name)
+    if length < 0:
+        raise ValueError(f"{name} is {length!r}: must not be negative")
+    return length
+
+
+def _require_convex(vertices: Points) -> None:
+    """Raise ValueError unless these are what `vertices` of a hull may return. O(h)."""
+    if len(vertices) < 2:
+        return
+    after = np.roll(vertices, -1, axis=0)
+    ascends = (vertices[:, 0] < after[:, 0]) | ((vertices[:, 0] == after[:, 0]) & (vertices[:, 1] < after[:, 1]))
+    last = max(int(np.argmin(ascends)), 1)  # the greatest vertex, if the chains go up to it and back down
+    turns = np.asarray(orient2d(vertices, after, np.roll(vertices, -2, axis=0)))
+    wrong = np.flatnonzero(ascends != (np.arange(len(vertices)) < last))
+    if len(vertices) > 2:
+        wrong = np.concatenate([wrong, np.flatnonzero(turns <= 0)])
+    if wrong.size:
+        row = int(wrong.min())
+        raise ValueError(
+            f"vertices row {row} is {vertices[row].tolist()}: not those of a hull, counter-clockwise from the least"
+        )

@@ -1,0 +1,213 @@
+"""Polygons as callers give them: rings of corners, checked exactly before they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ._exact import exact
+from ._predicates import Point, orient2d
+from .arrays import as_points, as_tuples, repr_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from fractions import Fraction
+
+    import numpy.typing as npt
+
+    from ._exact import Exact
+    from .arrays import Points
+
+    Signs = npt.NDArray[np.int8]
+    Rows = npt.NDArray[np.intp]
+
+CORNERS_OF_A_RING = 3  # at least
+PAIRS_AT_A_TIME = 1 << 18  # of edges: bounds the memory of a check
+
+
+class _Edges(NamedTuple):
+    """The edges of all rings of a polygon: ends, ring, number in the ring, and the ring's number of edges."""
+
+    a: Points
+    b: Points
+    ring: Rows
+    number: Rows
+    size: Rows
+
+
+def as_polygons(polygons: Any) -> list[list[Points]]:
+    """Polygons as lists of rings, exterior first: (k, 2) arrays without repeated corners, the closing one included.
+
+    Args:
+        polygons: polygons, each a sequence of rings, each a (k, 2) array-like of corners in either direction.
+
+    Raises:
+        ValueError: there is no polygon, or a ring is not valid. The message names polygon, ring and reason.
+        TypeError: an argument is not a sequence, or a coordinate is not a number.
+
+    O(k log k) for k corners if few edges overlap in x, at worst O(k²).
+    """
+    checked = [
+        _as_polygon(polygon, f"polygon {number}") for number, polygon in enumerate(_sequence(polygons, "polygons"))
+    ]
+    if not checked:
+        raise ValueError("polygons must hold at least one polygon, got none")
+    return checked
+
+
+def _sequence(values: Any, name: str) -> Iterable[Any]:
+    if isinstance(values, str | bytes | dict) or not isinstance(values, Iterable):
+        raise TypeError(f"{name} must be a sequence, got {repr_of(values)}")
+    return values
+
+
+def _as_polygon(polygon: Any, name: str) -> list[Points]:
+    rings = [_as_ring(ring, f"{name} ring {number}") for number, ring in enumerate(_sequence(polygon, name))]
+    if not rings:
+        raise ValueError(f"{name} has no ring: the first one is its exterior")
+    _refuse_meeting_edges(rings, name)
+    for number in range(1, len(rings)):
+        if any(sign < 0 for sign in _sides(rings[0], rings[number])):
+            raise ValueError(f"{name} ring {number} is a hole that is not inside the exterior")
+        for other in range(1, number):
+            one, two = rings[other], rings[number]
+            if _apart(one, two):
+                continue
+            if any(sign > 0 for sign in _sides(one, two)) or any(sign > 0 for sign in _sides(two, one)):
+                raise ValueError(f"{name} rings {other} and {number} are holes that overlap")
+    return rings
+
+
+def _as_ring(ring: Any, name: str) -> Points:
+    given = as_points(ring, name)
+    distinct = len(set(as_tuples(given)))
+    if distinct < CORNERS_OF_A_RING:
+        raise ValueError(f"{name} has {distinct} distinct corners: a ring needs at least {CORNERS_OF_A_RING}")
+    corners: Points = np.ascontiguousarray(given[(given != np.roll(given, 1, axis=0)).any(axis=1)])
+    if not np.any(orient2d(corners[0], corners[1], corners)):
+        raise ValueError(f"{name} has no area: all of its corners are on one line")
+    return corners
+
+
+# Edges that meet
+
+
+def _refuse_meeting_edges(rings: list[Points], name: str) -> None:
+    edges = _edges_of(rings)
+    for i, j in _near_pairs(edges):
+        a, b, c, d = edges.a[i], edges.b[i], edges.a[j], edges.b[j]
+        signs = [np.asarray(orient2d(*corners)) for corners in ((a, b, c), (a, b, d), (c, d, a), (c, d, b))]
+        across = (signs[0] * signs[1] <= 0) & (signs[2] * signs[3] <= 0)
+        proper = (signs[0] * signs[1] < 0) & (signs[2] * signs[3] < 0)
+        collinear = ~np.any(signs, axis=0)
+        longer = (np.minimum(np.maximum(a, b), np.maximum(c, d)) > np.maximum(np.minimum(a, b), np.minimum(c, d))).any(
+            axis=1
+        )
+        overlap = collinear & longer
+        step = np.abs(edges.number[i] - edges.number[j])
+        same = edges.ring[i] == edges.ring[j]
+        adjacent = same & ((step == 1) | (step == edges.size[i] - 1))
+        for what, bad in (("overlap", overlap), ("cross", proper), ("touch", across & same & ~adjacent)):
+            rows = np.flatnonzero(bad)
+            if rows.size:
+                first, second = min(
+                    (min(pair), max(pair)) for pair in zip(i[rows].tolist(), j[rows].tolist(), strict=True)
+                )
+                raise ValueError(f"{name} {_pair(edges, first, second)} {what}")
+
+
+def _pair(edges: _Edges, i: int, j: int) -> str:
+    ring, other, first, second = (int(of[e]) for of in (edges.ring, edges.number) for e in (i, j))
+    return f"{f'ring {ring}' if ring == other else f'rings {ring} and {other}'}: edges {first} and {second}"
+
+
+def _edges_of(rings: list[Points]) -> _Edges:
+    sizes = [len(ring) for ring in rings]
+    return _Edges(
+        np.concatenate(rings),
+        np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]),
+        np.repeat(np.arange(len(rings)), sizes),
+        np.concatenate([np.arange(size) for size in sizes]),
+        np.repeat(sizes, sizes),
+    )
+
+
+def _near_pairs(edges: _Edges) -> Iterator[tuple[Rows, Rows]]:
+    """All pairs of edges whose boxes meet, in portions."""
+    low, high = np.minimum(edges.a, edges.b), np.maximum(edges.a, edges.b)
+    order = np.argsort(low[:, 0], kind="stable")
+    later = np.searchsorted(low[order, 0], high[order, 0], side="right") - np.arange(len(order)) - 1
+    ends = np.cumsum(later)
+    start = 0
+    while start < len(order):
+        done = ends[start - 1] if start else 0
+        stop = max(int(np.searchsorted(ends, done + PAIRS_AT_A_TIME, side="right")), start + 1)
+        counts = later[start:stop]
+        first = np.repeat(np.arange(start, stop), counts)
+        second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+        i, j = order[first], order[second]
+        near = (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
+        if near.any():
+            yield i[near], j[near]
+        start = stop
+
+
+def _apart(ring: Points, other: Points) -> bool:
+    """Whether the boxes of two rings do not meet."""
+    return bool((ring.min(axis=0) > other.max(axis=0)).any() or (other.min(axis=0) > ring.max(axis=0)).any())
+
+
+# Where a ring is that no edge of the other crosses
+
+
+def _sides(ring: Points, other: Points) -> Iterator[int]:
+    """The signs of the parts into which `ring` divides the edges of `other`: +1 inside, -1 outside."""
+    signs = ring_signs(ring, other).tolist()
+    corners = as_tuples(other)
+    touching = as_tuples(ring[ring_signs(other, ring) == 0])
+    for k, a in enumerate(corners):
+        b = corners[(k + 1) % len(corners)]
+        stops = [(a, signs[k])]
+        on_edge = [p for p in touching if p not in (a, b) and _on_segment(p, a, b)]
+        stops += [(p, 0) for p in (sorted(on_edge) if a < b else sorted(on_edge, reverse=True))]
+        stops.append((b, signs[(k + 1) % len(corners)]))
+        for (p, before), (q, after) in pairwise(stops):
+            yield before or after or _sign_between(ring, p, q)
+
+
+def _on_segment(p: Point, a: Point, b: Point) -> bool:
+    return min(a, b) <= p <= max(a, b) and orient2d(a, b, p) == 0
+
+
+def _sign_between(ring: Points, p: Point, q: Point) -> int:
+    """The sign of the middle of p and q, in rational numbers."""
+    (px, py), (qx, qy) = exact(p), exact(q)
+    x, y = (px + qx) / 2, (py + qy) / 2
+    corners: Sequence[Exact] = [exact(corner) for corner in as_tuples(ring)]
+    inside = False
+    for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if (ay > y) != (by > y):
+            turn: Fraction = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+            inside ^= (turn > 0) == (by > ay)
+    return 1 if inside else -1
+
+
+def ring_signs(ring: Points, points: Points) -> Signs:
+    """(k,) signs of (k, 2) points: +1 inside of a simple ring, 0 on it, -1 outside. Exact. O(k) for each corner."""
+    inside = np.zeros(len(points), np.bool_)
+    on = np.zeros(len(points), np.bool_)
+    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        rows = np.flatnonzero((points[:, 1] >= low[1]) & (points[:, 1] <= high[1]) & (points[:, 0] <= high[0]))
+        if not rows.size:
+            continue
+        near = points[rows]
+        turns = np.asarray(orient2d(a, b, near))
+        on[rows] |= (turns == 0) & (near[:, 0] >= low[0])
+        passes = (a[1] > near[:, 1]) != (b[1] > near[:, 1])
+        inside[rows] ^= passes & ((turns > 0) == (b[1] > a[1]))
+    signs: Signs = np.where(on, 0, np.where(inside, 1, -1)).astype(np.int8)
+    return signs

@@ -1,0 +1,259 @@
+"""FenceIndex from outside: areas, states, crossings, and what is refused."""
+
+import pickle
+import re
+from math import inf
+
+import numpy as np
+import pytest
+from hulls import KEYED_HULLS
+
+from dynhull import Crossings, FenceIndex
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
+HOLE = [[1, 1], [2, 1], [2, 2], [1, 2]]
+
+kinds = pytest.mark.parametrize("make", ["python"], indirect=True)
+
+
+@pytest.fixture
+def make(request):
+    return KEYED_HULLS[request.param]
+
+
+def rows(crossings):
+    keys = crossings.keys.tolist() if isinstance(crossings.keys, np.ndarray) else list(crossings.keys)
+    return [*zip(crossings.fences.tolist(), keys, crossings.changes.tolist(), crossings.causes.tolist(), strict=True)]
+
+
+@kinds
+def test_a_first_state_is_not_reported(make):
+    hull = make.from_entities(["a", "b"], [[1, 1], [9, 9]])
+    index = FenceIndex(hull)
+    index.set_polygons(1, [[SQUARE]])
+    assert list(index.inside(1)) == ["a"]
+    assert rows(index.take()) == []
+    hull.put_many(["a", "b", "c"], [[8, 8], [2, 2], [3, 3]])
+    crossings = index.take()
+    assert rows(crossings) == [(1, "a", -1, 1), (1, "b", 1, 1), (1, "c", 1, 4)]
+    assert crossings.distances.tolist() == [np.hypot(4, 4), 0, 0]
+    assert crossings.previous.tolist()[:2] == [[1, 1], [9, 9]]
+    assert index.take() == index.take()
+
+
+@kinds
+def test_only_the_states_before_and_after_count(make):
+    hull = make.from_entities([1, 2], [[1, 1], [9, 9]], key_type="int")
+    index = FenceIndex(hull)
+    index.set_circle(5, 0, 0, 2)
+    hull.put(1, 7, 7)
+    hull.put(1, 0, 1)
+    hull.put(2, 0, 0)
+    hull.remove(2)
+    hull.put(3, 0, 0)
+    hull.expire(0)
+    hull.remove(3)
+    index.set_circle(5, 8, 8, 2)
+    index.set_circle(5, 0, 0, 2)
+    assert rows(index.take()) == []
+    hull.remove(1)
+    hull.put(1, 5, 5)
+    assert rows(index.take()) == [(5, 1, -1, Crossings.MOVED)]
+
+
+@kinds
+def test_causes(make):
+    hull = make.from_entities(["a", "b", "c"], [[1, 1], [1, 2], [6, 6]], [1.0, 2.0, 3.0])
+    index = FenceIndex(hull)
+    index.set_polygons(1, [[SQUARE]])
+    hull.expire(1)
+    hull.remove("b")
+    index.set_polygons(1, [[[[5, 5], [8, 5], [5, 8]]]])
+    hull.put("d", 5, 5)
+    assert rows(index.take()) == [
+        (1, "a", -1, Crossings.EXPIRED | Crossings.AREA),
+        (1, "b", -1, Crossings.REMOVED | Crossings.AREA),
+        (1, "c", 1, Crossings.AREA),
+        (1, "d", 1, Crossings.APPEARED | Crossings.AREA),
+    ]
+    hull.clear()
+    assert rows(index.take()) == [(1, "c", -1, Crossings.REMOVED), (1, "d", -1, Crossings.REMOVED)]
+
+
+@kinds
+def test_a_margin_keeps_subjects_inside(make):
+    hull = make.from_entities(["a"], [[2, 2]])
+    index = FenceIndex(hull)
+    index.set_polygons(1, [[SQUARE]], margin=1.0)
+    for x, expected in ((5.0, []), (np.nextafter(5.0, 6.0), [-1]), (5.0, []), (4.0, [1]), (4.5, [])):
+        hull.put("a", x, 2)
+        assert index.take().changes.tolist() == expected
+
+
+@kinds
+def test_an_empty_area_is_infinitely_far(make):
+    hull = make.from_entities(["a"], [[2, 2]])
+    index = FenceIndex(hull)
+    index.set_hull(1, [[2, 2]], margin=9.0)
+    index.set_hull(1, np.empty((0, 2)), margin=9.0)
+    crossings = index.take()
+    assert rows(crossings) == [(1, "a", -1, Crossings.AREA)]
+    assert crossings.distances.tolist() == [inf]
+
+
+@kinds
+def test_one_who_leaves_the_pack(make):
+    hull = make.from_entities(["a", "b", "c", "d"], [[0, 0], [4, 0], [0, 4], [1, 1]])
+    index = FenceIndex(hull)
+    index.set_hull(1, hull.vertices(), margin=3.0, without_self=True, inside=["a", "b", "c", "d"])
+    assert rows(index.take()) == [(1, "b", -1, Crossings.AREA), (1, "c", -1, Crossings.AREA)]
+    hull.put("d", 3, 3)  # beyond the edge from b to c, but near the hull of the others
+    assert rows(index.take()) == []
+    hull.put("d", 9, 9)
+    crossings = index.take()
+    assert rows(crossings) == [(1, "d", -1, Crossings.MOVED | Crossings.AREA)]
+    assert crossings.distances.tolist() == [np.sqrt(98)]
+
+
+@kinds
+def test_a_restored_fence_goes_on(make):
+    hull = make.from_entities([1, 2, 3], [[1, 1], [4.5, 2], [9, 9]], key_type="int")
+    index = FenceIndex(hull)
+    index.set_polygons(1, [[SQUARE]], margin=1.0, inside=np.array([1, 2, 77], np.uint64))
+    assert index.inside(1).tolist() == [1, 2]
+    assert rows(index.take()) == []
+    index.set_polygons(1, [[SQUARE]], margin=1.0, inside=[3])
+    assert rows(index.take()) == [(1, 1, 1, Crossings.AREA), (1, 3, -1, Crossings.AREA)]
+
+
+@kinds
+def test_passing_through(make):
+    hull = make.from_entities(["a", "b"], [[-1, 1], [-1, 4]])
+    index = FenceIndex(hull)
+    index.set_polygons(1, [[SQUARE, HOLE]], cross=True)
+    index.set_polygons(2, [[SQUARE, HOLE]], cross=True, closed=False)
+    index.set_polygons(3, [[SQUARE, HOLE]])
+    hull.put_many(["a", "b"], [[9, 1], [9, 4]])
+    crossings = index.take()
+    assert rows(crossings) == [(1, "a", 0, 1), (1, "b", 0, 1), (2, "a", 0, 1)]
+    assert crossings.distances.tolist() == [5, 5, 5]
+
+
+@kinds
+def test_a_fence_is_dropped(make):
+    hull = make.from_entities(["b", "a"], [[1, 1], [1, 1]])
+    index = FenceIndex(hull)
+    index.set_circle(-7, 0, 0, 3)
+    assert -7 in index
+    assert "a" not in index
+    assert list(index.drop(-7)) == ["a", "b"]
+    assert len(index) == 0
+    for method in (index.drop, index.inside, index.count):
+        with pytest.raises(KeyError, match="there is no fence -7"):
+            method(-7)
+
+
+@kinds
+def test_one_index_a_hull(make):
+    hull = make.from_entities(["a"], [[1, 1]])
+    index = FenceIndex(hull)
+    with pytest.raises(ValueError, match="has an index of fences already"):
+        FenceIndex(hull)
+    index.set_circle(1, 0, 0, 3)
+    copies = [hull.copy(), pickle.loads(pickle.dumps(hull))]
+    index.detach()
+    hull.put("a", 9, 9)
+    for each in (hull, *copies):
+        other = FenceIndex(each)
+        other.set_circle(1, 0, 0, 3)
+        assert list(other.inside(1)) == ([] if each is hull else ["a"])
+
+
+@kinds
+def test_a_hull_outlives_its_index(make):
+    hull = make.from_entities(["a"], [[1, 1]])
+    index = FenceIndex(hull)
+    index.set_circle(1, 0, 0, 3)
+    del index
+    hull.put_many(["a", "b"], [[5, 5], [6, 6]])
+    hull.remove("a")
+    assert len(FenceIndex(hull)) == 0
+
+
+BAD_POLYGONS = {
+    "polygons must hold at least one polygon": [],
+    "polygon 0 has no ring": [[]],
+    "polygon 0 ring 0 has 2 distinct corners": [[[[0, 0], [1, 1], [0, 0], [1, 1]]]],
+    "polygon 0 ring 0 has no area": [[[[0, 0], [1, 1], [3, 3]]]],
+    "polygon 0 ring 0: edges 0 and 2 cross": [[[[0, 0], [4, 4], [4, 0], [0, 4]]]],
+    "polygon 0 ring 0: edges 0 and 1 overlap": [[[[0, 0], [4, 0], [2, 0], [0, 4]]]],
+    "polygon 0 ring 0: edges 0 and 2 touch": [[[[0, 0], [4, 0], [4, 4], [2, 0], [0, 4]]]],
+    "polygon 1 rings 0 and 1: edges 0 and 0 cross": [[SQUARE], [SQUARE, [[1, -1], [1, 1], [0.5, 1]]]],
+    "polygon 0 rings 0 and 1: edges 0 and 0 overlap": [[SQUARE, [[1, 0], [2, 0], [2, 1]]]],
+    "polygon 0 ring 1 is a hole that is not inside the exterior": [[SQUARE, [[5, 5], [6, 5], [5, 6]]]],
+    "polygon 0 rings 1 and 2 are holes that overlap": [[[[-9, -9], [9, -9], [9, 9], [-9, 9]], SQUARE, HOLE]],
+    "polygon 0 ring 0 row 1 is (nan, 0.0)": [[[[0, 0], [float("nan"), 0], [1, 1]]]],
+    "polygon 0 ring 0 must have shape (n, 2)": [SQUARE],
+}
+
+
+@kinds
+@pytest.mark.parametrize("message", BAD_POLYGONS)
+def test_bad_polygons(make, message):
+    index = FenceIndex(make.from_entities(["a"], [[1, 1]]))
+    index.set_polygons(1, [[SQUARE]])
+    with pytest.raises(ValueError, match=re.escape(message)):
+        index.set_polygons(1, BAD_POLYGONS[message])
+    assert list(index.inside(1)) == ["a"]
+    assert len(index.take()) == 0
+
+
+GOOD_POLYGONS = [
+    [[SQUARE + SQUARE[:1]]],  # closed
+    [[[[0, 0], [2, 0], [2, 0], [4, 0], [4, 4]]]],  # a corner twice, three on a line
+    [[SQUARE, [[0, 2], [2, 1], [2, 3]]]],  # a hole that touches an edge
+    [[SQUARE, [[0, 0], [2, 1], [1, 2]]]],  # and a corner
+    [[[[0, 0], [9, 0], [9, 9], [0, 9]], [[1, 1], [3, 1], [3, 3]], [[3, 3], [5, 3], [5, 5]]]],  # holes that touch
+    [[SQUARE], [SQUARE]],
+]
+
+
+@kinds
+@pytest.mark.parametrize("polygons", GOOD_POLYGONS)
+def test_good_polygons(make, polygons):
+    index = FenceIndex(make())
+    index.set_polygons(1, polygons)
+    assert 1 in index
+
+
+def test_a_hole_that_leaves_through_a_corner_is_refused():
+    """One of its edges is outside between two corners of the exterior; its corners are all on or inside of that."""
+    exterior = [[0, 0], [8, 0], [8, 8], [5, 8], [4, 4], [3, 8], [0, 8]]
+    index = FenceIndex(KEYED_HULLS["python"]())
+    index.set_polygons(1, [[exterior, [[4, 4], [6, 2], [2, 2]]]])
+    with pytest.raises(ValueError, match="not inside the exterior"):
+        index.set_polygons(1, [[[[0, 0], [8, 0], [8, 8], [4, 4], [0, 8]], [[0, 8], [8, 8], [4, 1]]]])
+
+
+@kinds
+def test_bad_arguments(make):
+    index = FenceIndex(make("int"))
+    bad = [
+        (ValueError, "margin is -1.0: must not be negative", lambda: index.set_circle(1, 0, 0, 1, margin=-1)),
+        (ValueError, "margin", lambda: index.set_circle(1, 0, 0, 1, margin=inf)),
+        (ValueError, "radius is -2.0: must not be negative", lambda: index.set_circle(1, 0, 0, -2)),
+        (ValueError, "x", lambda: index.set_circle(1, inf, 0, 2)),
+        (ValueError, "fence is 9223372036854775808", lambda: index.set_circle(2**63, 0, 0, 2)),
+        (TypeError, "integer", lambda: index.set_circle("one", 0, 0, 2)),
+        (ValueError, "inside row 0 is -1", lambda: index.set_circle(1, 0, 0, 2, inside=[-1])),
+        (ValueError, "vertices row 0", lambda: index.set_hull(1, [[0, 0], [1, 1], [2, 0]])),
+        (ValueError, "vertices row 0", lambda: index.set_hull(1, [[0, 0], [1, 0], [2, 0]])),
+        (ValueError, "vertices row 2", lambda: index.set_hull(1, [[1, 0], [1, 1], [0, 0]])),
+        (ValueError, "vertices row 0", lambda: index.set_hull(1, [[0, 0], [0, 0]])),
+        (ValueError, "margin is 0.0: without_self needs", lambda: index.set_hull(1, [], without_self=True)),
+        (ValueError, "closed", lambda: index.set_hull(1, [], without_self=True, closed=False, margin=1.0)),
+    ]
+    for error, message, call in bad:
+        with pytest.raises(error, match=re.escape(message)):
+            call()
+    assert len(index) == 0
