@@ -65,6 +65,8 @@ def _key(value: Any) -> Any:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, tuple) and any(isinstance(each, np.ndarray) for each in value):
+        return f"({', '.join(map(_text, value))}{',' * (len(value) == 1)})"
     if not isinstance(value, np.ndarray):
         return repr(value)
     return str(value.tolist()) if len(value) <= MOST_ROWS_PRINTED else f"<array of shape {value.shape}>"

@@ -15,18 +15,24 @@ except ModuleNotFoundError as _missing:
         "dynhull_client needs grpcio and protobuf. Install them with: pip install 'dynhull[client]'", name=_missing.name
     ) from None
 
+from ._areas import Circle, Polygon, Prefix
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
-from ._async_watch import AsyncWatch
+from ._async_watch import AsyncFenceWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
 from ._errors import (
+    ConsumerNotFoundError,
     DeadlineError,
     DuplicateKeyError,
     DynhullError,
+    FenceExistsError,
+    FenceNotFoundError,
+    FenceReplacedError,
     HullEmptyError,
     HullExistsError,
+    HullFencedError,
     HullNotFoundError,
     HullReplacedError,
     HullUnsuitableError,
@@ -42,6 +48,7 @@ from ._errors import (
     UnauthenticatedError,
     UnavailableError,
 )
+from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
 from ._hull_copy import HullCopy
 from ._ingest import Ingest
 from ._messages import (
@@ -72,11 +79,12 @@ from ._messages import (
     Window,
 )
 from ._uses import Efficient, Measured, Phases, Separation
-from ._watch import Watch
+from ._watch import FenceWatch, Watch
 from ._writer import Writer
 
 __all__ = [
     "Applied",
+    "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncIngest",
     "AsyncWatch",
@@ -84,6 +92,8 @@ __all__ = [
     "Batch",
     "ChanRound",
     "Change",
+    "Circle",
+    "ConsumerNotFoundError",
     "Counted",
     "Crossings",
     "DeadlineError",
@@ -95,17 +105,26 @@ __all__ = [
     "Efficient",
     "Entities",
     "Event",
+    "Fence",
+    "FenceConsumer",
+    "FenceEvent",
+    "FenceExistsError",
+    "FenceNotFoundError",
+    "FenceReplacedError",
+    "FenceWatch",
     "Hull",
     "HullClient",
     "HullCopy",
     "HullEmptyError",
     "HullExistsError",
+    "HullFencedError",
     "HullInfo",
     "HullNotFoundError",
     "HullReplacedError",
     "HullUnsuitableError",
     "Ingest",
     "Ingested",
+    "Inside",
     "InvalidRequestError",
     "KeyMissingError",
     "LimitExceededError",
@@ -117,7 +136,9 @@ __all__ = [
     "Phases",
     "PointMissingError",
     "Points",
+    "Polygon",
     "Positions",
+    "Prefix",
     "ProducerInUseError",
     "Progress",
     "RevisionForgottenError",
@@ -126,6 +147,7 @@ __all__ = [
     "SequenceGapError",
     "Sketch",
     "Snapshot",
+    "SubjectsInside",
     "Supported",
     "Tangents",
     "UnauthenticatedError",

@@ -5,12 +5,14 @@ from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from . import _calls as calls
+from . import _fences as fences
 from . import _uses as uses
 from ._async_ingest import AsyncIngest
-from ._async_watch import AsyncWatch
+from ._async_watch import AsyncFenceWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call
 from ._connection import AsyncConnection
+from ._fence_messages import Fence
 from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 
@@ -61,8 +63,16 @@ class AsyncHullClient(Client[AsyncConnection]):
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)
+    create_fence = _answering(fences.create_fence)
+    replace_fence = _answering(fences.replace_fence)
+    delete_fence = _answering(fences.delete_fence)
+    get_fence = _answering(fences.get_fence)
+    fence_inside = _answering(fences.fence_inside)
+    ack_fence = _answering(fences.ack_fence)
+    delete_consumer = _answering(fences.delete_consumer)
     ingest = opening(AsyncIngest, calls.ingest)
     watch = opening(AsyncWatch, calls.watch)
+    watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     writer = opening(AsyncWriter, calls.writer)
 
     async def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> AsyncIterator[HullInfo]:
@@ -71,6 +81,17 @@ class AsyncHullClient(Client[AsyncConnection]):
         while following is not None:
             hulls, token = await self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
             for each in hulls:
+                yield each
+            following = token or None
+
+    async def list_fences(self, prefix: str = "", *, timeout: float | None = None) -> AsyncIterator[Fence]:
+        """The fences whose names begin with `prefix`, in the order of their names, fetched page by page."""
+        following: str | None = ""
+        while following is not None:
+            found, token = await self._connection.answer(
+                described(fences.list_page, prefix, following, timeout=timeout)
+            )
+            for each in found:
                 yield each
             following = token or None
 

@@ -1,6 +1,7 @@
-"""Following a hull with asyncio."""
+"""Following a hull or a fence with asyncio."""
 
 import asyncio
+from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from types import TracebackType
@@ -11,17 +12,22 @@ import grpc
 from ._calls import Watching
 from ._connection import AsyncConnection
 from ._errors import DynhullError, error_of
+from ._fence_messages import FenceEvent
+from ._fence_place import FencePlace
+from ._fences import WatchingFence
+from ._hull_place import HullPlace
 from ._messages import Event
-from ._place import Place
+from ._place import Happening, Place
 
 
-class AsyncWatch(AsyncIterator[Event]):
-    """`Watch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+class AsyncFollower(AsyncIterator[Happening]):
+    """The events of something that is watched. An async context manager, which closes it."""
 
-    def __init__(self, connection: AsyncConnection, watching: Watching) -> None:
+    def __init__(self, connection: AsyncConnection, place: Place[Happening]) -> None:
         self._connection = connection
-        self._place = Place(watching)
+        self._place = place
         self._closed = asyncio.Event()
+        self._arrived: deque[Happening] = deque()
         self._call: Any = None
         self._begin()
 
@@ -33,25 +39,24 @@ class AsyncWatch(AsyncIterator[Event]):
         """
         return self._place.lost
 
-    async def __anext__(self) -> Event:
-        event = None
-        while event is None:
+    async def __anext__(self) -> Happening:
+        while not self._arrived:
             if self._call is None:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._closed.wait(), self._place.pause)
-            if self._closed.is_set():
+            if self._closed.is_set() or self._place.ended:
                 raise StopAsyncIteration
             if self._call is None or self._call.cancelled():  # gRPC cancels a call when its caller stops waiting
                 self._begin()
             try:
-                event = self._place.take(await anext(self._events))
+                self._arrived.extend(self._place.take(await anext(self._events)))
             except grpc.RpcError as failure:
                 self._call = None
-                event = self._place.end(error_of(failure))
+                self._arrived.extend(self._place.end(error_of(failure)))
             except asyncio.CancelledError:
                 if not self._closed.is_set():
                     raise
-        return event
+        return self._arrived.popleft()
 
     async def close(self) -> None:
         """End the watch."""
@@ -68,8 +73,23 @@ class AsyncWatch(AsyncIterator[Event]):
         await self.close()
 
     def __repr__(self) -> str:
-        return f"<AsyncWatch of {self._place.request.name!r}>"
+        return f"<{type(self).__name__} of {self._place.request.name!r}>"
 
     def _begin(self) -> None:
-        self._call = self._connection.begin(self._connection.stub.Watch, self._place.request, self._place.timeout())
+        method = getattr(self._connection.stub, self._place.method)
+        self._call = self._connection.begin(method, self._place.request, self._place.timeout())
         self._events = aiter(self._call)
+
+
+class AsyncWatch(AsyncFollower[Event]):
+    """`Watch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, watching: Watching) -> None:
+        super().__init__(connection, HullPlace(watching))
+
+
+class AsyncFenceWatch(AsyncFollower[FenceEvent]):
+    """`FenceWatch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, watching: WatchingFence) -> None:
+        super().__init__(connection, FencePlace(watching))

@@ -160,8 +160,8 @@ def create_hull(
 
 def _config(keyed: KeyType | None, ordering: Ordering, point_limit: int | None) -> hull_pb2.HullConfig:
     return hull_pb2.HullConfig(
-        identity=_choice("keyed", keyed, IDENTITIES),
-        ordering=_choice("ordering", ordering, ORDERINGS),
+        identity=choice("keyed", keyed, IDENTITIES),
+        ordering=choice("ordering", ordering, ORDERINGS),
         max_points=_positive("point_limit", point_limit),
     )
 
@@ -176,13 +176,14 @@ def _window(
     return hull_pb2.Window(
         max_age=None if max_age is None else encode_duration(max_age, "max_age"),
         max_points=_positive("max_points", max_points),
-        clock=_choice("clock", clock, CLOCKS),
+        clock=choice("clock", clock, CLOCKS),
         max_skew=None if max_skew is None else encode_duration(max_skew, "max_skew"),
-        ahead=_choice("ahead", ahead, AHEAD_POLICIES),
+        ahead=choice("ahead", ahead, AHEAD_POLICIES),
     )
 
 
-def _choice(argument: str, value: Any, choices: Mapping[Any, Any]) -> Any:
+def choice(argument: str, value: Any, choices: Mapping[Any, Any]) -> Any:
+    """The value that stands for a choice; ValueError names the argument and what it may be."""
     if value not in choices:
         raise ValueError(f"{argument} must be one of {', '.join(map(repr, choices))}, got {value!r}")
     return choices[value]

@@ -5,13 +5,15 @@ from types import TracebackType
 from typing import Concatenate, ParamSpec, Self, TypeVar
 
 from . import _calls as calls
+from . import _fences as fences
 from . import _uses as uses
 from ._calls import Call
 from ._connection import BlockingConnection
+from ._fence_messages import Fence
 from ._ingest import Ingest
 from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
-from ._watch import Watch
+from ._watch import FenceWatch, Watch
 from ._writer import Writer
 
 P = ParamSpec("P")
@@ -72,8 +74,16 @@ class HullClient(Client[BlockingConnection]):
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)
+    create_fence = _answering(fences.create_fence)
+    replace_fence = _answering(fences.replace_fence)
+    delete_fence = _answering(fences.delete_fence)
+    get_fence = _answering(fences.get_fence)
+    fence_inside = _answering(fences.fence_inside)
+    ack_fence = _answering(fences.ack_fence)
+    delete_consumer = _answering(fences.delete_consumer)
     ingest = opening(Ingest, calls.ingest)
     watch = opening(Watch, calls.watch)
+    watch_fence = opening(FenceWatch, fences.watch_fence)
     writer = opening(Writer, calls.writer)
 
     def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[HullInfo]:
@@ -82,6 +92,14 @@ class HullClient(Client[BlockingConnection]):
         while following is not None:
             hulls, token = self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
             yield from hulls
+            following = token or None
+
+    def list_fences(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[Fence]:
+        """The fences whose names begin with `prefix`, in the order of their names, fetched page by page."""
+        following: str | None = ""
+        while following is not None:
+            found, token = self._connection.answer(described(fences.list_page, prefix, following, timeout=timeout))
+            yield from found
             following = token or None
 
     def close(self) -> None:

@@ -4,10 +4,12 @@ import asyncio
 import time
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, ClassVar, TypeVar
 
 import grpc
 
+from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 from ._address import target
@@ -37,7 +39,7 @@ class Connection:
 
     Attributes:
         address: host:port.
-        stub: the generated stub.
+        stub: the methods of both services, whose names differ.
         blocking: makes a BlockingConnection with the same arguments, for use in threads.
     """
 
@@ -78,7 +80,8 @@ class Connection:
             self._channel = self._grpc.insecure_channel(self.address, OPTIONS)
         else:
             self._channel = self._grpc.secure_channel(self.address, tls, OPTIONS)
-        self.stub: Any = HullServiceStub(self._channel)
+        stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
+        self.stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call: a method of the stub with a message, or with an iterator of messages."""

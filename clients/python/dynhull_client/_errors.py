@@ -95,6 +95,31 @@ class HullReplacedError(RevisionForgottenError):
     """A watch cannot resume: the hull was deleted, and another one has its name now."""
 
 
+class FenceNotFoundError(DynhullError, LookupError):
+    """There is no fence of that name."""
+
+
+class FenceExistsError(DynhullError):
+    """There is already a fence of that name."""
+
+
+class FenceReplacedError(DynhullError, LookupError):
+    """The fence was deleted, and another one has its name now: sequences begin again at 1."""
+
+
+class ConsumerNotFoundError(DynhullError, LookupError):
+    """The fence has no consumer of that name."""
+
+
+class HullFencedError(DynhullError):
+    """The hull cannot be deleted, because a fence names it; `fence` is the name of one."""
+
+    @property
+    def fence(self) -> str | None:
+        """The name of a fence to delete first."""
+        return self.metadata.get("fence")
+
+
 class UnauthenticatedError(DynhullError):
     """The server requires a token and received none, or one that it does not know."""
 
@@ -120,10 +145,15 @@ class DeadlineError(DynhullError, TimeoutError):
 
 
 BY_REASON: Mapping[str, type[DynhullError]] = {
+    "CONSUMER_NOT_FOUND": ConsumerNotFoundError,
     "DISK_FULL": LimitExceededError,
     "DRAINING": UnavailableError,
+    "FENCE_EXISTS": FenceExistsError,
+    "FENCE_NOT_FOUND": FenceNotFoundError,
+    "FENCE_REPLACED": FenceReplacedError,
     "HULL_EMPTY": HullEmptyError,
     "HULL_EXISTS": HullExistsError,
+    "HULL_FENCED": HullFencedError,
     "HULL_NOT_FOUND": HullNotFoundError,
     "HULL_REPLACED": HullReplacedError,
     "HULL_UNSUITABLE": HullUnsuitableError,

@@ -16,7 +16,15 @@ AnyConnection = TypeVar("AnyConnection", bound=Connection)
 
 Function = Callable[..., Any]
 
-NOT_NEGATIVE = ("min_revision", "other_min_revision", "sequence", "timeout")
+NOT_NEGATIVE = (
+    "after",
+    "confirmations",
+    "max_events",
+    "min_revision",
+    "other_min_revision",
+    "sequence",
+    "timeout",
+)
 
 
 class Client(Generic[AnyConnection]):

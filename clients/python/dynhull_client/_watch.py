@@ -1,6 +1,7 @@
-"""Following a hull."""
+"""Following a hull or a fence."""
 
 import threading
+from collections import deque
 from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Self
@@ -10,21 +11,22 @@ import grpc
 from ._calls import Watching
 from ._connection import BlockingConnection
 from ._errors import DynhullError, error_of
+from ._fence_messages import FenceEvent
+from ._fence_place import FencePlace
+from ._fences import WatchingFence
+from ._hull_place import HullPlace
 from ._messages import Event
-from ._place import Place
+from ._place import Happening, Place
 
 
-class Watch(Iterator[Event]):
-    """The events of a watched hull: a `Snapshot`, then `Change` and `Progress`. Iterates until closed.
+class Follower(Iterator[Happening]):
+    """The events of something that is watched. A context manager, which closes it."""
 
-    Iterating blocks until the next event, reconnects as often as necessary, and raises DynhullError if the watch cannot
-    continue. A context manager, which closes it; `close` may also be called by another thread, and ends the iteration.
-    """
-
-    def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
+    def __init__(self, connection: BlockingConnection, place: Place[Happening]) -> None:
         self._connection = connection
-        self._place = Place(watching)
+        self._place = place
         self._closed = threading.Event()
+        self._arrived: deque[Happening] = deque()
         self._call: Any = None
         self._begin()
 
@@ -36,20 +38,21 @@ class Watch(Iterator[Event]):
         """
         return self._place.lost
 
-    def __next__(self) -> Event:
-        event = None
-        while event is None:
+    def __next__(self) -> Happening:
+        while not self._arrived:
+            if self._place.ended:
+                raise StopIteration
             if self._call is None:
                 self._closed.wait(self._place.pause)
                 self._begin()
             try:
-                event = self._place.take(next(self._call))
+                self._arrived.extend(self._place.take(next(self._call)))
             except grpc.RpcError as failure:
                 if self._closed.is_set():
                     raise StopIteration from None
                 self._call = None
-                event = self._place.end(error_of(failure))
-        return event
+                self._arrived.extend(self._place.end(error_of(failure)))
+        return self._arrived.popleft()
 
     def close(self) -> None:
         """End the watch."""
@@ -67,9 +70,32 @@ class Watch(Iterator[Event]):
         self.close()
 
     def __repr__(self) -> str:
-        return f"<Watch of {self._place.request.name!r}>"
+        return f"<{type(self).__name__} of {self._place.request.name!r}>"
 
     def _begin(self) -> None:
-        self._call = self._connection.begin(self._connection.stub.Watch, self._place.request, self._place.timeout())
+        method = getattr(self._connection.stub, self._place.method)
+        self._call = self._connection.begin(method, self._place.request, self._place.timeout())
         if self._closed.is_set():
             self._call.cancel()
+
+
+class Watch(Follower[Event]):
+    """The events of a watched hull: a `Snapshot`, then `Change` and `Progress`. Iterates until closed.
+
+    Iterating blocks until the next event, reconnects as often as necessary, and raises DynhullError if the watch cannot
+    continue. A context manager, which closes it; `close` may also be called by another thread, and ends the iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
+        super().__init__(connection, HullPlace(watching))
+
+
+class FenceWatch(Follower[FenceEvent]):
+    """The events of a watched fence, in order. Iterates until closed, or until the fence is deleted.
+
+    Iterating blocks until the next event, reconnects as often as necessary, and raises DynhullError if the watch cannot
+    continue. A context manager, which closes it; `close` may also be called by another thread, and ends the iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, watching: WatchingFence) -> None:
+        super().__init__(connection, FencePlace(watching))

@@ -1,0 +1,328 @@
+"""The calls about fences: the request, how to read the answer, and the documentation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import grpc
+
+from dynhull.arrays import as_coordinate
+from dynhull_proto.v1 import fence_pb2
+from dynhull_proto.v1 import fence_service_pb2 as pb
+
+from ._areas import Prefix, as_area, encode_area
+from ._calls import Call, choice
+from ._errors import FenceExistsError, FenceNotFoundError
+from ._fence_messages import (
+    BOUNDARIES,
+    INITIALS,
+    Fence,
+    FenceConsumer,
+    Inside,
+    decode_consumer,
+    decode_fence,
+    decode_inside,
+)
+from ._times import encode_duration
+
+if TYPE_CHECKING:
+    from datetime import timedelta
+
+    from ._fence_messages import Boundary, Initial
+
+SETTINGS = (
+    "area",
+    "subjects",
+    "other_hull",
+    "boundary",
+    "margin",
+    "near",
+    "crosses",
+    "dwell",
+    "confirmations",
+    "min_dwell",
+    "without_self",
+    "max_events",
+    "max_event_age",
+)
+
+
+def create_fence(
+    name: str,
+    area: Any,
+    subjects: str | Prefix | None = None,
+    *,
+    other_hull: str | None = None,
+    boundary: Boundary = "closed",
+    margin: float = 0.0,
+    initial: Initial = "snapshot",
+    crosses: bool = False,
+    dwell: float | timedelta | None = None,
+    confirmations: int = 0,
+    min_dwell: float | timedelta | None = None,
+    near: float = 0.0,
+    without_self: bool = False,
+    max_events: int = 0,
+    max_event_age: float | timedelta | None = None,
+    exist_ok: bool = False,
+    timeout: float | None = None,
+) -> Call[Fence]:
+    """Create a fence: it compares subjects with an area, and makes an event when one enters or leaves, whoever moves.
+
+    >>> client.create_fence("depot", area=[[0, 0], [4, 0], [4, 3]], subjects="vehicles")  # doctest: +SKIP
+
+    FenceExistsError if a fence has that name; HullNotFoundError if there is no such hull.
+
+    Args:
+        name: 1 to 200 letters a to z and A to Z, digits and "._-/". A hull may have the same name.
+        area: the name of a hull, whose area moves as its points do; or a polygon: (n, 2) corners, a `Polygon` with
+            holes, GeoJSON, a geometry with `__geo_interface__`, or a list of these, joined by "or"; or a `Circle`.
+        subjects: the keyed hull whose keys are compared; or a `Prefix` for all keyed hulls with such names,
+        other_hull: or a hull that is compared as a whole, with an area that is a hull.
+        boundary: "closed": a subject on the boundary is inside; "open": it is outside.
+        margin: how far outside of the area a subject that is inside has to be to leave.
+        initial: what the fence says about subjects that are inside at first: one "snapshot" with all of them, "events",
+            an enter of each, or "none".
+        crosses: whether a subject that is outside before and after, but whose straight way between meets the area,
+            makes an event.
+        dwell: the time after which a subject that is still inside makes an event, in seconds or as a timedelta.
+        confirmations: the number of consecutive reports that must agree before a subject enters or leaves.
+        min_dwell: how long a subject must be on the other side before it enters or leaves.
+        near: with `other_hull`: the hulls are near while their distance is at most this.
+        without_self: compare each subject that is a point of the area's hull with the hull of the others. The area is
+            then the subjects' own hull, and there is a margin.
+        max_events: the number of events to keep; 0 for the limit of the server.
+        max_event_age: how long events are kept.
+        exist_ok: whether to return an existing fence of that name and with these settings. FenceExistsError if it has
+            others, or without `exist_ok`.
+        timeout: seconds, instead of the client's.
+    """
+    config = _config(
+        area,
+        subjects,
+        other_hull,
+        boundary,
+        margin,
+        crosses,
+        dwell,
+        confirmations,
+        min_dwell,
+        near,
+        without_self,
+        max_events,
+        max_event_age,
+    )
+    config.initial = choice("initial", initial, INITIALS)
+    create: Call[Fence] = Call(
+        "CreateFence",
+        pb.CreateFenceRequest(name=name, config=config),
+        lambda response: decode_fence(response.fence),
+        timeout,
+        repeatable=exist_ok,
+        instead=lambda error: existing if exist_ok and isinstance(error, FenceExistsError) else None,
+    )
+    wanted = decode_fence(fence_pb2.Fence(name=name, config=config))
+    existing: Call[Fence] = Call(
+        "GetFence",
+        pb.GetFenceRequest(name=name),
+        lambda response: _as_wanted(decode_fence(response.fence), wanted),
+        timeout,
+        instead=lambda error: create if isinstance(error, FenceNotFoundError) else None,  # deleted in the meantime
+    )
+    return create
+
+
+def replace_fence(
+    name: str,
+    area: Any,
+    subjects: str | Prefix | None = None,
+    *,
+    other_hull: str | None = None,
+    boundary: Boundary = "closed",
+    margin: float = 0.0,
+    crosses: bool = False,
+    dwell: float | timedelta | None = None,
+    confirmations: int = 0,
+    min_dwell: float | timedelta | None = None,
+    near: float = 0.0,
+    without_self: bool = False,
+    max_events: int = 0,
+    max_event_age: float | timedelta | None = None,
+    timeout: float | None = None,
+) -> Call[Fence]:
+    """Replace the area and the settings of a fence; the subjects must stay the same. Arguments as for `create_fence`.
+
+    Subjects that are inside of one area and outside of the other make events with the cause "fence_changed". The same
+    settings again make none.
+    """
+    config = _config(
+        area,
+        subjects,
+        other_hull,
+        boundary,
+        margin,
+        crosses,
+        dwell,
+        confirmations,
+        min_dwell,
+        near,
+        without_self,
+        max_events,
+        max_event_age,
+    )
+    request = pb.ReplaceFenceRequest(name=name, config=config)
+    return Call("ReplaceFence", request, lambda response: decode_fence(response.fence), timeout)
+
+
+def delete_fence(name: str, *, timeout: float | None = None) -> Call[None]:
+    """Delete a fence and its events. Its watches get a last event, "closed", and end."""
+    return Call("DeleteFence", pb.DeleteFenceRequest(name=name), lambda _: None, timeout, repeatable=False)
+
+
+def get_fence(name: str, *, timeout: float | None = None) -> Call[Fence]:
+    """A fence with its settings, its counts and its consumers. FenceNotFoundError if there is none of that name."""
+    return Call("GetFence", pb.GetFenceRequest(name=name), lambda response: decode_fence(response.fence), timeout)
+
+
+def list_page(prefix: str, page_token: str, timeout: float | None) -> Call[tuple[list[Fence], str]]:
+    """A page of fences, and the token of the next page, which is empty after the last."""
+
+    def decode(response: pb.ListFencesResponse) -> tuple[list[Fence], str]:
+        return [decode_fence(each) for each in response.fences], response.next_page_token
+
+    return Call("ListFences", pb.ListFencesRequest(prefix=prefix, page_token=page_token), decode, timeout)
+
+
+def fence_inside(name: str, *, timeout: float | None = None) -> Call[Inside]:
+    """The subjects that are inside, all at one moment."""
+    return Call("ReadInside", pb.ReadInsideRequest(name=name), decode_inside, timeout, in_parts=True)
+
+
+def ack_fence(
+    name: str, consumer: str, sequence: int, *, uid: str = "", timeout: float | None = None
+) -> Call[FenceConsumer]:
+    """Acknowledge the events of a fence up to a sequence. A sequence before the acknowledged one changes nothing.
+
+    Args:
+        name: the fence.
+        consumer: the name of the consumer, which is created if it is new.
+        sequence: the last sequence that has been processed.
+        uid: the uid of the fence that made the event: FenceReplacedError if the fence was created again since then.
+        timeout: seconds, instead of the client's.
+    """
+    request = pb.AckFenceRequest(name=name, consumer=consumer, sequence=sequence, uid=uid)
+    return Call("AckFence", request, lambda response: decode_consumer(response.consumer), timeout)
+
+
+def delete_consumer(name: str, consumer: str, *, timeout: float | None = None) -> Call[None]:
+    """Delete a consumer of a fence. What it has not acknowledged no longer counts as its backlog."""
+    request = pb.DeleteConsumerRequest(name=name, consumer=consumer)
+    return Call("DeleteConsumer", request, lambda _: None, timeout, repeatable=False)
+
+
+@dataclass(frozen=True, slots=True)
+class WatchingFence:
+    """A watch of a fence to begin."""
+
+    request: pb.WatchFenceRequest
+    reconnect: bool
+    timeout: float | None
+
+
+def watch_fence(
+    name: str,
+    consumer: str | None = None,
+    after: int | None = None,
+    *,
+    uid: str = "",
+    conflate: bool = False,
+    max_rate: float = 0.0,
+    progress_interval: float | None = None,
+    reconnect: bool = True,
+    timeout: float | None = None,
+) -> WatchingFence:
+    """Follow the events of a fence: an iterator that ends after the event "closed", when the fence is deleted.
+
+    >>> for event in client.watch_fence("depot", consumer="alarm"):  # doctest: +SKIP
+    ...     print(event.type, event.key)
+    ...     client.ack_fence("depot", "alarm", event.sequence)
+
+    It begins with the next event, unless a consumer or a sequence says where.
+
+    Args:
+        name: the fence.
+        consumer: the name of a durable consumer: the watch begins after the last event that it acknowledged, and for a
+            new consumer at the oldest event that is kept. The consumer outlives clients and servers; `ack_fence`
+            acknowledges.
+        after: the sequence after which to begin; 0 for all events that are kept.
+        uid: the uid of the fence whose sequences the caller has: FenceReplacedError if it was created again since then.
+        conflate: leave out events that cancel each other in what is sent together; not with a consumer.
+        max_rate: the most responses a second, each with all events since the one before; 0 for no limit.
+        progress_interval: seconds without an event after which an event "progress" is sent; None for never.
+        reconnect: whether the watch continues after a lost connection, however long that takes, without loss or
+            repetition. The first connection must succeed. Without it, UnavailableError ends the watch.
+        timeout: seconds after which the watch ends with DeadlineError; None for never.
+    """
+    if consumer is not None and after is not None:
+        raise ValueError("give either consumer, which knows its place, or after, not both")
+    if consumer is not None and conflate:
+        raise ValueError("conflate is for a watch without a consumer")
+    request = pb.WatchFenceRequest(name=name, uid=uid, conflate=conflate, max_responses_per_second=max_rate)
+    if consumer is not None:
+        request.consumer = consumer
+    elif after is not None:
+        request.after_sequence = after
+    else:
+        request.only_new = True
+    if progress_interval is not None:
+        request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
+    return WatchingFence(request, reconnect, timeout)
+
+
+def _config(
+    area: Any,
+    subjects: str | Prefix | None,
+    other_hull: str | None,
+    boundary: Boundary,
+    margin: float,
+    crosses: bool,
+    dwell: float | timedelta | None,
+    confirmations: int,
+    min_dwell: float | timedelta | None,
+    near: float,
+    without_self: bool,
+    max_events: int,
+    max_event_age: float | timedelta | None,
+) -> fence_pb2.FenceConfig:
+    if (subjects is None) == (other_hull is None):
+        raise ValueError("give either subjects or other_hull")
+    config = fence_pb2.FenceConfig(
+        boundary=choice("boundary", boundary, BOUNDARIES),
+        margin=as_coordinate(margin, "margin"),
+        near_distance=as_coordinate(near, "near"),
+        report_crosses=crosses,
+        confirmations=confirmations,
+        max_events=max_events,
+        dwell=None if dwell is None else encode_duration(dwell, "dwell"),
+        min_dwell=None if min_dwell is None else encode_duration(min_dwell, "min_dwell"),
+        max_event_age=None if max_event_age is None else encode_duration(max_event_age, "max_event_age"),
+    )
+    encode_area(as_area(area), without_self, config)
+    if isinstance(subjects, Prefix):
+        config.subject_prefix = subjects.text
+    elif subjects is not None:
+        config.subject_hull = subjects
+    elif other_hull is not None:
+        config.other_hull = other_hull
+    return config
+
+
+def _as_wanted(existing: Fence, wanted: Fence) -> Fence:
+    """The existing fence; FenceExistsError if it has other settings than the one to create."""
+    for setting in SETTINGS:
+        has, wants = getattr(existing, setting), getattr(wanted, setting)
+        if has != wants:
+            message = f"the fence {existing.name!r} exists with other settings: its {setting} is {has!r}, not {wants!r}"
+            raise FenceExistsError(message, grpc.StatusCode.ALREADY_EXISTS, "FENCE_EXISTS", {"value": existing.name})
+    return existing
