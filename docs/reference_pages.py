@@ -25,9 +25,15 @@ def commands() -> Iterator[str]:
     from typer.testing import CliRunner
 
     from dynhull_cli.commands import app
+    from dynhull_cli.groups import Group
 
     yield "# Commands\n"
-    for name in ["", *sorted(entry_points(group="dynhull.commands").names)]:
+    names = [""]
+    for entry in sorted(entry_points(group="dynhull.commands")):
+        command = entry.load()
+        parts = command.commands if isinstance(command, Group) else ()
+        names += [entry.name, *(f"{entry.name} {part}" for part in parts)]
+    for name in names:
         title = f"dynhull {name}".strip()
         help_text = CliRunner().invoke(app, [*name.split(), "--help"], prog_name="dynhull").output
         yield f"## {title}\n\n```text\n{help_text.strip()}\n```\n"

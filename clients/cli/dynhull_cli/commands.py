@@ -16,11 +16,13 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from .exits import Exit
+from .groups import Group
 
 GROUP = "dynhull.commands"
 PANELS = {
     "Hulls and their points": ("list", "create", "delete", "insert", "put", "remove", "load", "import"),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
+    "Fences": ("fences", "relay"),
     "Server": ("serve", "config", "token", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export"),
     "Getting to know dynhull": ("demo", "explain"),
@@ -43,6 +45,14 @@ class Flags:
 
 class Command(Flags, TyperCommand):
     """A command."""
+
+
+class CommandGroup(Flags, TyperGroup):
+    """A command that only groups others."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
+        """The names of the commands, in the order of their definition."""
+        return list(self.commands)
 
 
 class InstalledCommands(Flags, TyperGroup):
@@ -99,16 +109,39 @@ def _described(entry: EntryPoint, text: str | None) -> str | None:
 
 
 def _imported(entry: EntryPoint) -> Any:
-    command = typer.Typer(add_completion=False, rich_markup_mode="markdown")
     try:
         function = entry.load()
-        settings = getattr(function, "context_settings", None)
-        text = _described(entry, inspect.getdoc(function))
-        command.command(entry.name, cls=Command, help=text, context_settings=settings)(_explaining(entry, function))
     except ModuleNotFoundError as error:
         anything = {"allow_extra_args": True, "ignore_unknown_options": True}
+        command = _typer()
         command.command(entry.name, context_settings=anything)(_not_installed(entry, error))
-    return typer.main.get_command(command)
+        return typer.main.get_command(command)
+    return typer.main.get_command(_made(entry, entry.name, function))
+
+
+def _made(entry: EntryPoint, name: str, function: Callable[..., None] | Group) -> typer.Typer:
+    """The command of a function; of a group, the group with its commands."""
+    if isinstance(function, Group):
+        group = _typer(name=name, cls=CommandGroup, no_args_is_help=True, help=inspect.cleandoc(function.text))
+        group.callback()(lambda: None)  # without one, typer makes a group of one command that command
+        for each, part in function.commands.items():
+            if isinstance(part, Group):
+                group.add_typer(_made(entry, each, part))
+            else:
+                _add(group, entry, each, part, inspect.getdoc(part))
+        return group
+    command = _typer()
+    _add(command, entry, name, function, _described(entry, inspect.getdoc(function)))
+    return command
+
+
+def _add(app: typer.Typer, entry: EntryPoint, name: str, function: Callable[..., None], text: str | None) -> None:
+    settings = getattr(function, "context_settings", None)
+    app.command(name, cls=Command, help=text, context_settings=settings)(_explaining(entry, function))
+
+
+def _typer(**more: Any) -> typer.Typer:
+    return typer.Typer(add_completion=False, rich_markup_mode="markdown", **more)
 
 
 def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..., None]:

@@ -97,6 +97,8 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
             fail(Exit.FORBIDDEN, str(error))
         except sdk.HullNotFoundError as error:
             fail(Exit.FAILED, f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one.")
+        except sdk.FenceNotFoundError as error:
+            fail(Exit.FAILED, f"{error}\n`dynhull fences list` shows the fences of the server.")
         except sdk.InvalidRequestError as error:
             fail(Exit.UNUSABLE, str(error))
         except sdk.DynhullError as error:

@@ -1,0 +1,1 @@
+"""Bridges between dynhull and other systems: `dynhull relay` delivers the events of fences."""

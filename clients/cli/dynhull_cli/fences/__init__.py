@@ -1,0 +1,1 @@
+"""`dynhull fences`: the fences of a server and their events."""

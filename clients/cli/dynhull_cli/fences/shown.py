@@ -1,0 +1,119 @@
+"""Fences and their events as JSON and as text."""
+
+from dataclasses import asdict
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from dynhull_client import Circle, Fence, FenceEvent, Prefix
+
+from ..durations import shown
+from ..plural import plural
+
+if TYPE_CHECKING:
+    from dynhull_client import SubjectsInside
+
+
+def fence_members(fence: Fence) -> dict[str, Any]:
+    """A fence as members of JSON; members without a value are null."""
+    members = {name: getattr(fence, name) for name in Fence.__dataclass_fields__}
+    members["area"] = _area_json(fence)
+    members["subjects"] = {"prefix": fence.subjects.text} if isinstance(fence.subjects, Prefix) else fence.subjects
+    for span in ("dwell", "min_dwell", "max_event_age"):
+        members[span] = None if members[span] is None else members[span].total_seconds()
+    members["created"] = fence.created.isoformat()
+    members["consumers"] = [
+        asdict(each) | {"oldest": _time(each.oldest)}  # a datetime
+        for each in fence.consumers
+    ]
+    return members
+
+
+def event_members(event: FenceEvent) -> dict[str, Any]:
+    """An event as members of JSON: those that it has."""
+    members: dict[str, Any] = {
+        "type": event.type,
+        "fence": event.fence,
+        "sequence": event.sequence,
+        "uid": event.uid,
+        "hull": event.hull or None,
+        "key": event.key,
+        "cause": sorted(event.cause) or None,
+        "position": event.position,
+        "previous_position": event.previous_position,
+        "distance": event.distance,
+        "revision": event.revision or None,
+        "area_revision": event.area_revision or None,
+        "time": _time(event.time),
+        "event_time": _time(event.event_time),
+        "first_time": _time(event.first_time),
+        "first": event.first or None,
+        "last": event.last or None,
+        "conflated": event.conflated or None,
+    }
+    if event.type in ("snapshot", "closed"):
+        members["inside"] = [inside_members(each) for each in event.inside]
+    return {name: value for name, value in members.items() if value is not None}
+
+
+def inside_members(subjects: "SubjectsInside") -> dict[str, Any]:
+    """Keys of one hull as members of JSON."""
+    return {"hull": subjects.hull, "keys": list(subjects.keys), "revision": subjects.revision}
+
+
+def area_text(fence: Fence) -> str:
+    """The area in a few words."""
+    if isinstance(fence.area, str):
+        return f"hull {fence.area}"
+    if isinstance(fence.area, Circle):
+        return f"circle {fence.area.x:g} {fence.area.y:g} {fence.area.r:g}"
+    corners = sum(len(each.exterior) + sum(map(len, each.holes)) for each in fence.area)
+    several = f"{len(fence.area)} polygons" if len(fence.area) > 1 else "polygon"
+    return f"{several}, {plural(corners, 'corner')}"
+
+
+def subjects_text(fence: Fence) -> str:
+    """The subjects in a few words."""
+    if isinstance(fence.subjects, Prefix):
+        return f"{fence.subjects.text}*"
+    return fence.subjects if fence.subjects is not None else f"hull {fence.other_hull}"
+
+
+def settings_text(fence: Fence) -> str:
+    """The settings that are not the usual ones."""
+    found: list[str] = [fence.boundary] if fence.boundary != "closed" else []
+    found += [f"margin {fence.margin:g}"] if fence.margin else []
+    found += [f"near {fence.near:g}"] if fence.near else []
+    found += ["without self"] if fence.without_self else []
+    found += ["crosses"] if fence.crosses else []
+    found += [f"dwell {shown(fence.dwell)}"] if fence.dwell else []
+    found += [f"{fence.confirmations} confirmations"] if fence.confirmations > 1 else []
+    found += [f"min dwell {shown(fence.min_dwell)}"] if fence.min_dwell else []
+    return ", ".join(found)
+
+
+def event_cells(event: FenceEvent) -> tuple[str, ...]:
+    """Sequence, time, type, hull, key, x, y and causes; empty where the event has none."""
+    position = ("", "") if event.position is None else (repr(event.position[0]), repr(event.position[1]))
+    what = event.key
+    if event.type == "lost":
+        what = f"{event.first}-{event.last}"
+    elif event.type in ("snapshot", "closed"):
+        what = plural(sum(len(each.keys) for each in event.inside), "key")
+    time = "" if event.time is None else event.time.isoformat(timespec="milliseconds")
+    causes = ",".join(sorted(event.cause))
+    return (str(event.sequence), time, event.type, event.hull, "" if what is None else str(what), *position, causes)
+
+
+def _area_json(fence: Fence) -> Any:
+    if isinstance(fence.area, str):
+        return {"hull": fence.area}
+    if isinstance(fence.area, Circle):
+        return {"circle": [fence.area.x, fence.area.y, fence.area.r]}
+    rings = [each.__geo_interface__["coordinates"] for each in fence.area]
+    if len(rings) == 1:
+        return {"type": "Polygon", "coordinates": rings[0]}
+    return {"type": "MultiPolygon", "coordinates": rings}
+
+
+def _time(time: datetime | None) -> str | None:
+    return None if time is None else time.isoformat()

@@ -1,0 +1,29 @@
+"""Commands that consist of other commands."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+Function = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Group:
+    """A command that only groups others. Its module documents it with a function of its name.
+
+    Attributes:
+        text: the help.
+        commands: the commands, by name.
+    """
+
+    text: str
+    commands: Mapping[str, "Function | Group"]
+
+
+def group(**commands: "Function | Group") -> Callable[[Function], Any]:
+    """Make a group of a function without parameters, of which only the docstring counts."""
+
+    def grouped(documented: Function) -> Group:
+        return Group(documented.__doc__ or "", commands)
+
+    return grouped
