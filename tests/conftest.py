@@ -17,8 +17,8 @@ settings.load_profile("dynhull")
 
 @pytest.fixture(scope="session")
 def address() -> Iterator[str]:
-    """A server that tests share; each test uses hulls of its own."""
-    with server_process() as server:
+    """A server that tests share; each test uses hulls of its own. It starts and ends as it does for users."""
+    with server_process(wrap=["env"]) as server:
         yield server.address
 
 

@@ -14,8 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from command_line import dynhull
+from forked import COMMAND, Process
 from patience import wait_until
-from server_process import COMMAND
 
 import dynhull_cli
 from dynhull_client import HullClient
@@ -168,7 +168,7 @@ def test_an_interrupted_replacement_says_how_to_go_on(tmp_path, served, name):
     file = tmp_path / "points.csv"
     file.write_text("x,y\n" + "".join(f"{i},{i % 97}\n" for i in range(250_000)))
     command = [COMMAND, "load", name, file, "--replace"]
-    with HullClient(served) as client, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as loading:
+    with HullClient(served) as client, Process(command, stderr=subprocess.PIPE, text=True) as loading:
         wait_until(lambda: any(info.revision >= 1 for info in client.list_hulls(name)))
         loading.send_signal(signal.SIGINT)
         said = loading.stderr.read()

@@ -10,7 +10,8 @@ import pytest
 import trustme
 from command_line import dynhull, on_a_terminal
 from forgetful import FORGETFUL
-from server_process import COMMAND, PATIENCE, server_process
+from forked import COMMAND, Process
+from server_process import PATIENCE, run, server_process
 
 from dynhull_client import HullClient
 
@@ -80,7 +81,7 @@ def test_watch(hull):
 
 def test_watch_tells_each_change_at_once(hull, served):
     command = [COMMAND, "watch", hull, "--json", "--max-rate", "0", "--events", "3"]
-    with HullClient(served) as client, subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watching:
+    with HullClient(served) as client, Process(command, stdout=subprocess.PIPE, text=True) as watching:
         assert json.loads(watching.stdout.readline())["snapshot"]
         client.apply(hull, insert=[[9, 9]])
         event = json.loads(watching.stdout.readline())
@@ -325,9 +326,7 @@ def test_what_gRPC_would_not_explain(tmp_path, monkeypatch, options, words):  # 
     issued.cert_chain_pems[0].write_to_path(tmp_path / "cert")
     (tmp_path / "points.csv").write_text("x,y\n1,2\n")
     monkeypatch.chdir(tmp_path)
-    done = subprocess.run(
-        [COMMAND, "list", "--address", "127.0.0.1:1", *options.split(" ")], capture_output=True, text=True, check=False
-    )
+    done = run("list", "--address", "127.0.0.1:1", *options.split(" "))
     assert done.returncode == 2
     assert words in done.stderr
     assert done.stderr.count("\n") == 1

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 from command_line import dynhull, on_a_terminal
-from server_process import COMMAND
+from forked import COMMAND
 
 from dynhull_client import HullClient
 

@@ -11,8 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from command_line import dynhull
+from forked import COMMAND, Process
 from patience import wait_until
-from server_process import COMMAND, server_process
+from server_process import run, server_process
 
 from dynhull import convex_hull
 from dynhull_client import HullClient
@@ -214,7 +215,7 @@ def test_resume_after_the_command_was_killed(tmp_path, served, name):
     write(file, points)
     with (
         HullClient(served) as client,
-        subprocess.Popen([COMMAND, "load", name, file], stderr=subprocess.DEVNULL) as loading,
+        Process([COMMAND, "load", name, file], stderr=subprocess.DEVNULL) as loading,
     ):
         wait_until(lambda: any(info.revision >= 2 for info in client.list_hulls(name)))
         loading.kill()
@@ -236,10 +237,10 @@ def test_a_server_that_goes_and_comes_back(tmp_path):
     """First the server is down for too long, then it is back in time."""
     data = ("--data", str(tmp_path / "data"))
     rows = "".join(f"{x!r},{y!r}\n" for x, y in np.random.default_rng(1).normal(size=(16_384, 2)).tolist())
-    load = [COMMAND, "load", "a", "-", "--producer", "p"]
+    load = ["load", "a", "-", "--producer", "p"]
     with server_process(*data, killed=True) as server, HullClient(server.address) as client:
-        command = [*load, "--address", server.address, "--patience", "0.5"]
-        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading:
+        command = [COMMAND, *load, "--address", server.address, "--patience", "0.5"]
+        with Process(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading:
             loading.stdin.write("x,y\n" + rows)
             loading.stdin.flush()
             wait_until(lambda: any(info.revision >= 1 for info in client.list_hulls()))
@@ -253,8 +254,7 @@ def test_a_server_that_goes_and_comes_back(tmp_path):
     assert "The same command with --resume loads the rest" in said
     assert f"no answer from {server.address}" in said
     with server_process(*data) as server:
-        command = [*load, "--address", server.address, "--resume"]
-        done = subprocess.run(command, input="x,y\n" + rows * 2, capture_output=True, text=True, check=False)
+        done = run(*load, "--address", server.address, "--resume", given="x,y\n" + rows * 2)
         assert done.returncode == 0, done.stderr
         with HullClient(server.address) as client:
             assert client.get_hull("a").info.points == 32_768
@@ -264,7 +264,7 @@ def test_an_interruption(served, name):
     command = [COMMAND, "load", name, "-", "--producer", "p"]
     with (
         HullClient(served) as client,
-        subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading,
+        Process(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loading,
     ):
         loading.stdin.write("x,y\n" + "1,2\n" * 120_000)
         loading.stdin.flush()

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 import shapely
 from command_line import dynhull
-from server_process import COMMAND
+from forked import COMMAND
 
 from dynhull_client import HullClient
 

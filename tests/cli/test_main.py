@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from command_line import dynhull
-from server_process import COMMAND, PATIENCE
+from forked import COMMAND
+from patience import PATIENCE
 
 IMPORTED = """
 import sys

@@ -1,13 +1,13 @@
 """The dashboard answers only under its own names, and only to its own pages."""
 
 import http.client
-import subprocess
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 import pytest
 from dashboard_process import dashboard_process
-from server_process import COMMAND, PATIENCE
+from patience import PATIENCE
+from server_process import run
 
 UPGRADE = {
     "Connection": "Upgrade",
@@ -69,8 +69,7 @@ def test_a_refusal_names_the_option_that_allows_the_name(address: str, dashboard
 
 
 def test_a_name_that_cannot_be_one_is_an_error(address: str) -> None:
-    command = [COMMAND, "dashboard", "--port", "0", "--address", address, "--origin", "*.example.org"]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    ended = run("dashboard", "--port", "0", "--address", address, "--origin", "*.example.org")
     assert ended.returncode == 2
     assert "--origin is '*.example.org': expected HOST or HOST:PORT" in ended.stderr
 

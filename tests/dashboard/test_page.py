@@ -1,6 +1,5 @@
 """The dashboard in a real browser, on a real server."""
 
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from metrics import measured, scrape
 from patience import wait_until
 from peers import program
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
-from server_process import COMMAND, Server, server_process
+from server_process import Server, run, server_process
 
 from dynhull_client import HullClient
 
@@ -319,7 +318,7 @@ def test_each_empty_state_says_what_to_do(browser: Browser, tmp_path: Path) -> N
         client.create_hull("fleet")
         expect(note(page)).to_contain_text("fleet has no points yet. Add some: dynhull load fleet FILE.csv")
         advice = note(page).text_content().rpartition("dynhull ")[2].replace("FILE.csv", str(points))
-        subprocess.run([COMMAND, *advice.split()], check=True, capture_output=True)
+        assert run(*advice.split()).returncode == 0
         wait_for_vertices(page, "fleet", [[0, 0], [4, 0], [4, 4]])
         expect(note(page)).to_be_hidden()
         let_go(page, "fleet")
@@ -339,8 +338,7 @@ def test_each_empty_state_says_what_to_do(browser: Browser, tmp_path: Path) -> N
 
 def test_a_refused_token_is_named_as_the_cause(browser: Browser, tmp_path: Path) -> None:
     tokens = tmp_path / "tokens.toml"
-    made = subprocess.run([COMMAND, "token", "--read", "fleet"], check=True, capture_output=True, text=True)
-    tokens.write_text(made.stdout)
+    tokens.write_text(run("token", "--read", "fleet").stdout)
     with (
         server_process("--in-memory", "--tokens", str(tokens), complaints="UNAUTHENTICATED") as server,
         dashboard_process(server.address) as url,

@@ -6,9 +6,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from forked import COMMAND
 from metrics import fetch, measured
+from patience import PATIENCE
 from peers import program
-from server_process import COMMAND, PATIENCE
 
 from dynhull_client import HullClient
 

@@ -2,13 +2,13 @@
 
 import os
 import signal
-import subprocess
 from pathlib import Path
 
 import grpc
 import numpy as np
 import pytest
-from server_process import COMMAND, PATIENCE, server_process
+from patience import PATIENCE
+from server_process import run, server_process
 
 import dynhull
 from dynhull_client import HullClient, LimitExceededError
@@ -106,8 +106,7 @@ def test_a_watch_resumes_across_a_kill(tmp_path):
 def test_a_second_server_on_the_folder_is_refused(tmp_path):
     options = ["--data", str(tmp_path / "data")]
     with server_process(*options):
-        command = [COMMAND, "serve", "--port", "0", *options]
-        second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        second = run("serve", "--port", "0", *options)
     assert second.returncode == 2
     assert "another server" in second.stderr
     assert "Traceback" not in second.stderr

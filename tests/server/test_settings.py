@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from command_line import dynhull
-from server_process import COMMAND, PATIENCE, server_process
+from forked import COMMAND, Process
+from server_process import PATIENCE, server_process
 
 from dynhull_client import HullClient, LimitExceededError
 
@@ -84,7 +85,7 @@ def test_help_shows_every_setting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_log_is_json_where_told() -> None:
     command = [COMMAND, "serve", "--port", "0", "--in-memory", "--log-format", "json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with Process(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         address = process.stdout.readline().split()[-1]
         process.terminate()
         assert process.wait(PATIENCE) == 0

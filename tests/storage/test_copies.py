@@ -26,7 +26,8 @@ from folders import (
     snapshot,
     stopped,
 )
-from server_process import COMMAND, PATIENCE, server_process
+from forked import COMMAND, Process
+from server_process import PATIENCE, server_process
 
 from dynhull_client import HullClient
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, Kept, PointRows, Record
@@ -89,7 +90,7 @@ def test_a_backup_takes_the_moment_it_began_at(paths):
     batch = np.zeros((50_000, 2))
     for revision in range(1, 21):
         storage.commit([Append(1, [Record(revision, PointRows(batch, batch[:0]))])])
-    with subprocess.Popen([COMMAND, "backup", copy, "--data", data]) as backup:
+    with Process([COMMAND, "backup", copy, "--data", data]) as backup:
         revision = 20
         while backup.poll() is None:
             revision += 1

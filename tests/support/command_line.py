@@ -2,9 +2,9 @@
 
 import os
 import pty
-import subprocess
 
-from server_process import COMMAND, PATIENCE
+from forked import COMMAND, Process
+from patience import PATIENCE
 from typer.testing import CliRunner, Result
 
 from dynhull_cli.commands import app
@@ -18,7 +18,7 @@ def dynhull(*arguments: object, input: str | bytes | None = None) -> Result:  # 
 def on_a_terminal(*arguments: str, answer: bytes = b"") -> tuple[int, str]:
     """Run a command on a terminal of its own; returns its exit code and what it showed."""
     controller, terminal = pty.openpty()
-    with subprocess.Popen([COMMAND, *arguments], stdin=terminal, stdout=terminal, stderr=terminal) as command:
+    with Process([COMMAND, *arguments], stdin=terminal, stdout=terminal, stderr=terminal) as command:
         os.close(terminal)
         os.write(controller, answer)
         code = command.wait(PATIENCE)

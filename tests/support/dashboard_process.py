@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from urllib.parse import urlencode
 
+from forked import COMMAND, Process
+from patience import PATIENCE
 from playwright.sync_api import Browser, Page
-from server_process import COMMAND, PATIENCE
 
 PATIENCE_OF_BROWSER = 30_000  # milliseconds
 LOUD = "warning", "error"
@@ -24,7 +25,7 @@ def dashboard_process(address: str, *options: str) -> Iterator[str]:
     command = [COMMAND, "dashboard", "--port", "0", "--address", address, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+        Process(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
     ):
         try:
             first_line = process.stdout.readline()

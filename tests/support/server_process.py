@@ -2,17 +2,16 @@
 
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
+from subprocess import PIPE
 
+from forked import COMMAND, Process
 from patience import PATIENCE
 
 UNFINISHED = "is incomplete or damaged and was dropped, with at most 1 of the newest commits"
-COMMAND = str(Path(sys.executable).with_name("dynhull"))
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ def server_process(
     command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *memory, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+        Process(command, stdout=PIPE, stderr=errors, text=True) as process,
     ):
         try:
             first_line = process.stdout.readline()
@@ -57,6 +56,9 @@ def server_process(
             assert complaints in said if complaints else not said, said
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """The `dynhull` command, to its end."""
-    return subprocess.run([COMMAND, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)
+def run(*arguments: object, given: str = "") -> subprocess.CompletedProcess[str]:
+    """The `dynhull` command, to its end, with `given` as its standard input."""
+    command = [COMMAND, *map(str, arguments)]
+    with Process(command, stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True) as process:
+        output, errors = process.communicate(given, timeout=PATIENCE)
+    return subprocess.CompletedProcess(command, process.returncode, output, errors)

@@ -25,13 +25,15 @@ from pathlib import Path
 
 import grpc
 import numpy as np
+
+sys.path.append(str(Path(__file__).parents[2] / "support"))
+from forked import COMMAND, Process
 from promises import BrokenPromiseError, require
 
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-COMMAND = str(Path(sys.executable).with_name("dynhull"))
 KEYED = "kept/keys"
 KEPT = ["kept/a", "kept/b", "kept/c", KEYED]
 CHURNED = ["churned/a", "churned/b", "churned/c"]
@@ -73,7 +75,7 @@ class Server:
         command = [COMMAND, "serve", "--port", str(self.port), "--data", str(self.data), "--create-on-write"]
         command += ["--snapshot-points", "500", "--log-level", "warning"]
         with self.log.open("ab") as log:
-            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+            self.process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
         line = self.process.stdout.readline()
         require("serving on" in line, f"the server did not start: {self.log.read_text()}")
         self.port = int(line.rsplit(":", 1)[1])

@@ -56,13 +56,14 @@ from actors import (
     last_sequence,
     persist,
 )
+from forked import COMMAND, Process
 from promises import require
 from proxy import Proxy
+from server_process import run
 from timed import ModelledHull, Shuttle, TimedWriter, wall
 from timeline import FLEETS, SECOND, TIMED
 
 HULL = "tortured"
-COMMAND = str(Path(sys.executable).with_name("dynhull"))
 DISK = "64m"
 PAGE_BYTES = 8192  # of the database
 
@@ -82,7 +83,7 @@ class Server:
         command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--data", str(self.data)]
         command += ["--create-on-write", "--snapshot-points", "300", "--log-level", "warning", "--scrub-cpu", "0"]
         with self._log.open("ab") as log:
-            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+            self.process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
         line = self.process.stdout.readline()
         if "serving on" not in line:
             self.process.wait()
@@ -224,8 +225,8 @@ class Torture:
             self._check_copy(restored, acknowledged)
 
     def _command(self, *words: str) -> None:
-        run = subprocess.run([COMMAND, *words], capture_output=True, text=True, check=False)
-        require(run.returncode == 0, f"dynhull {' '.join(words)}: {run.stderr}")
+        done = run(*words)
+        require(done.returncode == 0, f"dynhull {' '.join(words)}: {done.stderr}")
 
     def _check_copy(self, copied: Server, acknowledged: dict[str, int]) -> None:
         copied.start()

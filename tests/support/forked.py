@@ -1,0 +1,153 @@
+"""`dynhull` commands, each in a process of its own that starts fast.
+
+Importing what a server needs takes a second of processor time; forking a process that has imported it takes a few
+milliseconds. On Linux the commands of the tests are forked from this file, which runs as a process for each worker.
+"""
+
+import atexit
+import ctypes
+import gc
+import importlib
+import inspect
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import NoReturn
+
+COMMAND = str(Path(sys.executable).with_name("dynhull"))
+
+# What the commands import when they run.
+RUN_BY = {"serve": ["dynhull_server.process"], "dashboard": ["dynhull_client", "dynhull_dashboard.serve"]}
+RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
+
+CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl
+REQUEST_BYTES = 2**18
+
+
+class Process(subprocess.Popen[str]):
+    """`subprocess.Popen`, but the process is forked if it runs `COMMAND` in the environment of this one."""
+
+    def _execute_child(self, *arguments: object) -> None:
+        call = inspect.signature(super()._execute_child).bind(*arguments).arguments
+        ours = [call[each] for each in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
+        if sys.platform != "linux" or call["args"][0] != COMMAND or call["env"] is not None:
+            super()._execute_child(*arguments)
+            return
+        files = [number if given == -1 else given for number, given in enumerate((ours[0], ours[3], ours[5]))]
+        try:
+            self.pid = _fork(list(map(str, call["args"])), str(call["cwd"] or Path.cwd()), files)
+        finally:
+            self._close_pipe_fds(*ours)
+        self._child_created = True
+
+
+_lock = threading.Lock()
+
+
+def _fork(command: list[str], folder: str, files: list[int]) -> int:
+    """The number of a process that runs the command with these files as its standard ones, a child of this process."""
+    request = json.dumps([command, folder, dict(os.environ)]).encode()
+    with _lock:
+        parent = _parent()
+        adopt = ctypes.CDLL(None).prctl
+        adopt(CHILD_SUBREAPER, 1, 0, 0, 0)
+        try:
+            socket.send_fds(parent, [request], files)
+            return int(parent.recv(64))
+        finally:
+            adopt(CHILD_SUBREAPER, 0, 0, 0, 0)
+
+
+@cache
+def _parent() -> socket.socket:
+    """The connection with the process that forks, which ends with this process."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with theirs:
+        process = subprocess.Popen([sys.executable, __file__, str(theirs.fileno())], pass_fds=[theirs.fileno()])
+
+    def end() -> None:
+        ours.close()
+        process.wait()
+
+    atexit.register(end)
+    return ours
+
+
+def _wait_to_be(connection: socket.socket) -> None:
+    """Answer requests, and return in each forked process, as the process of its command."""
+    while True:
+        request, files, _flags, _address = socket.recv_fds(connection, REQUEST_BYTES, 3)
+        if not request:
+            sys.exit()
+        command, folder, environment = json.loads(request)
+        _import_for(command[1:2])
+        reads, writes = os.pipe()
+        if (middle := os.fork()) == 0:
+            if (process := os.fork()) != 0:
+                # With the end of its parent, the process becomes a child of the one that asked for it.
+                os.write(writes, str(process).encode())
+                os._exit(0)
+            for each in (reads, writes):
+                os.close(each)
+            connection.close()
+            _become(command, folder, environment, files)
+            return
+        os.waitpid(middle, 0)
+        connection.send(os.read(reads, 64))
+        for each in (reads, writes, *files):
+            os.close(each)
+
+
+def _import_for(names: list[str]) -> None:
+    for entry in entry_points(group="dynhull.commands"):
+        if entry.name in names:
+            for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
+                importlib.import_module(module)
+    gc.freeze()  # a collection would write to, and so copy, all of the memory that the processes share
+
+
+def _become(command: list[str], folder: str, environment: dict[str, str], files: list[int]) -> None:
+    for number, file in enumerate(files):
+        os.dup2(file, number)
+        os.close(file)
+    os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
+    time.tzset()
+    sys.argv = command
+    sys.stdin, sys.stdout, sys.stderr = (
+        open(number, mode, buffering, encoding=old.encoding, errors=old.errors, closefd=False)  # noqa: SIM115
+        for number, mode, buffering, old in ((0, "r", -1, sys.stdin), (1, "w", -1, sys.stdout), (2, "w", 1, sys.stderr))
+    )
+
+
+def _leave(code: int) -> NoReturn:
+    """End this process as Python would, but without the half second in which it takes the modules apart."""
+    threading._shutdown()
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+if __name__ == "__main__":
+    from dynhull_cli.main import main
+
+    # OpenBLAS, which numpy starts, ends its threads before a fork.
+    warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+    sys.path[0] = str(Path(COMMAND).parent)
+    _wait_to_be(socket.socket(fileno=int(sys.argv[1])))
+    try:
+        main()
+    except SystemExit as end:
+        if isinstance(end.code, int):
+            _leave(end.code)
+        raise
