@@ -24,20 +24,29 @@ from .failure import text_of
 from .listening import listening_error, why_not
 from .rpc.access import ANONYMOUS, LOOK_SECONDS, Caller, TokenFile
 from .rpc.calls import Calls, Context
+from .rpc.fence_service import FenceService
 from .rpc.health import Health
 from .rpc.hull_service import HullService
-from .rpc.methods import DESCRIPTOR, UnknownMethods, health_handlers, hull_handlers, reflection_handlers
+from .rpc.methods import (
+    DESCRIPTOR,
+    FENCES,
+    UnknownMethods,
+    fence_handlers,
+    health_handlers,
+    hull_handlers,
+    reflection_handlers,
+)
 from .rpc.metrics import Metrics, StateCollector
 from .rpc.metrics_page import MetricsPage
 from .rpc.places import Places
 from .settings import Settings, is_loopback
-from .state.limits import Limits
+from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
 from .storage.memory import MemoryStorage
 from .storage.port import Storage
 from .storage.sqlite.storage import SQLiteStorage
 
-SERVICE = DESCRIPTOR.full_name
+SERVICES = DESCRIPTOR.full_name, FENCES.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm.
 SCRUB = "dynhull.v1.scrub"
 
@@ -81,6 +90,13 @@ class Server:
             max_producers=settings.max_producers,
             max_producers_per_caller=settings.max_producers_per_caller,
             history_bytes=settings.history_bytes,
+            fences=FenceLimits(
+                max_fences=settings.max_fences,
+                max_fence_consumers=settings.max_fence_consumers,
+                max_fence_events=settings.max_fence_events,
+                max_fence_event_age=settings.max_fence_event_age,
+                fence_history_bytes=settings.fence_history_bytes,
+            ),
         )
         self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
         self._metrics = Metrics()
@@ -129,9 +145,16 @@ class Server:
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )
+        fences = FenceService(
+            self._engine,
+            self._metrics,
+            max_corners=self._settings.max_fence_corners,
+            max_watch_lag=self._settings.max_watch_lag,
+        )
         self._server.add_generic_rpc_handlers(
             (
                 hull_handlers(service, self._calls),
+                fence_handlers(fences, self._calls),
                 health_handlers(self._health, self._calls),
                 reflection_handlers(self._calls),
                 UnknownMethods(self._calls),
@@ -140,7 +163,7 @@ class Server:
         port = self._listen()
         self.address = f"{self._settings.host}:{port}"
         self._serve_metrics()
-        self._health.set(NOT_SERVING, "", SERVICE)
+        self._health.set(NOT_SERVING, "", *SERVICES)
         await self._server.start()
         for note in await self._engine.start(progress):
             log.warning("lost", extra={"what": note})
@@ -178,7 +201,7 @@ class Server:
     def _set_health(self, reason: str | None) -> None:
         """Update the health status."""
         if self._serving:
-            self._health.set(SERVING if reason is None else NOT_SERVING, "", SERVICE)
+            self._health.set(SERVING if reason is None else NOT_SERVING, "", *SERVICES)
 
     def _listen(self) -> int:
         settings = self._settings

@@ -63,6 +63,17 @@ class Settings(BaseModel):
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds that a watcher may take to receive one event.")
     history_bytes: int = Field(4 * 2**20, ge=0, description="Memory per hull for the history that watches resume from.")
 
+    max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
+    max_fence_corners: int = Field(100_000, ge=3, description="Largest number of corners of the area of a fence.")
+    max_fence_consumers: int = Field(1_000, ge=1, description="Largest number of durable consumers of a fence.")
+    max_fence_events: int = Field(
+        1_000_000, ge=1, description="Number of events of a fence to keep, at most; older ones are dropped."
+    )
+    max_fence_event_age: float = Field(
+        0.0, ge=0, description="Seconds after which events of fences are dropped; 0 to keep them."
+    )
+    fence_history_bytes: int = Field(2**18, ge=0, description="Memory per fence for its recent events.")
+
     scrub_cpu: float = Field(
         0.05,
         ge=0,

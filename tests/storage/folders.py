@@ -6,6 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
+from dynhull.keys import PackedKeys
+from dynhull_server.state.fences.config import FenceConfig, PolygonArea
+from dynhull_server.state.fences.records import (
+    AddFence,
+    AppendEvents,
+    Cause,
+    Consumer,
+    EventType,
+    FenceEvent,
+    FenceRow,
+    Inside,
+    Members,
+    PutConsumer,
+)
 from dynhull_server.state.records import Append, Contents, Create, HullRow, Kept, PointRows, Record
 from dynhull_server.storage.sqlite.folder import DATABASE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -63,6 +77,36 @@ def fill(storage, last, name="fleet", number=1):
 def append(storage, first, last, number=1):
     for each in records(first, last):
         storage.commit([Append(number, [each])])
+
+
+def fence_row(number=9, name="gate", hull="fleet"):
+    area = PolygonArea(((np.array([[0, 0], [4, 0], [0, 3]], "<f8").tobytes(),),))
+    return FenceRow(number, name, f"uid{number}", 12.5, FenceConfig(area, "hull", hull, margin=0.5))
+
+
+def event(sequence, kind=None, key=None):
+    """An event: keys enter and leave in turn."""
+    kind = kind or (EventType.ENTER if sequence % 2 else EventType.EXIT)
+    key = key or f"é{(sequence + 1) // 2}"
+    here, before = (float(sequence), 0.1), (sequence - 0.5, 0.1)
+    distance = 0.0 if kind is EventType.ENTER else 0.625
+    time = 1_700_000_000_000_000 + sequence
+    return FenceEvent(
+        sequence, kind, int(Cause.MOVED), "fleet", key, sequence, 0, here, before, distance, time - 9, time
+    )
+
+
+def events(first, last):
+    return [event(sequence) for sequence in range(first, last + 1)]
+
+
+def fill_fence(storage, last, number=9, hull="fleet"):
+    """A fence with a commit for each event, a consumer, and one who was inside from the beginning."""
+    inside = Inside(0, (Members(hull, PackedKeys.pack(["a"]), 1),))
+    storage.commit([AddFence(fence_row(number, hull=hull), inside)])
+    for each in events(1, last):
+        storage.commit([AppendEvents(number, [each])])
+    storage.commit([PutConsumer(number, Consumer("mail", 1, 0))])
 
 
 def snapshot(storage, revision, number=1):

@@ -4,12 +4,26 @@ import io
 import itertools
 import sqlite3
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from folders import same
+from folders import event, events, fence_row, fill_fence, same
 
 from dynhull.keys import PackedKeys
+from dynhull_server.state.fences.records import (
+    AddFence,
+    AppendEvents,
+    ChangeFence,
+    Consumer,
+    DropConsumer,
+    DropEvents,
+    DropFence,
+    EventType,
+    Inside,
+    Members,
+    PutConsumer,
+)
 from dynhull_server.state.records import (
     FOREVER,
     NO_TIME,
@@ -421,3 +435,118 @@ def test_housekeeping_changes_nothing(opened):
     opened.storage.settle()
     assert opened.storage.bytes_used() >= 0
     same(opened.storage.read(1).records, records(1, 3))
+
+
+# Fences
+
+
+def fenced(opened, last, number=9):
+    """A fence with `last` events, and the hull that it depends on."""
+    if opened.storage.row(1) is None:
+        opened.commit(Create(row(1, "fleet")))
+    fill_fence(opened.storage, last, number)
+
+
+def inside_of(opened, number=9):
+    kept = opened.storage.read_fence(number)
+    return {each.hull: list(each.keys) for each in kept.inside.members}
+
+
+def test_a_fence_comes_back_with_its_events(opened):
+    assert opened.contents.fences == []
+    fenced(opened, 3)
+    opened.commit(AppendEvents(9, events(4, 6)), PutConsumer(9, Consumer("mail", 5, 2)))
+    for _ in range(2):
+        kept = opened.storage.read_fence(9)
+        assert kept.row == fence_row()
+        assert kept.events == events(1, 6)
+        assert (kept.first, kept.last, kept.consumers) == (1, 6, {"mail": Consumer("mail", 5, 2)})
+        assert inside_of(opened) == {"fleet": ["a"]}
+        assert opened.storage.read_events(9, 2, 2) == events(3, 4)
+        assert opened.storage.read_events(9, 6, 2) == []
+        opened.reopen()
+        assert opened.contents.fences == [fence_row()]
+        assert opened.contents.next_number == 10
+    assert opened.storage.read_fence(1) is None
+
+
+def test_all_kinds_of_events_come_back(opened):
+    members = (Members("fleet", PackedKeys.pack(["a", "é"]), 7), Members("b", np.array([2, 2**63], np.uint64), 2**40))
+    kinds = [
+        event(1)._replace(type=EventType.SNAPSHOT, key=None, hull="", position=None, previous=None, distance=None),
+        event(2)._replace(key=2**64 - 1, event_time=NO_TIME, area_revision=5, causes=255, distance=float("inf")),
+        event(3)._replace(hull="other", time=3, first_time=1, previous=None, distance=5e-324),
+        event(4)._replace(position=None, distance=None, previous=(-1e308, 5e-324), subject_revision=2**50),
+    ]
+    kinds[0] = kinds[0]._replace(inside=members)
+    fenced(opened, 0)
+    opened.commit(AppendEvents(9, kinds))
+    same(opened.reopen().storage.read_fence(9).events[0].inside[0].keys.data, members[0].keys.data)
+    found = opened.storage.read_events(9, 0, 10)
+    assert found[1:] == kinds[1:]
+    assert [(each.hull, list(each.keys), each.revision) for each in found[0].inside] == [
+        ("fleet", ["a", "é"], 7),
+        ("b", [2, 2**63], 2**40),
+    ]
+
+
+def test_who_is_inside_replaces_earlier_events(opened):
+    fenced(opened, 6)
+    members = (Members("fleet", PackedKeys.pack(f"key {i:05}" for i in range(40_000)), 4),)
+    opened.carry_out(opened.storage.inside(9, Inside(4, members)))
+    for _ in range(2):
+        kept = opened.storage.read_fence(9)
+        assert (kept.inside.sequence, kept.events, kept.first) == (4, events(5, 6), 1)
+        assert [key for each in kept.inside.members for key in each.keys] == list(members[0].keys)
+        opened.reopen()
+    assert opened.storage.boundary(9, 7) == 5  # later events lead from there to who is inside now
+    opened.commit(DropEvents(9, 5))
+    for _ in range(2):
+        assert opened.storage.read_events(9, 0, 10) == events(5, 6)
+        assert opened.storage.read_fence(9).first == 5
+        opened.reopen()
+
+
+def test_settings_and_consumers_of_a_fence_change(opened):
+    fenced(opened, 2)
+    changed = replace(fence_row(), config=replace(fence_row().config, margin=0.0, max_events=7))
+    opened.commit(ChangeFence(changed), PutConsumer(9, Consumer("post")), DropConsumer(9, "mail"))
+    for _ in range(2):
+        kept = opened.storage.read_fence(9)
+        assert (kept.row, kept.consumers) == (changed, {"post": Consumer("post")})
+        opened.reopen()
+
+
+def test_a_deleted_fence_leaves_nothing(opened):
+    fenced(opened, 3)
+    opened.commit(AppendEvents(9, events(4, 4)), DropFence(9))
+    fenced(opened, 1, number=10)
+    opened.carry_out(opened.storage.sweep())
+    assert opened.carry_out(opened.storage.inside(9, Inside(3))) <= 1
+    for _ in range(2):
+        assert opened.storage.read_fence(9) is None
+        assert opened.storage.read_fence(10).events == events(1, 1)
+        assert opened.contents.next_number in (1, 11)
+        opened.reopen()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        AddFence(fence_row(), Inside()),
+        AppendEvents(9, events(2, 3)),
+        AppendEvents(9, events(4, 4)),
+        AppendEvents(8, events(1, 1)),
+        ChangeFence(fence_row(8)),
+        DropFence(8),
+        PutConsumer(8, Consumer("mail")),
+    ],
+)
+def test_changes_of_fences_that_do_not_fit_are_refused(opened, change):
+    fenced(opened, 2)
+    with pytest.raises(NotCommittedError):
+        opened.commit(AppendEvents(9, events(3, 3)), PutConsumer(9, Consumer("post")), change, change)
+    for _ in range(2):
+        kept = opened.storage.read_fence(9)
+        assert (kept.events, list(kept.consumers)) == (events(1, 2), ["mail"])
+        opened.reopen()

@@ -12,6 +12,7 @@ from folders import (
     LOG,
     append,
     fill,
+    fill_fence,
     flip,
     killed,
     opened,
@@ -168,7 +169,8 @@ def test_a_foreign_value_in_any_column_is_refused_or_repaired_with_a_note(folder
     for step in storage.snapshot(1, Kept(3, Contents(points_of(storage, 1)))):
         storage.commit([step])
     append(storage, 4, 6)
-    kept = [points_of(storage, number) for number in (1, 2)]
+    fill_fence(storage, 4)
+    kept, fence = [points_of(storage, number) for number in (1, 2)], storage.read_fence(9)
     storage.close()
     with closing(sqlite3.connect(folder / DATABASE)) as database:
         columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
@@ -191,6 +193,7 @@ def test_a_foreign_value_in_any_column_is_refused_or_repaired_with_a_note(folder
         if not contents.notes:
             for number, expected in enumerate(kept, start=1):
                 np.testing.assert_array_equal(points_of(storage, number), expected)
+            assert storage.read_fence(9) == fence
         storage.close()
     assert damaged >= 2 * len(columns)
 

@@ -28,6 +28,7 @@ from ..state.events import (
     Request,
     Retried,
     Retry,
+    Stir,
     Stopping,
     Tick,
     WriteBatch,
@@ -40,6 +41,8 @@ from ..state.records import DEFAULT, HullSettings, Kept
 from ..state.trip import Trip
 from ..storage.port import Contents, Progress, Storage
 from .batch_stream import BatchStream
+from .fence_keeping import FenceKeeping
+from .fences import Fences
 from .group_commit import GroupCommit
 from .housekeeping import Housekeeping
 from .live_hull import LiveHull
@@ -89,6 +92,9 @@ class Engine:
         storage: keeps the hulls.
         supervisor: receives all failures in the background.
         machine: time, threads and random names.
+
+    Attributes:
+        fences: the fences.
     """
 
     def __init__(self, limits: Limits, storage: Storage, supervisor: Supervisor, machine: Machine) -> None:
@@ -97,6 +103,7 @@ class Engine:
         self._supervisor = supervisor
         self._machine = machine
         self._core = Core(limits)
+        self.fences = Fences(self, storage)
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
         self._calls: deque[Callable[[], None]] = deque()
@@ -137,6 +144,7 @@ class Engine:
             unsaved = sum(len(record.rows) for record in kept.records)
             self._core.restore(row, state, unsaved)
             progress(done, len(contents.hulls))
+        await self.run(self._turns, partial(self._restore_fences, contents))
         self._time = ServerTime(clock, self._core.latest_time)
         self._commits = GroupCommit(
             self._storage,
@@ -149,7 +157,13 @@ class Engine:
         self._started = True
         self._supervisor.every(TICK, "clock", self._tick)
         self._supervisor.every(WATCH_SECONDS, "commit watch", self._watch_commits)
+        keeping = FenceKeeping(self, self._storage, clock, self._limits.fences)
+        self._supervisor.every(keeping.SECONDS, "fences", keeping.round)
         return contents.notes
+
+    def _restore_fences(self, contents: Contents) -> None:
+        kept = [self._storage.read_fence(row.number) for row in contents.fences]
+        self._core.restore_fences([each for each in kept if each is not None])
 
     def keep_house(self, snapshot_points: int, sync_seconds: float | None) -> None:
         """Begin the background work on the storage.
@@ -217,7 +231,7 @@ class Engine:
 
     async def create(self, name: str, settings: HullSettings = DEFAULT) -> LiveHull:
         """Create an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
-        hull: Hull = await self.ask(CreateHull(Waiter(), name, self._birth(), settings))
+        hull: Hull = await self.ask(CreateHull(Waiter(), name, self.birth(), settings))
         return self._live_hull(hull)
 
     async def delete(self, name: str) -> None:
@@ -231,7 +245,7 @@ class Engine:
         """
         request.to, request.name = Waiter(), name
         if create:
-            request.birth = self._birth()
+            request.birth = self.birth()
         request.arrived = self.time()
         applied: Applied = await self.ask(request)
         return applied
@@ -251,7 +265,7 @@ class Engine:
             HullNotFoundError: no hull has that name, and `create` is False.
         """
         hull = self._core.get(name) if self.has(name) or not create else None
-        return BatchStream(self, name, hull, notify, self._birth)
+        return BatchStream(self, name, hull, notify, self.birth)
 
     def time(self) -> int:
         """The server's clock, in microseconds since 1970."""
@@ -284,6 +298,11 @@ class Engine:
             raise
         finally:
             self._stepping = False
+
+    @property
+    def core(self) -> Core:
+        """The core; only the engine's own parts look into it."""
+        return self._core
 
     async def ask(self, request: Request) -> Any:
         """The result of a request with a Waiter, or raise its error. Cancelling the caller ends only the wait."""
@@ -336,6 +355,8 @@ class Engine:
                 self._compute(effect.ticket)
             case Examine():
                 self._examine(effect)
+            case Stir():
+                self.fences.stir(effect.fences)
             case Retry():
                 self._supervisor.failed("examination", effect.reason)
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))
@@ -383,7 +404,10 @@ class Engine:
 
         def examined() -> Event:
             try:
-                return Examined(effect.ticket, [self._stored(number, load) for number, load in effect.hulls])
+                states = [self._stored(number, load) for number, load in effect.hulls]
+                fences = [self._storage.read_fence(number) for number in effect.fences]
+                restored = None if effect.restore is None else effect.restore(states, fences)
+                return Examined(effect.ticket, states, fences, restored)
             except Exception as error:  # no error may end the trip
                 return NotExamined(effect.ticket, error)
 
@@ -440,7 +464,8 @@ class Engine:
         if since is not None and now - since > STUCK:
             self._supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))
 
-    def _birth(self) -> Birth:
+    def birth(self) -> Birth:
+        """The origin of a hull or fence that is created now."""
         return Birth(self._machine.token(), self._machine.clock.wall())
 
     def _live_hull(self, hull: Hull) -> LiveHull:

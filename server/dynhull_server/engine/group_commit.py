@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..state.records import Change
+from ..state.changes import Change
 from ..storage.port import NotCommittedError, Step, Storage
 from .threads import Clock, Inbox, Threads
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points, packed_points, plain_points
-from dynhull_proto.v1 import hull_service_pb2, points_pb2
+from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 
 from .readings import Reading
 
@@ -67,7 +67,9 @@ def decode_sequence(producer: str, sequence: int) -> int:
     return sequence
 
 
-def decode_page(request: hull_service_pb2.ListHullsRequest) -> tuple[str, str, int]:
+def decode_page(
+    request: hull_service_pb2.ListHullsRequest | fence_service_pb2.ListFencesRequest,
+) -> tuple[str, str, int]:
     """The prefix, the name before the page, and the size of the page."""
     if not NAME_CHARACTERS.fullmatch(request.prefix):
         raise InvalidFieldError("prefix", request.prefix, 'names consist of letters, digits and "._-/"')
@@ -214,15 +216,17 @@ def decode_resume(request: hull_service_pb2.WatchRequest) -> Resume | None:
     return Resume(request.resume.uid, request.resume.revision)
 
 
-def decode_rate(events_per_second: float) -> float:
+def decode_rate(events_per_second: float, field: str = "max_events_per_second") -> float:
     """The least number of seconds between events."""
     if not 0 <= events_per_second < math.inf:
-        raise InvalidFieldError("max_events_per_second", events_per_second, "must be finite and not negative")
+        raise InvalidFieldError(field, events_per_second, "must be finite and not negative")
     # Lower rates are treated as one event per day.
     return min(1 / events_per_second, LONGEST_INTERVAL) if events_per_second else 0.0
 
 
-def decode_interval(request: hull_service_pb2.WatchRequest) -> float | None:
+def decode_interval(
+    request: hull_service_pb2.WatchRequest | fence_service_pb2.WatchFenceRequest,
+) -> float | None:
     """Seconds without an event before a progress mark, None for no marks."""
     if not request.HasField("progress_interval"):
         return None

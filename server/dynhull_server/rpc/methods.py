@@ -16,20 +16,34 @@ from google.protobuf.message_factory import GetMessageClass
 from grpc_health.v1 import health_pb2
 from grpc_reflection.v1alpha import reflection, reflection_pb2
 
-from dynhull_proto.v1 import hull_service_pb2
+from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2
 
 from ..state.errors import LimitExceededError
 from .calls import Call, Calls, Context, Received, Work
+from .fence_service import FenceService
 from .health import MAX_BYTES, Health
 from .hull_service import HullService
 from .status import MethodUnknownError
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
+FENCES = fence_service_pb2.DESCRIPTOR.services_by_name["FenceService"]
 HEALTH = health_pb2.DESCRIPTOR.services_by_name["Health"]
 REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 
 # A draining server lets these calls finish, and cuts off the others.
-FINISHED = {"CreateHull", "DeleteHull", "ListHulls", "Apply", "ApplyTogether"}
+FINISHED = {
+    "CreateHull",
+    "DeleteHull",
+    "ListHulls",
+    "Apply",
+    "ApplyTogether",
+    "CreateFence",
+    "ReplaceFence",
+    "DeleteFence",
+    "ListFences",
+    "AckFence",
+    "DeleteConsumer",
+}
 
 # The name of all unknown methods in the counts of calls.
 UNKNOWN_METHOD = "unknown"
@@ -39,11 +53,12 @@ Behave = Callable[[Any, Call], Awaitable[Any]]
 
 def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
     """The handlers of the hull service."""
-    works = {}
-    for method in DESCRIPTOR.methods:
-        make = _streaming if method.client_streaming or method.server_streaming else _unary
-        works[method.name] = make(method, getattr(service, method.name))
-    return _handlers(DESCRIPTOR, works, "", calls, calls.admit, calls.max_message_bytes)
+    return _own_handlers(DESCRIPTOR, service, calls)
+
+
+def fence_handlers(service: FenceService, calls: Calls) -> grpc.GenericRpcHandler:
+    """The handlers of the fence service."""
+    return _own_handlers(FENCES, service, calls)
 
 
 def health_handlers(health: Health, calls: Calls) -> grpc.GenericRpcHandler:
@@ -54,7 +69,7 @@ def health_handlers(health: Health, calls: Calls) -> grpc.GenericRpcHandler:
 
 def reflection_handlers(calls: Calls) -> grpc.GenericRpcHandler:
     """The handlers of reflection, which describes all services."""
-    services = [each.full_name for each in (DESCRIPTOR, HEALTH, REFLECTION)]
+    services = [each.full_name for each in (DESCRIPTOR, FENCES, HEALTH, REFLECTION)]
     servicer = reflection.aio.ReflectionServicer(services)
 
     async def describe(call: Call) -> None:
@@ -82,6 +97,16 @@ class UnknownMethods(grpc.GenericRpcHandler):
 
 async def _refuse_method(_: Call) -> None:
     raise MethodUnknownError
+
+
+def _own_handlers(
+    descriptor: ServiceDescriptor, service: HullService | FenceService, calls: Calls
+) -> grpc.GenericRpcHandler:
+    works = {}
+    for method in descriptor.methods:
+        make = _streaming if method.client_streaming or method.server_streaming else _unary
+        works[method.name] = make(method, getattr(service, method.name))
+    return _handlers(descriptor, works, "", calls, calls.admit, calls.max_message_bytes)
 
 
 def _handlers(

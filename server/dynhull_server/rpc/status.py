@@ -10,13 +10,19 @@ from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFail
 from google.rpc.status_pb2 import Status
 
 from ..state.errors import (
+    ConsumerNotFoundError,
     DiskFullError,
+    FenceExistsError,
+    FenceNotFoundError,
+    FenceReplacedError,
     HullEmptyError,
     HullExistsError,
+    HullFencedError,
     HullNotFoundError,
     HullReplacedError,
     HullUnsuitableError,
     InvalidBatchError,
+    InvalidFenceError,
     KeyMissingError,
     KeyRepeatedError,
     LimitExceededError,
@@ -25,6 +31,7 @@ from ..state.errors import (
     PointMissingError,
     RefusedError,
     RevisionForgottenError,
+    SequenceAheadError,
     SequenceGapError,
     StoppingError,
 )
@@ -32,7 +39,7 @@ from .access import PermissionDeniedError, UnauthenticatedError
 from .decode import InvalidFieldError
 
 DOMAIN = "dynhull.v1"
-HULL_TYPE = "dynhull.v1.Hull"
+HULL_TYPE, FENCE_TYPE, CONSUMER_TYPE = "dynhull.v1.Hull", "dynhull.v1.Fence", "dynhull.v1.FenceConsumer"
 # Statuses are sent as headers, whose size is limited.
 LONGEST_VALUE = 120
 # Numbers, points and counts such as "8 bytes" are shown as they are, names without spaces too.
@@ -129,6 +136,28 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case HullExistsError():
             resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
             return _status(code.ALREADY_EXISTS, str(error), "HULL_EXISTS", {"value": error.name}, resource)
+        case FenceNotFoundError():
+            resource = ResourceInfo(resource_type=FENCE_TYPE, resource_name=error.name, description=str(error))
+            return _status(code.NOT_FOUND, str(error), "FENCE_NOT_FOUND", {"value": error.name}, resource)
+        case ConsumerNotFoundError():
+            resource = ResourceInfo(resource_type=CONSUMER_TYPE, resource_name=error.name, description=str(error))
+            return _status(code.NOT_FOUND, str(error), "CONSUMER_NOT_FOUND", {"value": error.name}, resource)
+        case FenceExistsError():
+            resource = ResourceInfo(resource_type=FENCE_TYPE, resource_name=error.name, description=str(error))
+            return _status(code.ALREADY_EXISTS, str(error), "FENCE_EXISTS", {"value": error.name}, resource)
+        case FenceReplacedError():
+            metadata = {"field": "uid", "value": error.name, "uid": error.uid}
+            return _status(code.OUT_OF_RANGE, str(error), "FENCE_REPLACED", metadata)
+        case InvalidFenceError():
+            return _invalid_field("config.", InvalidFieldError(error.field, error.value, error.problem), where)
+        case HullFencedError():
+            failure = PreconditionFailure()
+            failure.violations.add(type="HULL_FENCED", subject=error.name, description=str(error))
+            metadata = {"value": error.name, "fence": error.fence}
+            return _status(code.FAILED_PRECONDITION, str(error), "HULL_FENCED", metadata, failure)
+        case SequenceAheadError():
+            metadata = {"field": error.field, "value": str(error.sequence), "last": str(error.last)}
+            return _status(code.OUT_OF_RANGE, str(error), "SEQUENCE_AHEAD", metadata)
         case SequenceGapError():
             failure = PreconditionFailure()
             failure.violations.add(type="SEQUENCE_GAP", subject="sequence", description=str(error))

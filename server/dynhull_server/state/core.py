@@ -11,6 +11,10 @@ a time. The trip belongs to the server: when a caller disconnects, it is not ans
 A request to several hulls waits in all of their queues, and begins when it is the first in each of them: then one trip
 occupies all of these queues. It enters the queues in one step, so any two such requests are in the same order wherever
 they meet, and there is no deadlock.
+
+The hulls that a fence depends on share one queue, so that what a change of one means for the fence is known before the
+next change of any, and is committed with it. Creating and deleting a fence joins and parts queues, in a step in which
+none of them has a trip.
 """
 
 from functools import partial
@@ -21,6 +25,7 @@ from sortedcontainers import SortedDict
 
 from .errors import (
     DiskFullError,
+    FenceNotFoundError,
     HullNotFoundError,
     LimitExceededError,
     NotStoredError,
@@ -49,12 +54,31 @@ from .events import (
     Request,
     Retried,
     Retry,
+    Stir,
     Stopping,
     Tick,
     Together,
     WriteBatch,
     WriteTogether,
 )
+from .fences.fence import Fence
+from .fences.line import Line
+from .fences.line_trip import Ground, LineTrip
+from .fences.queues import components, merged
+from .fences.requests import (
+    PREFIX,
+    STRUCTURAL,
+    CreateFence,
+    DeleteFence,
+    DropConsumer,
+    DropEvents,
+    FenceRequest,
+    PutConsumer,
+    ReadFence,
+    ReplaceFence,
+)
+from .fences.restoring import Restored, restore
+from .fences.subjects import Subjects
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
@@ -64,6 +88,8 @@ from .trip import Leg, Place, Trip, write
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from .fences.records import KeptFence
+
 # A request for at most this many points runs at once: a tenth of a millisecond. It holds the GIL anyway.
 SMALL = 128
 # Small requests for at most this many points together run at once, too: a thread would begin them later than that.
@@ -72,24 +98,28 @@ SMALL_TRIP = 1024
 TRIP_ROWS = 2**18
 # Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
-READS = ReadHull | ReadTogether
+READS = ReadHull | ReadTogether | ReadFence
+# Requests that may wait in several queues.
+SPANNING = Together | FenceRequest
 
 
 class _Queue:
-    """The work of one name.
+    """The work of one name, or of all hulls and fences of a line.
 
     Attributes:
-        name: the name.
-        hull: the committed hull of that name, or None.
+        name: the name, or one of those of the line.
+        hull: the committed hull of that name, or None. None for a line.
+        line: the fences of several hulls that share the queue, or None.
         trip: the trip in progress, or None.
         waiting: the requests for later trips. While there is no trip, the first one waits in other queues, too.
     """
 
-    __slots__ = ("hull", "name", "trip", "waiting")
+    __slots__ = ("hull", "line", "name", "trip", "waiting")
 
-    def __init__(self, name: str, hull: Hull | None = None) -> None:
+    def __init__(self, name: str, hull: Hull | None = None, line: Line | None = None) -> None:
         self.name = name
         self.hull = hull
+        self.line = line
         self.trip: Trip | None = None
         self.waiting: list[Request] = []
 
@@ -126,7 +156,8 @@ class Core:
         self._now = now
         self._queues: dict[str, _Queue] = {}
         self._hulls: SortedDict[str, Hull] = SortedDict()
-        self._creating = 0
+        self._fences: SortedDict[str, Fence] = SortedDict()
+        self._creating = self._fencing = 0
         self._trips = 0
         self._stopping = False
         # A heap of the times at which points leave, with the number and name of the hull. An entry is outdated if its
@@ -139,6 +170,13 @@ class Core:
             ReadTogether: self._asked_together,
             CreateHull: self._asked,
             DeleteHull: self._asked,
+            CreateFence: self._asked_of_fence,
+            ReplaceFence: self._asked_of_fence,
+            DeleteFence: self._asked_of_fence,
+            ReadFence: self._asked_of_fence,
+            PutConsumer: self._asked_of_fence,
+            DropConsumer: self._asked_of_fence,
+            DropEvents: self._asked_of_fence,
             Gone: self._gone,
             Computed: self._computed,
             Committed: self._committed,
@@ -166,7 +204,8 @@ class Core:
     @property
     def latest_time(self) -> int | None:
         """The latest time of the server's clock that a hull has recorded, None if there is none. O(hulls)."""
-        clocks = (hull.counts.clock for hull in self._hulls.values() if hull.state.contents.follows_server)
+        clocks = [hull.counts.clock for hull in self._hulls.values() if hull.state.contents.follows_server]
+        clocks += [fence.time for fence in self._fences.values() if fence.last]
         return max((clock for clock in clocks if clock is not None), default=None)
 
     def get(self, name: str) -> Hull:
@@ -175,6 +214,18 @@ class Core:
         if hull is None:
             raise HullNotFoundError(name)
         return hull
+
+    @property
+    def fences(self) -> "SortedDict[str, Fence]":
+        """The fences by name."""
+        return self._fences
+
+    def fence(self, name: str) -> Fence:
+        """The fence of that name, or raise FenceNotFoundError."""
+        fence: Fence | None = self._fences.get(name)
+        if fence is None:
+            raise FenceNotFoundError(name)
+        return fence
 
     @property
     def busy(self) -> bool:
@@ -202,6 +253,24 @@ class Core:
         self._queues[row.name] = _Queue(row.name, hull)
         self._plan(hull)
 
+    def restore_fences(self, kept: "Sequence[KeptFence]") -> None:
+        """Add the fences that the storage has kept. Call this after `restore`, and before the first step."""
+        subjects: dict[str, Subjects] = {}
+        for each in kept:
+            fence = Fence(each.row, self._limits.fences.fence_history_bytes)
+            fence.restored(each)
+            config = each.row.config
+            fence.area = None if config.area_hull is None else self.get(config.area_hull)
+            for name in self._compared(fence):
+                if name not in subjects:
+                    subjects[name] = Subjects(self.get(name))
+                subjects[name].fences[fence.number] = fence
+                fence.subjects[name] = subjects[name]
+            self._fences[fence.name] = fence
+        self._adopt(restore(subjects.values(), {}, {each.row.number: each for each in kept}), subjects)
+        queues = list(self._queues.values()) + [self._queue(PREFIX + each.row.name) for each in kept]
+        self._regroup(queues, self._fences.values())
+
     # Requests
 
     def _asked(self, request: CreateHull | DeleteHull | Expire | ReadHull | WriteBatch, effects: list[Effect]) -> None:
@@ -222,10 +291,33 @@ class Core:
         self._go_on([queue], effects)
 
     def _asked_together(self, request: Together, effects: list[Effect]) -> None:
-        queues = [self._queue(part.name) for part in request.parts]
+        self._wait([self._queue(part.name) for part in request.parts], request, effects)
+
+    def _asked_of_fence(self, request: FenceRequest, effects: list[Effect]) -> None:
+        request.names = self._involved(request)
+        self._wait([self._queue(name) for name in request.names], request, effects)
+
+    def _wait(self, queues: "list[_Queue]", request: Request, effects: list[Effect]) -> None:
+        queues = list(dict.fromkeys(queues))
         for queue in queues:
             queue.waiting.append(request)
         self._go_on(queues, effects)
+
+    def _involved(self, request: FenceRequest) -> tuple[str, ...]:
+        """The names of the queues of a request about a fence."""
+        names = [PREFIX + request.name]
+        if isinstance(request, CreateFence | ReplaceFence):
+            config = request.config
+            if config.area_hull is not None:
+                names.append(config.area_hull)
+            if config.kind != "prefix":
+                names.append(config.subjects)
+        return tuple(names)
+
+    def _compared(self, fence: Fence) -> list[str]:
+        """The names of the hulls whose keys a fence compares."""
+        config = fence.row.config
+        return [config.subjects] if config.kind == "hull" else []
 
     def _queue(self, name: str) -> _Queue:
         queue = self._queues.get(name)
@@ -236,8 +328,10 @@ class Core:
     def _read(self, queue: _Queue, request: ReadHull) -> None:
         """Run a small read. It needs no trip while the queue is idle."""
         hull = queue.hull
+        if hull is None:  # perhaps one of a line
+            hull = self._hulls.get(request.hull.name)
         if hull is None or hull is not request.hull:
-            request.error = HullNotFoundError(queue.name)
+            request.error = HullNotFoundError(request.hull.name)
             self._rest(queue)
             return
         try:
@@ -267,12 +361,12 @@ class Core:
 
     def _gone(self, event: Gone, effects: list[Effect]) -> None:
         event.what.leave()
-        if isinstance(event.what, Together):
+        if isinstance(event.what, SPANNING):
             self._go_on(self._remove(event.what), effects)
 
-    def _remove(self, request: Together) -> list[_Queue]:
+    def _remove(self, request: SPANNING) -> list[_Queue]:
         """Remove a request from the queues where it waits. Returns these queues: they may go on without it."""
-        queues = [self._queues[part.name] for part in request.parts if part.name in self._queues]
+        queues = dict.fromkeys(self._queues[name] for name in _names(request) if name in self._queues)
         left = [queue for queue in queues if request in queue.waiting]
         for queue in left:
             queue.waiting.remove(request)
@@ -288,22 +382,35 @@ class Core:
                 left += self._refuse_waiting(queue, error, effects)
             while queue.trip is None and queue.waiting:
                 first = queue.waiting[0]
-                together = self._at(first.parts) if isinstance(first, Together) else [queue]
+                together = self._at(_names(first)) if isinstance(first, SPANNING) else [queue]
                 if not all(each.trip is None and each.waiting and each.waiting[0] is first for each in together):
                     break  # the last of these queues that comes so far begins it
-                requests, rows = _take(queue) if len(together) == 1 else _take_together(together)
+                requests, rows = self._taken(together)
                 if requests:
-                    self._begin(together, requests, rows, effects)
-                    left += [each for each in together if each is not queue]
+                    trip = self._begin(together, requests, rows, effects)
+                    left += [each for each in trip.queues if each is not queue]
             self._rest(queue)
 
-    def _begin(self, queues: list[_Queue], requests: list[Request], rows: int, effects: list[Effect]) -> None:
+    def _taken(self, queues: list[_Queue]) -> tuple[list[Request], int]:
+        """The requests of the next trip to these queues, and their points."""
+        if len(queues) == 1:
+            queue = queues[0]
+            return _take(queue, lambda request: len(self._at(_names(request))) > 1)
+        if isinstance(queues[0].waiting[0], FenceRequest) or any(queue.line is not None for queue in queues):
+            requests = [queue.waiting.pop(0) for queue in queues][:1]
+            return requests, requests[0].rows
+        return _take_together(queues)
+
+    def _begin(self, queues: list[_Queue], requests: list[Request], rows: int, effects: list[Effect]) -> Trip:
         trip = self._new_trip(queues, requests)
+        if isinstance(trip, LineTrip):
+            rows = max(rows, trip.weight)
         if rows > SMALL_TRIP or (rows > SMALL and any(request.rows > SMALL for request in requests)):
             effects.append(Compute(trip))
-            return
+            return trip
         trip.run()
         self._ran(trip, effects)
+        return trip
 
     def _new_trip(self, queues: list[_Queue], requests: list[Request]) -> Trip:
         place = None
@@ -311,8 +418,12 @@ class Core:
             place = Place(self._next_number, self._no_more_hulls(), self._limits)
             self._next_number += 1
             self._creating += 1
-        legs = [Leg(queue.name, queue.hull, keeps=self._keeps) for queue in queues]
-        trip = Trip(legs, requests, self._now, FIRST_PAUSE, place)
+        if all(queue.line is None for queue in queues) and not isinstance(requests[0], FenceRequest):
+            legs = [Leg(queue.name, queue.hull, keeps=self._keeps) for queue in queues]
+            trip = Trip(legs, requests, self._now, FIRST_PAUSE, place)
+        else:
+            trip = self._line_trip(queues, requests)
+        trip.queues = queues
         for queue in queues:
             queue.trip = trip
         self._trips += 1
@@ -322,15 +433,14 @@ class Core:
         most = self._limits.max_hulls
         return LimitExceededError("max_hulls", most) if len(self._hulls) + self._creating >= most else None
 
-    def _at(self, parts: "Sequence[Hull | Leg | WriteBatch]") -> list[_Queue]:
-        """The queues of the hulls that these belong to."""
-        return [self._queues[part.name] for part in parts]
+    def _at(self, names: "Iterable[str]") -> list[_Queue]:
+        """The queues of these names."""
+        return list(dict.fromkeys(self._queues[name] for name in names))
 
     def _computed(self, event: Computed, effects: list[Effect]) -> None:
         trip = event.ticket
-        queues = self._at(trip.legs)
         self._ran(trip, effects)
-        self._go_on(queues, effects)
+        self._go_on(trip.queues, effects)
 
     def _ran(self, trip: Trip, effects: list[Effect]) -> None:
         if trip.torn:
@@ -358,24 +468,30 @@ class Core:
         self._trips -= 1
         if trip.place is not None:
             self._creating -= 1
-        for leg in trip.legs:
-            queue = self._queues[leg.name]
+        if isinstance(trip, LineTrip):
+            self._fencing -= trip.creates
+        for queue in trip.queues:
             queue.trip = None
             if queue.hull is not None:
                 self._plan(queue.hull)
+            elif queue.line is not None:
+                for leg in trip.legs:
+                    if leg.name in self._hulls:
+                        self._plan(self._hulls[leg.name])
 
     def _rest(self, queue: _Queue) -> None:
         """Remove the queue of a name that has neither a hull nor work."""
-        if queue.hull is None and queue.trip is None and not queue.waiting:
-            self._queues.pop(queue.name, None)
+        if queue.hull is not None or queue.line is not None or queue.trip is not None or queue.waiting:
+            return
+        if self._queues.get(queue.name) is queue:  # it has not become part of a line
+            del self._queues[queue.name]
 
     # Commits
 
     def _committed(self, event: Committed, effects: list[Effect]) -> None:
         trip = event.ticket
-        queues = self._at(trip.legs)
         self._keep(trip, effects)
-        self._go_on(queues, effects)
+        self._go_on(trip.queues, effects)
 
     def _keep(self, trip: Trip, effects: list[Effect]) -> None:
         """Publish the changes of the trip, which are committed: those of all its hulls in one step."""
@@ -386,7 +502,9 @@ class Core:
                 after.counts = after.state.counts
                 after.unsaved += leg.unsaved
             if after is not before:
-                self._queues[leg.name].hull = after
+                queue = self._queues[leg.name]
+                if queue.line is None:
+                    queue.hull = after
                 if before is not None:
                     before.ended = True
                     del self._hulls[leg.name]
@@ -395,6 +513,8 @@ class Core:
             hull = after or before
             if hull is not None:
                 moved.append(hull)
+        if isinstance(trip, LineTrip):
+            self._keep_fences(trip, effects)
         self._end(trip, effects, tuple(moved))
 
     def _failed(self, event: Failed, effects: list[Effect]) -> None:
@@ -403,9 +523,8 @@ class Core:
             trip.failure, trip.unknown = event.error, True
             self._examine(trip, effects)
             return
-        queues = self._at(trip.legs)
         self._fail(trip, event.error, effects)
-        self._go_on(queues, effects)
+        self._go_on(trip.queues, effects)
 
     def _fail(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
         """Handle a trip whose changes were not committed."""
@@ -414,6 +533,8 @@ class Core:
         if trip.place is None and (trip.applied or trip.torn):
             self._examine(trip, effects)  # the states in memory include the batches
         else:
+            if isinstance(trip, LineTrip):
+                trip.undo_created()
             self._again(trip)
 
     def _refuse_changes(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
@@ -444,7 +565,7 @@ class Core:
 
     def _wait_again(self, trip: Trip, requests: "Sequence[Request]") -> None:
         """Put requests of a trip before those that wait in its queues."""
-        for queue in self._at(trip.legs):
+        for queue in trip.queues:
             queue.waiting[:0] = requests
 
     # Examination of the storage
@@ -456,20 +577,21 @@ class Core:
             assert hull is not None  # a trip without a hull changes nothing
             load = partial(HullState, self._limits, hull.row.settings, now=self._now)
             hulls.append((hull.row.number, load))
-        effects.append(Examine(trip, hulls))
+        if isinstance(trip, LineTrip):
+            self._examine_fences(trip, hulls, effects)
+        else:
+            effects.append(Examine(trip, hulls))
 
     def _under_way(self, trip: Trip) -> bool:
         """Whether a trip is in progress; False where the server is stopping and did not wait for it."""
-        queue = self._queues.get(trip.legs[0].name)
-        return queue is not None and queue.trip is trip
+        return trip.queues[0].trip is trip
 
     def _examined(self, event: Examined, effects: list[Effect]) -> None:
         trip = event.ticket
         if not self._under_way(trip):
             return
-        queues = self._at(trip.legs)
         found = list(zip(trip.legs, event.states, strict=True))
-        if trip.unknown and trip.landed(event.states):
+        if trip.unknown and trip.landed(event.states, event.fences):
             self._keep(trip, effects)
         elif any(leg.before is not None and state is None for leg, state in found):
             self._not_examined(NotExamined(trip, LookupError("the hull is not in the storage")), effects)
@@ -477,17 +599,18 @@ class Core:
             for leg, state in found:
                 if leg.before is not None and state is not None:
                     leg.before.state = state
+            if isinstance(trip, LineTrip):
+                self._restore_fences(trip, event)
             assert trip.failure is not None  # a trip is examined only after a failure
             if trip.unknown:
                 self._refuse_changes(trip, _not_stored(trip.failure), effects)
             self._again(trip)
-        self._go_on(queues, effects)
+        self._go_on(trip.queues, effects)
 
     def _not_examined(self, event: NotExamined, effects: list[Effect]) -> None:
         trip = event.ticket
         if not self._under_way(trip):
             return
-        queues = self._at(trip.legs)
         trip.ill = event.error
         if trip.unknown:
             self._refuse_changes(trip, OutcomeUnknownError(words(event.error)), effects)
@@ -498,7 +621,7 @@ class Core:
         else:
             effects.append(Retry(trip, trip.pause, event.error))
             trip.pause = min(2 * trip.pause, LONGEST_PAUSE)
-        self._go_on(queues, effects)
+        self._go_on(trip.queues, effects)
 
     def _retried(self, event: Retried, effects: list[Effect]) -> None:
         if self._under_way(event.ticket):
@@ -517,10 +640,120 @@ class Core:
                 stream.stopped = True
             request.error = error
             refused.append(request)
-            if isinstance(request, Together):
+            if isinstance(request, SPANNING):
                 others += self._remove(request)
         effects.append(Reply(refused))
         return others
+
+    # Fences
+
+    def _line_trip(self, queues: list[_Queue], requests: list[Request]) -> LineTrip:
+        """A trip on hulls with fences, or one that gives them a fence."""
+        lines = [queue.line for queue in queues if queue.line is not None]
+        names: dict[str, None] = {}
+        fences: dict[str, Fence | None] = {}
+        for request in requests:
+            if isinstance(request, FenceRequest):
+                fences[request.name] = self._fences.get(request.name)
+                names |= dict.fromkeys(request.names[1:])
+            else:
+                names |= dict.fromkeys(_names(request))
+        number, refusal = 0, None
+        if isinstance(requests[0], CreateFence):
+            number, most = self._next_number, self._limits.fences.max_fences
+            self._next_number += 1
+            self._fencing += 1
+            if len(self._fences) + self._fencing > most:
+                refusal = LimitExceededError("max_fences", most)
+        ground = Ground(lines, fences, number, refusal, self._limits.fences)
+        legs = [Leg(name, self._hulls.get(name), keeps=self._keeps) for name in names]
+        return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)
+
+    def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
+        """Publish what a trip has committed of fences, and join or part the queues."""
+        stirred = []
+        for leg in trip.fence_legs.values():
+            fence = leg.fence
+            if leg.created:
+                self._fences[fence.name] = fence
+                for subjects in fence.subjects.values():
+                    subjects.fences[fence.number] = fence
+            leg.publish()
+            if leg.deleted:
+                del self._fences[fence.name]
+                for subjects in fence.subjects.values():
+                    subjects.dropped(fence)
+            if leg.events:
+                stirred.append(fence)
+        if stirred:
+            effects.append(Stir(stirred))
+        if trip.structural:
+            fences = {fence.name: fence for line in trip.lines for fence in line.fences.values() if not fence.ended}
+            fences |= {leg.fence.name: leg.fence for leg in trip.fence_legs.values() if leg.created}
+            trip.queues = self._regroup(trip.queues, fences.values(), trip)
+
+    def _regroup(self, queues: list[_Queue], fences: "Iterable[Fence]", trip: Trip | None = None) -> list[_Queue]:
+        """Make queues of these ones: one for all names that fences join, one for each other name.
+
+        None of the queues has another trip. Their requests keep their order.
+        """
+        names = [name for queue in queues for name in ([queue.name] if queue.line is None else queue.line.names)]
+        waiting = merged([queue.waiting for queue in queues])
+        for queue in queues:
+            queue.waiting = []
+        made: list[_Queue] = []
+        for group, of_group in components(names, fences):
+            if of_group:
+                queue = _Queue(PREFIX + of_group[0].name, line=Line(of_group, group))
+            else:
+                (name,) = group
+                queue = _Queue(name, self._hulls.get(name))
+            queue.trip = trip
+            made.append(queue)
+            self._queues |= dict.fromkeys(group, queue)
+        for request in waiting:
+            for queue in self._at(_names(request)):
+                queue.waiting.append(request)
+        return made
+
+    def _examine_fences(
+        self, trip: LineTrip, hulls: "list[tuple[int, Callable[[Kept], HullState]]]", effects: list[Effect]
+    ) -> None:
+        """Read the fences that the trip concerns together with its hulls."""
+        touched = trip.touched()
+        numbers = sorted({number for subjects in touched.values() for number in subjects.fences})
+        numbers += sorted(trip.fence_legs.keys() - set(numbers))
+
+        def restored(states: "list[HullState | None]", kept: "list[KeptFence | None]") -> Restored | None:
+            if trip.unknown and trip.landed(states, kept):
+                return None
+            stored = dict(zip(numbers, kept, strict=True))
+            found = {leg.name: state for leg, state in zip(trip.legs, states, strict=True) if state is not None}
+            there = {number: each for number, each in stored.items() if each is not None}
+            return restore(touched.values(), found, there)
+
+        trip.examined = numbers
+        effects.append(Examine(trip, hulls, numbers, restored))
+
+    def _restore_fences(self, trip: LineTrip, event: Examined) -> None:
+        """Return fences to what the storage has of them: the changes of the trip were not committed."""
+        restored = event.restored
+        assert restored is not None  # the changes were not committed
+        trip.undo_created()
+        for kept in restored.kept.values():
+            fence = self._fences[kept.row.name]
+            fence.restored(kept)
+            fence.area = None if kept.row.config.area_hull is None else self.get(kept.row.config.area_hull)
+        self._adopt(restored, trip.touched())
+        fences = {fence.name: fence for line in trip.lines for fence in line.fences.values()}
+        trip.queues = self._regroup(trip.queues, fences.values(), trip)
+
+    def _adopt(self, restored: Restored, subjects: dict[str, Subjects]) -> None:
+        """Give subjects their restored indexes."""
+        for name, index in restored.indexes.items():
+            subjects[name].index = index
+            for fence in subjects[name].fences.values():
+                fence.inside = sum(each.index.count(fence.number) for each in fence.subjects.values())
 
     # Time and shutdown
 
@@ -546,22 +779,39 @@ class Core:
         for queue in list(self._queues.values()):
             trip = queue.trip
             if trip is not None and trip.ill is not None:
-                queues = self._at(trip.legs)
                 self._over(trip)  # the next start reads the outcome from the storage
-                self._go_on(queues, effects)
+                self._go_on(trip.queues, effects)
             # Requests that wait for a trip are refused after it, so that the answers of a stream keep their order.
 
 
-def _take(queue: _Queue) -> tuple[list[Request], int]:
-    """The requests of the next trip, and their points: at most TRIP_ROWS, and a DeleteHull always alone."""
+def _names(request: Any) -> "Sequence[str]":
+    """The names that a request concerns."""
+    match request:
+        case FenceRequest():
+            names: Sequence[str] = request.names
+            return names
+        case WriteTogether() | ReadTogether():
+            return [part.name for part in request.parts]
+        case ReadHull():
+            return [request.hull.name]
+    return [request.name]
+
+
+def _take(queue: _Queue, spans: "Callable[[Request], bool]") -> tuple[list[Request], int]:
+    """The requests of the next trip, and their points: at most TRIP_ROWS.
+
+    A DeleteHull is always alone, and so are requests that change lines. Requests to several hulls stay if they wait in
+    other queues too, which `spans` decides.
+    """
     waiting, queue.waiting = queue.waiting, []
     requests: list[Request] = []
     rows = 0
     for i, request in enumerate(waiting):
         if request.abandoned or (type(request) is WriteBatch and request.stream and request.stream.stopped):
             continue
-        deletes = type(request) is DeleteHull
-        if isinstance(request, Together) or (requests and (deletes or rows + request.rows > TRIP_ROWS)):
+        deletes = type(request) is DeleteHull or isinstance(request, STRUCTURAL)
+        stays = isinstance(request, SPANNING) and spans(request)
+        if stays or (requests and (deletes or rows + request.rows > TRIP_ROWS)):
             queue.waiting = waiting[i:]
             break
         requests.append(request)

@@ -197,6 +197,90 @@ class HullReplacedError(RefusedError):
         self.uid = uid
 
 
+class FenceNotFoundError(RefusedError):
+    """No fence has that name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no fence {name!r}")
+        self.name = name
+
+
+class FenceExistsError(RefusedError):
+    """A fence of that name already exists."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"the fence {name!r} already exists")
+        self.name = name
+
+
+class FenceReplacedError(RefusedError):
+    """The fence of that name has been deleted and created again.
+
+    Attributes:
+        name: the name.
+        uid: the uid of the present fence.
+    """
+
+    def __init__(self, name: str, uid: str) -> None:
+        super().__init__(f"the fence {name!r} was created again: its uid is now {uid}")
+        self.name = name
+        self.uid = uid
+
+
+class InvalidFenceError(RefusedError):
+    """The settings of a fence are invalid, or do not suit its hulls.
+
+    Attributes:
+        field: the path of the field in the settings.
+        value: the value.
+        problem: the reason why it is invalid.
+    """
+
+    def __init__(self, field: str, value: object, problem: str) -> None:
+        super().__init__(f"{field} is {value}: {problem}")
+        self.field = field
+        self.value = value
+        self.problem = problem
+
+
+class HullFencedError(RefusedError):
+    """A hull cannot be deleted because a fence depends on it.
+
+    Attributes:
+        name: the name of the hull.
+        fence: the name of a fence that depends on it.
+    """
+
+    def __init__(self, name: str, fence: str) -> None:
+        super().__init__(f"the fence {fence!r} depends on the hull {name!r}: delete the fence first")
+        self.name = name
+        self.fence = fence
+
+
+class ConsumerNotFoundError(RefusedError):
+    """The fence has no consumer of that name."""
+
+    def __init__(self, fence: str, name: str) -> None:
+        super().__init__(f"the fence {fence!r} has no consumer {name!r}")
+        self.name = name
+
+
+class SequenceAheadError(RefusedError):
+    """A sequence is after the last event of a fence.
+
+    Attributes:
+        field: the field of the request.
+        sequence: the sequence.
+        last: the sequence of the last event.
+    """
+
+    def __init__(self, field: str, sequence: int, last: int) -> None:
+        super().__init__(f"sequence {sequence} is after the last event, {last}")
+        self.field = field
+        self.sequence = sequence
+        self.last = last
+
+
 class NotStoredError(RefusedError):
     """The storage failed to keep a change: nothing of it was applied, and it may be sent again."""
 

@@ -3,12 +3,16 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from .records import DEFAULT, Change, HullSettings, Kept
+from .changes import Change
+from .records import DEFAULT, HullSettings, Kept
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .batch import Batch, KeyedBatch
+    from .fences.fence import Fence
+    from .fences.records import KeptFence
+    from .fences.restoring import Restored
     from .hull import Hull
     from .hull_state import HullState
     from .trip import Trip
@@ -202,10 +206,19 @@ class Failed:
 
 @dataclass(slots=True)
 class Examined:
-    """The state in the storage of each hull of a trip; None for a hull that the storage does not have."""
+    """The state in the storage of each hull of a trip; None for a hull that the storage does not have.
+
+    Attributes:
+        ticket: the trip.
+        states: the states of the hulls.
+        fences: the fences in the storage; None for those that it does not have.
+        restored: the result of `Examine.restore`.
+    """
 
     ticket: "Trip"
     states: "list[HullState | None]"
+    fences: "list[KeptFence | None]" = field(default_factory=list)
+    restored: "Restored | None" = None
 
 
 @dataclass(slots=True)
@@ -270,10 +283,14 @@ class Examine:
 
     Attributes:
         hulls: the number of each hull, and a function that makes its state of what is stored.
+        fences: the numbers of fences.
+        restore: makes the subjects of these fences, given what is stored; None where there is no fence.
     """
 
     ticket: "Trip"
     hulls: "list[tuple[int, Callable[[Kept], HullState]]]"
+    fences: list[int] = field(default_factory=list)
+    restore: "Callable[[list[HullState | None], list[KeptFence | None]], Restored | None] | None" = None
 
 
 @dataclass(slots=True)
@@ -296,4 +313,11 @@ class Reply:
     moved: "tuple[Hull, ...]" = ()
 
 
-Effect = Compute | Commit | Examine | Retry | Reply
+@dataclass(slots=True)
+class Stir:
+    """Wake the watchers of these fences: each has new events, or was deleted."""
+
+    fences: "list[Fence]"
+
+
+Effect = Compute | Commit | Examine | Retry | Reply | Stir

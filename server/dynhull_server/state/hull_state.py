@@ -1,6 +1,6 @@
 """One hull: its points, its revision, its producers, and the history of its vertices."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -79,17 +79,24 @@ class HullState:
 
     # Changes
 
-    def apply(self, write: "WriteBatch", now: float, records: list[Record] | None) -> Applied:
+    def apply(
+        self,
+        write: "WriteBatch",
+        now: float,
+        records: list[Record] | None,
+        expired: Callable[[], None] | None = None,
+    ) -> Applied:
         """Apply a batch as the next revision, and append it to `records` unless that is None.
 
-        Points that leave at the time of the batch do so before it, as a revision of their own.
+        Points that leave at the time of the batch do so before it, as a revision of their own, followed by a call of
+        `expired`.
 
         Raises:
             Exception: the batch is refused; nothing has changed.
         """
         if write.producer and not self.is_new(write, now):
             return self.duplicate()
-        return self.apply_decoded(write, self.decoded(write), now, records)
+        return self.apply_decoded(write, self.decoded(write), now, records, expired)
 
     def is_new(self, write: "WriteBatch", now: float) -> bool:
         """Whether a batch is the next one of its producer, or not numbered; False where it has already been applied.
@@ -118,19 +125,28 @@ class HullState:
         self.contents.check(batch)
         return batch
 
-    def apply_decoded(self, write: "WriteBatch", batch: Any, now: float, records: list[Record] | None) -> Applied:
+    def apply_decoded(
+        self,
+        write: "WriteBatch",
+        batch: Any,
+        now: float,
+        records: list[Record] | None,
+        expired: Callable[[], None] | None = None,
+    ) -> Applied:
         """Apply a new batch as the next revision, and append it to `records` unless that is None.
 
         Raises:
             Exception: the batch is refused; nothing has changed.
         """
         contents = self.contents
-        expired = 0
+        gone = 0
         if contents.clock is not None:
             clock = contents.expires_before(batch)
             if clock is not None:
                 contents.check(batch)  # a refused batch makes no points leave
-                expired = self.expire(clock, records)
+                gone = self.expire(clock, records)
+                if gone and expired is not None:
+                    expired()
         self.torn = True
         try:
             applied = contents.apply(batch, self.counts.revision + 1)
@@ -139,8 +155,8 @@ class HullState:
             raise
         if write.producer:
             self._producers.applied(write.producer, write.sequence, write.owner, now)
-        if expired:
-            applied.expired = expired
+        if gone:
+            applied.expired = gone
         self._applied(applied.points, "batch", hull_changed=applied.hull_changed)
         if records is not None:
             rows = contents.rows(batch, applied)

@@ -4,6 +4,25 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class FenceLimits:
+    """Limits on fences; error messages use the field names.
+
+    Attributes:
+        max_fences: the number of fences.
+        max_fence_consumers: the number of consumers per fence.
+        max_fence_events: the number of events to keep per fence.
+        max_fence_event_age: the seconds for which events are kept, 0 for no limit.
+        fence_history_bytes: the memory per fence for its recent events.
+    """
+
+    max_fences: int = 100_000
+    max_fence_consumers: int = 1_000
+    max_fence_events: int = 1_000_000
+    max_fence_event_age: float = 0.0
+    fence_history_bytes: int = 2**18
+
+
+@dataclass(frozen=True, slots=True)
 class Limits:
     """Limits on the state; error messages use the field names.
 
@@ -13,6 +32,7 @@ class Limits:
         max_producers: the number of producers (writers that number their batches) per hull.
         max_producers_per_caller: the number of producers per hull that belong to one caller.
         history_bytes: the memory per hull for the history that watchers resume from.
+        fences: the limits on fences.
     """
 
     max_hulls: int
@@ -20,3 +40,4 @@ class Limits:
     max_producers: int
     max_producers_per_caller: int
     history_bytes: int
+    fences: FenceLimits = FenceLimits()

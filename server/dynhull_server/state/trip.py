@@ -1,15 +1,21 @@
 """One trip: requests that run together, and whose changes are committed together."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from .batch import Applied, Batch, KeyedBatch
+from .changes import Change
 from .errors import HullExistsError, HullNotFoundError
 from .events import CreateHull, DeleteHull, Expire, ReadHull, ReadTogether, Request, WriteBatch, WriteTogether
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import DEFAULT, Append, Change, Create, Delete, HullRow, HullSettings, Kept, Record
+from .records import DEFAULT, Append, Create, Delete, HullRow, HullSettings, Kept, Record
 from .together import apply_together
+
+if TYPE_CHECKING:
+    from .fences.records import KeptFence
 
 
 @dataclass(slots=True)
@@ -77,6 +83,7 @@ class Trip:
     Attributes:
         applied: whether any batch was applied.
         torn: whether the requests were applied in part, because memory ran out in the middle of one.
+        queues: the queues that it occupies; only the core looks into them.
         failure: the error of the commit, or None.
         unknown: whether it may have been committed despite the failure.
         ill: set while the commit has failed and the storage cannot be read: the error of the last attempt.
@@ -91,6 +98,7 @@ class Trip:
         "legs",
         "pause",
         "place",
+        "queues",
         "requests",
         "torn",
         "unknown",
@@ -104,6 +112,7 @@ class Trip:
         self.applied = self.torn = self.unknown = False
         self.failure: Exception | None = None
         self.ill: Exception | None = None
+        self.queues: list[Any] = []
         self._now = now
 
     def run(self) -> None:
@@ -117,7 +126,7 @@ class Trip:
                 elif type(request) is ReadTogether:
                     request.result = self._read_together(request)
                 else:
-                    request.result = self._do(request, self.legs[0])
+                    request.result = self._do(request)
             except Exception as error:  # any error is the answer to the caller
                 refuse(request, error)
             if self.torn:  # later requests would see a part of a batch
@@ -129,11 +138,15 @@ class Trip:
             return self.legs[0].changes()
         return [change for leg in self.legs for change in leg.changes()]
 
-    def landed(self, found: list[HullState | None]) -> bool:
+    def landed(self, states: list[HullState | None], _: "list[KeptFence | None]") -> bool:
         """Whether the trip was committed, given the state of each hull in the storage: it has all changes, or none."""
-        return all(leg.landed(state) for leg, state in zip(self.legs, found, strict=True))
+        return all(leg.landed(state) for leg, state in zip(self.legs, states, strict=True))
 
-    def _do(self, request: Request, leg: Leg) -> object:
+    def _leg(self, _: Request) -> Leg:
+        return self.legs[0]
+
+    def _do(self, request: Request) -> object:
+        leg = self._leg(request)
         match request:
             case ReadHull():
                 return _read(request, leg)
@@ -154,7 +167,7 @@ class Trip:
         raise AssertionError(f"not a request: {request}")
 
     def _write(self, request: WriteBatch) -> None:
-        leg = self.legs[0]
+        leg = self._leg(request)
         stream, hull = request.stream, leg.after
         if stream is not None and stream.stopped:
             request.abandoned = True
@@ -163,12 +176,15 @@ class Trip:
             if request.birth is None or (stream is not None and stream.hull is not None):
                 raise HullNotFoundError(leg.name)
             hull = self._new_hull(request, leg)
-        applied = write(request, hull, self._now, leg.records)
+        applied = self._apply(request, hull, leg)
         self.torn = hull.state.torn
         if applied is None:
             return
         leg.after = hull
         self._count(leg, applied)
+
+    def _apply(self, request: WriteBatch, hull: Hull, leg: Leg) -> Applied | None:
+        return write(request, hull, self._now, leg.records)
 
     def _write_together(self, request: WriteTogether) -> None:
         """Apply a batch to each hull. All requests of such a trip name the same hulls, perhaps in another order."""
@@ -234,13 +250,22 @@ def _read(request: ReadHull, leg: Leg) -> object:
     return hull.state.counts, request.function(hull.state)
 
 
-def write(request: WriteBatch, hull: Hull, now: float, records: list[Record] | None) -> Applied | None:
-    """Apply a batch to a hull, and store the result or the error in the request. None where it was refused."""
+def write(
+    request: WriteBatch,
+    hull: Hull,
+    now: float,
+    records: list[Record] | None,
+    expired: Callable[[], None] | None = None,
+) -> Applied | None:
+    """Apply a batch to a hull, and store the result or the error in the request. None where it was refused.
+
+    `expired` is called after the revision of points that left before the batch.
+    """
     stream = request.stream
     try:
         if stream is not None and stream.hull is not hull and stream.hull is not None:
             raise HullNotFoundError(hull.name)
-        request.result = applied = hull.state.apply(request, now, records)
+        request.result = applied = hull.state.apply(request, now, records, expired)
     except Exception as error:  # any error is the answer to the caller
         refuse(request, error)
         return None

@@ -4,10 +4,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
 
-from ..state.records import Append, Change, Create, Delete, HullRow, Kept, Record
+from ..state.changes import Change
+from ..state.fences.records import (
+    AddFence,
+    AppendEvents,
+    ChangeFence,
+    DropConsumer,
+    DropEvents,
+    DropFence,
+    FenceEvent,
+    Inside,
+    KeptFence,
+    PutConsumer,
+)
+from ..state.records import Append, Create, Delete, HullRow, Kept, Record
 from .port import NEWEST, Contents, DamagedError, NotCommittedError, Progress, Step
 
 KEPT_SNAPSHOTS = 2
+FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | DropEvents | PutConsumer | DropConsumer
 
 
 @dataclass(slots=True)
@@ -16,6 +30,14 @@ class _Snapshot:
 
     number: int
     kept: Kept
+
+
+@dataclass(slots=True)
+class _WhoIsInside:
+    """A step: all who are inside of a fence."""
+
+    number: int
+    inside: Inside
 
 
 @dataclass(slots=True)
@@ -38,6 +60,7 @@ class MemoryStorage:
     def __init__(self, *, keeps: bool = True) -> None:
         self.keeps = keeps
         self._hulls: dict[int, _Hull] = {}
+        self._fences: dict[int, KeptFence] = {}
         self._next_number = 1
         self._turn = Lock()  # commits and reads run in different threads
 
@@ -45,7 +68,8 @@ class MemoryStorage:
         """The hulls."""
         progress(0, len(self._hulls))
         rows = sorted((hull.row for hull in self._hulls.values()), key=lambda row: row.name)
-        return Contents(rows, self._next_number, [])
+        fences = sorted((fence.row for fence in self._fences.values()), key=lambda row: row.name)
+        return Contents(rows, self._next_number, [], fences)
 
     def commit(self, changes: Sequence[Change | Step]) -> None:
         """Keep the changes."""
@@ -93,6 +117,36 @@ class MemoryStorage:
         """No steps: deletes leave nothing behind."""
         return iter(())
 
+    def read_fence(self, number: int) -> KeptFence | None:
+        """A fence as last committed; DamagedError if its hulls were not kept."""
+        with self._turn:
+            fence = self._fences.get(number)
+            if fence is None:
+                return None
+            if not self.keeps:
+                raise DamagedError(f"who is inside of {fence.row.name} was not kept")
+            events = [event for event in fence.events if event.sequence > fence.inside.sequence]
+            return replace(fence, events=events, consumers=dict(fence.consumers))
+
+    def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
+        """Events of a fence."""
+        with self._turn:
+            fence = self._fences[number]
+            start = max(after + 1 - fence.first, 0)
+            return fence.events[start : start + most]
+
+    def boundary(self, number: int, first: int) -> int:
+        """The sequence nearest before `first` such that all events before it can be dropped."""
+        return self._boundary(self._fences[number], first)
+
+    def _boundary(self, fence: KeptFence, first: int) -> int:
+        return min(first, fence.inside.sequence + 1) if self.keeps else first
+
+    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+        """One step."""
+        if self.keeps:
+            yield _WhoIsInside(number, inside)
+
     def sync(self) -> None:
         """Do nothing: memory is never durable."""
 
@@ -125,6 +179,30 @@ class MemoryStorage:
                 if revisions != list(range(before + 1, before + 1 + len(revisions))):
                     raise NotCommittedError(f"revisions {revisions} of hull {change.number} do not follow {before}")
                 last[change.number] = before + len(revisions)
+        self._examine_fences(changes)
+
+    def _examine_fences(self, changes: Sequence[Change | Step]) -> None:
+        last: dict[int, int | None] = {}  # sequences after the changes so far; None for a fence they delete
+        for change in changes:
+            if not isinstance(change, FENCE_CHANGES):
+                continue
+            number = change.row.number if isinstance(change, AddFence | ChangeFence) else change.number
+            there = self._fences.get(number)
+            before = last.get(number, None if there is None else there.last)
+            if isinstance(change, AddFence):
+                if before is not None:
+                    raise NotCommittedError(f"fence {number} already exists")
+                last[number] = change.inside.sequence
+                continue
+            if before is None:
+                raise NotCommittedError(f"there is no fence {number}")
+            if isinstance(change, DropFence):
+                last[number] = None
+            elif isinstance(change, AppendEvents):
+                sequences = [event.sequence for event in change.events]
+                if sequences != list(range(before + 1, before + 1 + len(sequences))):
+                    raise NotCommittedError(f"events {sequences} of fence {number} do not follow {before}")
+                last[number] = before + len(sequences)
 
     def _last(self, number: int, changed: Mapping[int, int | None]) -> int | None:
         """The last revision of a hull, None if it does not exist."""
@@ -144,11 +222,36 @@ class MemoryStorage:
                 del self._hulls[change.number]
             case _Snapshot():
                 self._take(change)
+            case _WhoIsInside():
+                if change.number in self._fences:  # otherwise deleted meanwhile
+                    self._fences[change.number].inside = change.inside
+            case AddFence():
+                self._fences[change.row.number] = KeptFence(change.row, change.inside)
+                self._next_number = max(self._next_number, change.row.number + 1)
+            case DropFence():
+                del self._fences[change.number]
+            case ChangeFence():
+                self._fences[change.row.number].row = change.row
+            case AppendEvents() | DropEvents() | PutConsumer() | DropConsumer():
+                self._change(self._fences[change.number], change)
 
     def _append(self, change: Append) -> None:
         hull = self._hulls[change.number]
         hull.last = change.records[-1].revision
         hull.records += change.records
+
+    def _change(self, fence: KeptFence, change: AppendEvents | DropEvents | PutConsumer | DropConsumer) -> None:
+        match change:
+            case AppendEvents():
+                fence.events += change.events
+            case DropEvents():
+                dropped = max(self._boundary(fence, change.first) - fence.first, 0)
+                del fence.events[:dropped]
+                fence.first += dropped
+            case PutConsumer():
+                fence.consumers[change.consumer.name] = change.consumer
+            case DropConsumer():
+                fence.consumers.pop(change.name, None)
 
     def _take(self, snapshot: _Snapshot) -> None:
         hull = self._hulls.get(snapshot.number)

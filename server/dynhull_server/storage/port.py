@@ -5,10 +5,14 @@ the engine calls `sync` and `checkpoint`, and commits the steps of `snapshot` an
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
-from ..state.records import Change, HullRow, Kept
+from ..state.fences.records import FenceEvent, FenceRow, Inside, KeptFence
+from ..state.records import HullRow, Kept
+
+if TYPE_CHECKING:
+    from ..state.changes import Change
 
 NEWEST = 2**62
 
@@ -53,21 +57,23 @@ class Contents:
 
     Attributes:
         hulls: the hulls, ordered by name.
-        next_number: a number greater than that of any hull ever created.
+        next_number: a number greater than that of any hull or fence ever created.
         notes: messages about what was lost or repaired.
+        fences: the fences, ordered by name.
     """
 
     hulls: list[HullRow]
     next_number: int
     notes: list[str]
+    fences: list[FenceRow] = field(default_factory=list)
 
 
 class Storage(Protocol):
-    """Keeps hulls.
+    """Keeps hulls and fences.
 
     Attributes:
         immediate: whether commits take no time and cannot fail, and so need no thread.
-        keeps: whether it keeps batches; if not, it is given none.
+        keeps: whether it keeps batches; if not, it is given none. It keeps events in any case.
     """
 
     immediate: bool
@@ -87,8 +93,8 @@ class Storage(Protocol):
         Changes apply in order. A step of a deleted hull changes nothing.
 
         Raises:
-            NotCommittedError: none was committed, and none will be found later. Also if a hull to create exists, if a
-                hull to change does not exist, or if batches do not follow its last revision.
+            NotCommittedError: none was committed, and none will be found later. Also if a hull or fence to create
+                exists, if one to change does not exist, or if batches or events do not follow the last ones.
             Exception: any other error: the outcome is unknown until `settle` has returned.
         """
 
@@ -125,6 +131,33 @@ class Storage(Protocol):
 
     def sweep(self) -> Iterator["Step"]:
         """Drop the rows of deleted hulls and unfinished snapshots, in the same way. Run only one sweep at a time."""
+
+    def read_fence(self, number: int) -> KeptFence | None:
+        """A fence as last committed, with the events that follow who was inside; None if no fence has that number.
+
+        Raises:
+            DamagedError: the data is damaged.
+        """
+
+    def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
+        """At most that many events of a fence after a sequence, from the oldest one that is kept.
+
+        Raises:
+            KeyError: no fence has that number.
+            DamagedError: the data is damaged.
+        """
+
+    def inside(self, number: int, inside: Inside) -> Iterator["Step"]:
+        """Write who is inside of a fence, then drop what that supersedes: commit each step before the next is taken.
+
+        It is valid from its last writing step on. Events that follow it are not dropped by `DropEvents`.
+        """
+
+    def boundary(self, number: int, first: int) -> int:
+        """The greatest sequence up to `first` before which `DropEvents` drops all events.
+
+        KeyError if no fence has that number.
+        """
 
     def sync(self) -> None:
         """Make earlier commits durable, for storages whose commits are not.

@@ -17,7 +17,7 @@ from .columns import Cursor, key_bytes, point_bytes, time_bytes
 # number; the length of the producer's name; the flags.
 HEADER = struct.Struct("<IIQHB")
 TIME = struct.Struct("<q")
-MOST_NUMBERS = 6  # in the key of a row
+MOST_NUMBERS = 7  # in the key of a row
 NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..port import DamagedError, FormatError, Progress
 from .encoding import checksum, weight
+from .fence_examine import FenceExamination, FoundFences
 from .hull_rows import found_hulls, values
 from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
 from .schema import APPLICATION_ID, FORMAT, PAGE_BYTES, SCHEMAS, found
@@ -23,6 +24,7 @@ MOST_MESSAGES = 5  # of SQLite's checks
 PROGRESS_ROWS = 1000
 
 MISSING = 0  # the number of no row
+FENCES_SINCE = 4  # the first format with fences
 
 
 @dataclass(slots=True)
@@ -162,6 +164,7 @@ class _Examination:
         self._done = self._all = 0
         self._newest_snapshot = MISSING
         self._next_number = 1
+        self._fences = FoundFences()
         self._renewed = 0  # checksums of the rows of hulls in the present format, less the stored ones
 
     def run(self) -> None:
@@ -171,9 +174,14 @@ class _Examination:
         self._snapshots()
         self._chunks()
         self._batches()
+        if self._version >= FENCES_SINCE:
+            self._fences = FenceExamination(self._connection, self._ledger, contents=self._contents).run()
+            self._findings.fatal += self._fences.fatal
+            self._findings.repairs += self._fences.repairs
         self._compare(totals)
         for scanned in self._hulls.values():
             self._judge(scanned)
+        self._judge_fenced()
 
     def _totals(self) -> Totals | None:
         (batches,) = self._connection.execute("SELECT count(*) FROM batches").fetchone()
@@ -271,7 +279,9 @@ class _Examination:
     def _compare(self, totals: Totals | None) -> None:
         """Compare the rows found with the totals."""
         hulls = self._ledger.hulls.values()
-        there = Totals(next_number=max([self._next_number, *(number + 1 for number in self._ledger.hulls)]))
+        fences = self._fences
+        numbers = [self._next_number, fences.next_number, *(number + 1 for number in self._ledger.hulls)]
+        there = Totals(next_number=max(numbers)).plus(0, 0, fences.sum, fences.rows)
         there = there.plus(len(hulls), sum(len(hull.ids) for hull in hulls), sum(hull.sum for hull in hulls))
         self._ledger.totals = (totals or there)._replace(sum=there.sum)
         stored = there.plus(0, 0, -self._renewed)
@@ -284,6 +294,10 @@ class _Examination:
                 f"the totals record {totals.hulls} hulls with {totals.batches} rows of batches, the tables have "
                 f"{there.hulls} with {there.batches}, or different ones: rows are missing, or log and database do not "
                 "belong together"
+            )
+        if totals is not None and totals.fence_rows != there.fence_rows:
+            self._findings.fatal.append(
+                f"the totals record {totals.fence_rows} rows of fences, the tables have {there.fence_rows}"
             )
         names = Counter(hull.row.name for hull in hulls)
         self._findings.fatal += [f"{times} hulls have the name {name!r}" for name, times in names.items() if times > 1]
@@ -327,6 +341,24 @@ class _Examination:
             self._findings.repairs.append(Cut(hull.row.number, last, scanned.damaged[hull.firsts[row]]))
         else:
             self._findings.blame(hull, f"{text}, and later ones exist", fatal=True)
+
+    def _judge_fenced(self) -> None:
+        """A fence cannot follow a hull that is cut back, or that is missing."""
+        cut = {step.number for step in self._findings.repairs if isinstance(step, Cut)}
+        kept = {hull.row.name for number, hull in self._ledger.hulls.items() if number not in cut}
+        for fence in self._ledger.fences.values():
+            config = fence.row.config
+            needed = {config.area_hull, config.subjects if config.kind != "prefix" else None} - {None}
+            lost = needed - kept
+            lost |= {
+                self._ledger.hulls[number].row.name
+                for number in cut
+                if config.concerns(self._ledger.hulls[number].row.name)
+            }
+            if lost:
+                self._findings.fatal.append(
+                    f"fence {fence.row.name!r} depends on hull {min(map(str, lost))!r}, whose newest revision is lost"
+                )
 
     def _judge_snapshots(self, scanned: _Scanned) -> int:
         """The revision of the newest intact snapshot, 0 if there is none."""

@@ -80,6 +80,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     1: ("SELECT id, name, created, config FROM hulls", _of_format_1),
     2: ("SELECT id, name, uid, created, max_points, checksum FROM hulls", _of_format_2),
     3: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
+    4: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
 }
 
 

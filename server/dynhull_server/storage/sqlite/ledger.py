@@ -7,17 +7,28 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, Self
 
-from ...state.records import Append, Change, Create, Delete, HullRow
+from ...state.changes import Change
+from ...state.records import Append, Create, Delete, HullRow
 from ..port import NotCommittedError
 from .encoding import checksum, encode, weight
+from .fence_ledger import FenceChanges, FenceRows, FenceStep
 from .hull_rows import values
 from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
 from .totals import Totals
 
 KEPT = 2  # snapshots per hull; the older one serves if the newer is damaged
 
-# The tables in which deleted hulls and unfinished snapshots leave rows, and their largest column.
-DROPPED = {"snapshots": "state", "batches": "payload", "chunks": "points"}
+# The tables in which deleted hulls and fences and unfinished snapshots leave rows, and their largest column.
+DROPPED = {
+    "snapshots": "state",
+    "batches": "payload",
+    "chunks": "points",
+    "events": "payload",
+    "insides": "payload",
+    "consumers": "name",
+}
+
+IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids")
 
 Statement = tuple[str, tuple[Any, ...]]
 
@@ -95,21 +106,27 @@ class Ledger:
     Attributes:
         totals: the number and the sum of all valid rows.
         hulls: the hulls by number.
-        dead: by table, the rows to drop because no hull or snapshot needs them.
+        fences: the fences by number.
+        dead: by table, the rows to drop because no hull, fence or snapshot needs them.
         batch_ids, chunk_ids, snapshot_ids: the next numbers. No number is used twice while the storage is open, so a
             row found dead cannot belong to anything else when it is dropped.
+        event_ids, inside_ids, consumer_ids: the same for fences.
     """
 
     totals: Totals = field(default_factory=Totals)
     hulls: dict[int, HullRows] = field(default_factory=dict)
+    fences: dict[int, FenceRows] = field(default_factory=dict)
     dead: "dict[str, array[int]]" = field(default_factory=lambda: {table: array("q") for table in DROPPED})
     batch_ids: "count[int]" = field(default_factory=lambda: count(1))
     chunk_ids: "count[int]" = field(default_factory=lambda: count(1))
     snapshot_ids: "count[int]" = field(default_factory=lambda: count(1))
+    event_ids: "count[int]" = field(default_factory=lambda: count(1))
+    inside_ids: "count[int]" = field(default_factory=lambda: count(1))
+    consumer_ids: "count[int]" = field(default_factory=lambda: count(1))
 
     def go_on_from(self, before: "Ledger", under_way: Set[int]) -> None:
         """Replace an earlier ledger; chunks of snapshots that are `under_way` are not dead."""
-        for name in ("batch_ids", "chunk_ids", "snapshot_ids"):
+        for name in IDS:
             setattr(self, name, count(max(next(getattr(self, name)), next(getattr(before, name)))))
         self.dead["chunks"] = array("q", (place for place in self.dead["chunks"] if place not in under_way))
 
@@ -167,7 +184,7 @@ class DropDead:
     ids: "array[int]"
 
 
-AnyStep = Chunk | Finish | DropSnapshot | DropBatches | Cut | DropDead
+AnyStep = Chunk | Finish | DropSnapshot | DropBatches | Cut | DropDead | FenceStep
 
 
 class Group:
@@ -186,9 +203,13 @@ class Group:
         self._now: dict[int, _Now] = {}
         self._effects: list[Callable[[], object]] = []
         self.statements: list[Statement] = []
+        self._fences = FenceChanges(ledger, self.statements, self._effects)
         for change in changes:
             self._take(change)
-        self._totals = self._totals._replace(commits=self._totals.commits + 1)
+        fences = self._fences
+        next_number = max(self._totals.next_number, fences.next_number)
+        self._totals = self._totals.plus(0, 0, fences.sum, fences.rows)
+        self._totals = self._totals._replace(commits=self._totals.commits + 1, next_number=next_number)
         self.statements.append((UPDATE_TOTALS, self._totals.row))
 
     def adopt(self) -> None:
@@ -219,6 +240,8 @@ class Group:
                 self._cut(change)
             case DropDead():
                 self._drop_dead(change)
+            case _:
+                self._fences.take(change)
 
     def _hull(self, number: int) -> "_Now | None":
         """A hull after the changes so far, None if it does not exist."""

@@ -4,7 +4,7 @@ import sqlite3
 
 from .hull_rows import values
 from .ledger import Ledger
-from .schema import INSERT_HULL, TABLES, stamp
+from .schema import FENCE_TABLES, INSERT_HULL, TABLES, stamp
 from .totals import Totals, renew_totals
 
 
@@ -27,7 +27,10 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger) -> Non
     if version == 1:
         for index in ("batches_by_revision", "chunks_by_number"):
             connection.execute(f"DROP INDEX {index}")
-        connection.execute(TABLES["totals"])
+    else:
+        connection.execute("DROP TABLE totals")
+    for table in ("totals", *FENCE_TABLES):
+        connection.execute(TABLES[table])
     connection.execute("DROP TABLE hulls")
     connection.execute(TABLES["hulls"])
     connection.executemany(INSERT_HULL, (values(hull.row) for hull in ledger.hulls.values()))

@@ -3,7 +3,7 @@
 import sqlite3
 
 APPLICATION_ID = 0x64796E68  # "dynh"
-FORMAT = 3
+FORMAT = 4
 PAGE_BYTES = 8192  # a large batch spans several pages, and wastes half of one
 
 TABLES = {
@@ -44,12 +44,57 @@ TABLES = {
     sum INTEGER NOT NULL,
     next_number INTEGER NOT NULL,
     mode INTEGER NOT NULL,
+    fence_rows INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+    "fences": """CREATE TABLE fences (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL,
+    uid TEXT NOT NULL,
+    created REAL NOT NULL,
+    config TEXT NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+    "events": """CREATE TABLE events (
+    fence INTEGER NOT NULL,
+    first INTEGER NOT NULL,
+    last INTEGER NOT NULL,
+    checksum INTEGER NOT NULL,
+    payload BLOB NOT NULL
+)""",
+    "insides": """CREATE TABLE insides (
+    fence INTEGER NOT NULL,
+    sequence INTEGER NOT NULL,
+    part INTEGER NOT NULL,
+    parts INTEGER NOT NULL,
+    checksum INTEGER NOT NULL,
+    payload BLOB NOT NULL
+)""",
+    "consumers": """CREATE TABLE consumers (
+    fence INTEGER NOT NULL,
+    name TEXT NOT NULL,
+    acknowledged INTEGER NOT NULL,
+    lost INTEGER NOT NULL,
     checksum INTEGER NOT NULL
 )""",
 }
+FENCE_TABLES = ("fences", "events", "insides", "consumers")
 
+# Format 3 had no fences.
+FORMAT_3 = {table: sql for table, sql in TABLES.items() if table not in FENCE_TABLES} | {
+    "totals": """CREATE TABLE totals (
+    id INTEGER PRIMARY KEY,
+    commits INTEGER NOT NULL,
+    hulls INTEGER NOT NULL,
+    batches INTEGER NOT NULL,
+    sum INTEGER NOT NULL,
+    next_number INTEGER NOT NULL,
+    mode INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+}
 # Format 2 had one setting of a hull, and in batches and snapshots neither keys nor times.
-FORMAT_2 = TABLES | {
+FORMAT_2 = FORMAT_3 | {
     "hulls": """CREATE TABLE hulls (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL,
@@ -74,13 +119,26 @@ FORMAT_1 = {
     "chunks": TABLES["chunks"],
     "chunks_by_number": "CREATE UNIQUE INDEX chunks_by_number ON chunks (snapshot, number)",
 }
-SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {1: FORMAT_1, 2: FORMAT_2, FORMAT: TABLES}
+SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
+    1: FORMAT_1,
+    2: FORMAT_2,
+    3: FORMAT_3,
+    FORMAT: TABLES,
+}
 
 INSERT_HULL = "INSERT INTO hulls (id, name, uid, created, settings, checksum) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_BATCH = "INSERT INTO batches (rowid, hull, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_CHUNK = "INSERT INTO chunks (rowid, snapshot, number, checksum, points) VALUES (?, ?, ?, ?, ?)"
 INSERT_SNAPSHOT = "INSERT INTO snapshots (id, hull, revision, chunks, state, checksum) VALUES (?, ?, ?, ?, ?, ?)"
-UPDATE_TOTALS = "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_number=?, mode=?, checksum=?"
+INSERT_FENCE = "INSERT INTO fences (id, name, uid, created, config, checksum) VALUES (?, ?, ?, ?, ?, ?)"
+INSERT_EVENTS = "INSERT INTO events (rowid, fence, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
+INSERT_INSIDE = (
+    "INSERT INTO insides (rowid, fence, sequence, part, parts, checksum, payload) VALUES (?, ?, ?, ?, ?, ?, ?)"
+)
+INSERT_CONSUMER = "INSERT INTO consumers (rowid, fence, name, acknowledged, lost, checksum) VALUES (?, ?, ?, ?, ?, ?)"
+UPDATE_TOTALS = (
+    "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_number=?, mode=?, fence_rows=?, checksum=?"
+)
 
 
 def found(connection: sqlite3.Connection) -> tuple[int, int, dict[str, str | None]]:

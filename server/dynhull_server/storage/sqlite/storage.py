@@ -16,8 +16,10 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 
+from ...state.changes import Change
 from ...state.errors import words
-from ...state.records import Change, HullRow, Kept
+from ...state.fences.records import FenceEvent, Inside, KeptFence
+from ...state.records import HullRow, Kept
 from ..durability import Durability
 from ..port import (
     NEWEST,
@@ -33,6 +35,8 @@ from .chunks import chunk, starts, state
 from .disk import Access, Disk
 from .encoding import weight
 from .examine import Findings, examine, format_of, load
+from .fence_ledger import DropInside, inside_steps
+from .fence_reading import read_events, read_fence
 from .folder import Folder
 from .ledger import (
     DROPPED,
@@ -127,9 +131,9 @@ class SQLiteStorage:
                 ) from error
             self._open = stack.pop_all()
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
-        return Contents(
-            rows, self._ledger.totals.next_number, notes + [self._prefixed(note) for note in findings.notes]
-        )
+        fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
+        notes += [self._prefixed(note) for note in findings.notes]
+        return Contents(rows, self._ledger.totals.next_number, notes, fences)
 
     def close(self) -> None:
         """Release the folder."""
@@ -240,6 +244,40 @@ class SQLiteStorage:
         """The oldest revision that `read` can return."""
         with self._visible:
             return self._settled().hulls[number].oldest
+
+    @_as_storage_errors()
+    def read_fence(self, number: int) -> KeptFence | None:
+        """A fence as last committed."""
+        with self._readers.lend() as connection:
+            with self._visible:
+                fence = self._settled().fences.get(number)
+                if fence is None:
+                    return None
+                first, fence = fence.first, fence.since(fence.base)
+                begin(connection)
+            return read_fence(connection, fence, first)
+
+    @_as_storage_errors()
+    def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
+        """Events of a fence."""
+        with self._readers.lend() as connection:
+            with self._visible:
+                fence = self._settled().fences[number].since(after)
+                begin(connection)
+            return read_events(connection, fence, after, most)
+
+    def boundary(self, number: int, first: int) -> int:
+        """The sequence nearest before `first` such that all events before it can be dropped."""
+        with self._visible:
+            return self._settled().fences[number].boundary(first)
+
+    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+        """Write who is inside, then drop what that supersedes."""
+        yield from inside_steps(number, inside, lambda: next(self._ledger.inside_ids))
+        while (fence := self._ledger.fences.get(number)) and (
+            older := [key for key in fence.insides if key < fence.base]
+        ):
+            yield DropInside(number, older[0])
 
     def _settled(self) -> Ledger:
         if self._unsettled:

@@ -21,10 +21,11 @@ class Totals(NamedTuple):
         commits: the number of earlier commits; it only grows.
         hulls: the number of hulls.
         batches: the number of rows of batches, without those of deleted hulls.
-        sum: the sum of the checksums of the hulls and of the weights of these rows.
+        sum: the sum of the checksums of the hulls and of the weights of all other rows.
         next_number: a number greater than that of any hull ever created.
         mode: STOPPED or one of MODES. In the database file itself it is STOPPED only if the log has no acknowledged
             commits.
+        fence_rows: the number of rows of fences: their own, and those of events, consumers and who is inside.
     """
 
     commits: int = 0
@@ -33,11 +34,20 @@ class Totals(NamedTuple):
     sum: int = 0
     next_number: int = 1
     mode: int = STOPPED
+    fence_rows: int = 0
 
-    def plus(self, hulls: int, batches: int, checksums: int) -> Self:
+    def plus(self, hulls: int, batches: int, checksums: int, fence_rows: int = 0) -> Self:
         """The totals after adding rows or, with negative numbers, removing them."""
         total = (self.sum + checksums) % 2**SUM_BITS
-        return type(self)(self.commits, self.hulls + hulls, self.batches + batches, total, self.next_number, self.mode)
+        return type(self)(
+            self.commits,
+            self.hulls + hulls,
+            self.batches + batches,
+            total,
+            self.next_number,
+            self.mode,
+            self.fence_rows + fence_rows,
+        )
 
     @property
     def row(self) -> tuple[int, ...]:
@@ -51,19 +61,18 @@ def read_totals(connection: sqlite3.Connection) -> tuple[Totals | None, bool]:
     Raises:
         sqlite3.Error: the table is missing, or cannot be read.
     """
-    query = "SELECT commits, hulls, batches, sum, next_number, mode, checksum FROM totals"
     whole = set()
-    rows = connection.execute(query).fetchall()
+    rows = [row for _, *row in connection.execute("SELECT * FROM totals")]  # up to format 3 without fences
     for *values, stored in rows:
         if all(type(value) is int for value in values) and checksum(b"", *values) == stored:
             whole.add(Totals(*values))
-    both = len(rows) == COPIES and len(set(rows)) == 1
+    both = len(rows) == COPIES and all(row == rows[0] for row in rows)
     return whole.pop() if len(whole) == 1 else None, both
 
 
 def renew_totals(connection: sqlite3.Connection, totals: Totals) -> None:
     """Rewrite both copies."""
-    columns = "commits, hulls, batches, sum, next_number, mode, checksum"
+    columns = "commits, hulls, batches, sum, next_number, mode, fence_rows, checksum"
     connection.execute("DELETE FROM totals")
-    sql = f"INSERT INTO totals ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?)"  # noqa: S608  (ours)
+    sql = f"INSERT INTO totals ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"  # noqa: S608  (ours)
     connection.executemany(sql, [totals.row] * COPIES)

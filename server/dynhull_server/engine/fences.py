@@ -1,0 +1,195 @@
+"""Fences as their callers use them."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
+
+from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError
+from ..state.fences.config import FenceConfig
+from ..state.fences.fence import Fence
+from ..state.fences.fence_leg import members
+from ..state.fences.records import Consumer, FenceEvent, Inside
+from ..state.fences.requests import (
+    CreateFence,
+    DeleteFence,
+    DropConsumer,
+    DropEvents,
+    PutConsumer,
+    ReadFence,
+    ReplaceFence,
+)
+from ..storage.port import Storage, StorageError
+from .waiter import Waiter
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+T = TypeVar("T")
+
+
+class LiveFence:
+    """A fence that many callers read and watch.
+
+    Attributes:
+        fence: its committed state.
+    """
+
+    def __init__(self, engine: "Engine", storage: Storage, fence: Fence) -> None:
+        self.fence = fence
+        self._engine = engine
+        self._storage = storage
+        self._moved: asyncio.Event | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.fence.name
+
+    @property
+    def uid(self) -> str:
+        """Distinguishes it from other fences of its name."""
+        return self.fence.row.uid
+
+    @property
+    def created(self) -> datetime:
+        """The time of its creation."""
+        return datetime.fromtimestamp(self.fence.row.created, UTC)
+
+    async def inside(self) -> Inside:
+        """The subjects that are inside, all at one moment. O(number of them)."""
+        return await self._read(lambda fence, last: Inside(last, tuple(members(fence))), rows=self.fence.inside)
+
+    async def acknowledge(self, consumer: str, sequence: int | None, uid: str = "") -> Consumer:
+        """Acknowledge events for a consumer, which is created if it is new."""
+        request = PutConsumer(Waiter(), self.name, self._engine.time(), consumer, sequence, uid)
+        found: Consumer = await self._engine.ask(request)
+        return found
+
+    async def drop_consumer(self, consumer: str) -> None:
+        """Delete a consumer."""
+        await self._engine.ask(DropConsumer(Waiter(), self.name, self._engine.time(), consumer))
+
+    async def drop_events(self, first: int) -> None:
+        """Drop the events before `first`."""
+        await self._engine.ask(DropEvents(Waiter(), self.name, self._engine.time(), self.fence, first))
+
+    async def events(self, after: int, most: int) -> list[FenceEvent]:
+        """At most that many events after a sequence, from the oldest one that is kept.
+
+        Raises:
+            NotStoredError: the storage cannot be read.
+        """
+        found = self.fence.recent(after, most)
+        if found is not None:
+            return found
+        try:
+            read = partial(self._storage.read_events, self.fence.number, after, most)
+            events: list[FenceEvent] = await self._engine.run(self._engine.disk, read)
+        except KeyError:  # deleted meanwhile: what is left of it is in memory
+            return self.fence.recent(self.fence.oldest_recent - 1, most) or []
+        except (StorageError, OSError, MemoryError) as error:
+            raise NotStoredError(str(error)) from error
+        return events
+
+    async def reached(self, sequence: int) -> None:
+        """Wait until the fence has an event of this sequence or a later one, or is deleted."""
+        while not self.fence.ended and self.fence.last < sequence:
+            if self._moved is None:
+                self._moved = asyncio.Event()
+            await self._moved.wait()
+
+    def moved(self) -> None:
+        """Wake the waiting callers."""
+        if self._moved is not None:
+            self._moved.set()
+            self._moved = None
+
+    async def _read(self, function: Callable[[Fence, int], T], rows: int) -> T:
+        found: T = await self._engine.ask(ReadFence(Waiter(), self.name, self._engine.time(), function, rows=rows))
+        return found
+
+
+class Fences:
+    """The fences of an engine.
+
+    Args:
+        engine: the engine.
+        storage: keeps their events.
+    """
+
+    def __init__(self, engine: "Engine", storage: Storage) -> None:
+        self._engine = engine
+        self._storage = storage
+        self._live: dict[Fence, LiveFence] = {}
+
+    def __len__(self) -> int:
+        return len(self._engine.core.fences)
+
+    def all(self) -> list[LiveFence]:
+        """All fences, by name."""
+        return [self._live_fence(fence) for fence in list(self._engine.core.fences.values())]
+
+    def get(self, name: str) -> LiveFence:
+        """The fence of that name, or raise FenceNotFoundError."""
+        return self._live_fence(self._engine.core.fence(name))
+
+    def page(self, prefixes: Sequence[str], after: str, size: int) -> tuple[list[LiveFence], bool]:
+        """At most `size` fences whose names follow `after`, and whether there are more.
+
+        Only names that begin with one of the prefixes. These are sorted, and none of them begins with another.
+        """
+        fences: list[LiveFence] = []
+        for prefix in prefixes:
+            for name in self._engine.core.fences.irange(minimum=max(prefix, after)):
+                if not name.startswith(prefix):
+                    break
+                if name == after:
+                    continue
+                if len(fences) == size:
+                    return fences, True
+                fences.append(self.get(name))
+        return fences, False
+
+    async def create(self, name: str, config: FenceConfig) -> LiveFence:
+        """Create a fence, or raise the error that refuses it."""
+        engine = self._engine
+        request = CreateFence(Waiter(), name, engine.time(), config, engine.birth(), rows=self._rows(config))
+        return self._live_fence(await engine.ask(request))
+
+    async def replace(self, name: str, config: FenceConfig) -> LiveFence:
+        """Replace the area and the settings of a fence, or raise the error that refuses it."""
+        request = ReplaceFence(Waiter(), name, self._engine.time(), config, rows=self._rows(config))
+        return self._live_fence(await self._engine.ask(request))
+
+    async def delete(self, name: str) -> None:
+        """Delete a fence, or raise FenceNotFoundError or NotStoredError."""
+        fence = self._engine.core.fences.get(name)
+        if fence is None:
+            raise FenceNotFoundError(name)
+        await self._engine.ask(DeleteFence(Waiter(), name, self._engine.time(), rows=fence.inside))
+
+    def stir(self, fences: Sequence[Fence]) -> None:
+        """Wake those who watch these fences."""
+        for fence in fences:
+            live = self._live.get(fence)
+            if live is not None:
+                live.moved()
+                if fence.ended:
+                    del self._live[fence]
+
+    def _rows(self, config: FenceConfig) -> int:
+        """The number of subjects, about."""
+        try:
+            return self._engine.get(config.subjects).counts.points
+        except HullNotFoundError:
+            return 0
+
+    def _live_fence(self, fence: Fence) -> LiveFence:
+        live = self._live.get(fence)
+        if live is None:
+            live = LiveFence(self._engine, self._storage, fence)
+            if not fence.ended:
+                self._live[fence] = live
+        return live

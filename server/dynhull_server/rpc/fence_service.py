@@ -1,0 +1,148 @@
+"""FenceService, one method per RPC of dynhull.v1. The .proto files document the methods."""
+
+from contextlib import aclosing
+
+from dynhull_proto.v1 import fence_service_pb2 as pb
+
+from ..engine.engine import Engine
+from ..engine.fences import LiveFence
+from ..engine.watch_fence import watch_fence
+from ..state.errors import FenceReplacedError, SequenceAheadError
+from ..state.fences.config import FenceConfig
+from ..state.fences.records import Consumer, Members
+from . import decode
+from .calls import Call
+from .decode_fence import decode_consumer, decode_fence, decode_fence_name, decode_start
+from .encode_fence import encode_consumer, encode_fence, encode_members, encode_sent
+from .metrics import Metrics
+
+# The number of keys in a part of ReadInside.
+KEYS_A_PART = 65_536
+
+
+class FenceService:
+    """The service on an engine.
+
+    Args:
+        engine: the fences.
+        metrics: counts the work.
+        max_corners: the largest number of corners of an area.
+        max_watch_lag: the seconds that a watcher may take to receive a response.
+    """
+
+    def __init__(self, engine: Engine, metrics: Metrics, *, max_corners: int, max_watch_lag: float) -> None:
+        self._fences = engine.fences
+        self._metrics = metrics
+        self._max_corners = max_corners
+        self._max_watch_lag = max_watch_lag
+
+    async def CreateFence(self, request: pb.CreateFenceRequest, call: Call) -> pb.CreateFenceResponse:
+        name = decode_fence_name(request.name)
+        call.access.require_write(name)
+        config = decode_fence(request, self._max_corners)
+        _require_hulls(call, config)
+        return pb.CreateFenceResponse(fence=encode_fence(await self._fences.create(name, config), {}))
+
+    async def ReplaceFence(self, request: pb.ReplaceFenceRequest, call: Call) -> pb.ReplaceFenceResponse:
+        name = decode_fence_name(request.name)
+        call.access.require_write(name)
+        config = decode_fence(request, self._max_corners)
+        _require_hulls(call, config)
+        fence = await self._fences.replace(name, config)
+        return pb.ReplaceFenceResponse(fence=encode_fence(fence, await _oldest(fence)))
+
+    async def DeleteFence(self, request: pb.DeleteFenceRequest, call: Call) -> pb.DeleteFenceResponse:
+        name = decode_fence_name(request.name)
+        call.access.require_write(name)
+        _require_hulls(call, self._fences.get(name).fence.row.config)
+        await self._fences.delete(name)
+        return pb.DeleteFenceResponse()
+
+    async def GetFence(self, request: pb.GetFenceRequest, call: Call) -> pb.GetFenceResponse:
+        fence = self._read(call, request.name)
+        return pb.GetFenceResponse(fence=encode_fence(fence, await _oldest(fence)))
+
+    async def ListFences(self, request: pb.ListFencesRequest, call: Call) -> pb.ListFencesResponse:
+        prefix, after, size = decode.decode_page(request)
+        fences, more = self._fences.page(call.access.readable(prefix), after, size)
+        return pb.ListFencesResponse(
+            fences=[encode_fence(fence, await _oldest(fence)) for fence in fences],
+            next_page_token=fences[-1].name if more else "",
+        )
+
+    async def ReadInside(self, request: pb.ReadInsideRequest, call: Call) -> None:
+        fence = self._read(call, request.name)
+        with call.cutoff():
+            inside = await fence.inside()
+        parts = [
+            Members(each.hull, each.keys[first : first + KEYS_A_PART], each.revision)
+            for each in inside.members
+            for first in range(0, len(each.keys), KEYS_A_PART)
+        ]
+        for part in [[part] for part in parts] or [[]]:
+            response = pb.ReadInsideResponse(sequence=inside.sequence, subjects=encode_members(part))
+            await call.write_within(self._max_watch_lag, response)
+
+    async def WatchFence(self, request: pb.WatchFenceRequest, call: Call) -> None:
+        fence = self._read(call, request.name)
+        start = decode_start(request)
+        interval = decode.decode_rate(request.max_responses_per_second, "max_responses_per_second")
+        progress = decode.decode_interval(request)
+        if request.uid and request.uid != fence.uid:
+            raise FenceReplacedError(fence.name, fence.uid)
+        after = fence.fence.last if start.after is None else start.after
+        if start.consumer is not None:
+            with call.cutoff():
+                consumer = await fence.acknowledge(start.consumer, None)
+            after = consumer.acknowledged
+        if after > fence.fence.last:
+            raise SequenceAheadError("after_sequence", after, fence.fence.last)
+        responses = watch_fence(
+            fence, after, conflate=request.conflate, min_interval=interval, progress_interval=progress
+        )
+        uid = fence.uid
+        with self._metrics.watcher() as watcher:
+            async with aclosing(responses):
+                while True:
+                    with call.cutoff():
+                        sent = await anext(responses, None)
+                    if sent is None:
+                        return
+                    with self._metrics.sending(watcher, "fence"):
+                        await call.write_within(self._max_watch_lag, encode_sent(sent, uid))
+                    uid = ""
+
+    async def AckFence(self, request: pb.AckFenceRequest, call: Call) -> pb.AckFenceResponse:
+        fence = self._read(call, request.name)
+        name = decode_consumer(request.consumer)
+        consumer = await fence.acknowledge(name, min(request.sequence, decode.LARGEST_INTEGER), request.uid)
+        oldest = await _oldest_of(fence, consumer)
+        return pb.AckFenceResponse(consumer=encode_consumer(fence.fence, consumer, oldest))
+
+    async def DeleteConsumer(self, request: pb.DeleteConsumerRequest, call: Call) -> pb.DeleteConsumerResponse:
+        fence = self._read(call, request.name)
+        await fence.drop_consumer(decode_consumer(request.consumer))
+        return pb.DeleteConsumerResponse()
+
+    def _read(self, call: Call, name: str) -> LiveFence:
+        name = decode_fence_name(name)
+        call.access.require_read(name)
+        return self._fences.get(name)
+
+
+def _require_hulls(call: Call, config: FenceConfig) -> None:
+    """Raise PermissionDeniedError if the hulls that a fence names may not be read."""
+    call.access.require_read(config.subjects)
+    if config.area_hull is not None:
+        call.access.require_read(config.area_hull)
+
+
+async def _oldest(fence: LiveFence) -> dict[str, int]:
+    """The time of the oldest event in the backlog of each consumer that has one."""
+    times = {name: await _oldest_of(fence, consumer) for name, consumer in fence.fence.consumers.items()}
+    return {name: time for name, time in times.items() if time is not None}
+
+
+async def _oldest_of(fence: LiveFence, consumer: Consumer) -> int | None:
+    events = await fence.events(consumer.acknowledged, 1)
+    return events[0].time if events else None

@@ -1,0 +1,1 @@
+"""Fences: who is inside of which area, and the events when that changes."""

@@ -1,0 +1,86 @@
+"""The settings of a fence."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Initial = Literal["snapshot", "events", "none"]
+SubjectKind = Literal["hull", "prefix", "other"]
+Ring = bytes  # the corners as pairs of little-endian doubles
+
+
+@dataclass(frozen=True, slots=True)
+class HullArea:
+    """A live hull as an area. With `without_self` each subject is compared with the hull of the others."""
+
+    name: str
+    without_self: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PolygonArea:
+    """Polygons joined by "or", each an exterior ring and holes."""
+
+    polygons: tuple[tuple[Ring, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CircleArea:
+    """A disk."""
+
+    x: float
+    y: float
+    radius: float
+
+
+Area = HullArea | PolygonArea | CircleArea
+
+
+@dataclass(frozen=True, slots=True)
+class FenceConfig:
+    """The settings of a fence; durations and times are in microseconds, 0 for none.
+
+    Attributes:
+        area: what subjects are compared with.
+        kind: who is compared: the keys of a hull ("hull"), those of all keyed hulls with a prefix ("prefix"), or a hull
+            as a whole ("other").
+        subjects: the name of the hull, or the prefix.
+        closed: whether the boundary belongs to the area.
+        margin: how far outside of the area a subject that is inside has to be to leave.
+        near: with an other hull, the distance up to which the hulls are near.
+        initial: what a new fence says about the subjects that are inside already.
+        crosses: whether a subject that passes through the area makes an event.
+        dwell: the time inside after which a subject makes an event.
+        confirmations: the number of consecutive reports that must agree before a subject enters or leaves.
+        min_dwell: how long a subject must be on the other side before it enters or leaves.
+        max_events: the number of events to keep, 0 for the limit of the server.
+        max_event_age: how long events are kept.
+    """
+
+    area: Area
+    kind: SubjectKind
+    subjects: str
+    closed: bool = True
+    margin: float = 0.0
+    near: float = 0.0
+    initial: Initial = "snapshot"
+    crosses: bool = False
+    dwell: int = 0
+    confirmations: int = 0
+    min_dwell: int = 0
+    max_events: int = 0
+    max_event_age: int = 0
+
+    @property
+    def area_hull(self) -> str | None:
+        """The name of the hull that is the area, None for other areas."""
+        return self.area.name if isinstance(self.area, HullArea) else None
+
+    def compares(self, name: str) -> bool:
+        """Whether the keys of a hull of that name are subjects."""
+        return (
+            name == self.subjects if self.kind == "hull" else self.kind == "prefix" and name.startswith(self.subjects)
+        )
+
+    def concerns(self, name: str) -> bool:
+        """Whether the fence depends on a hull of that name."""
+        return name == self.area_hull or self.compares(name) or (self.kind == "other" and name == self.subjects)

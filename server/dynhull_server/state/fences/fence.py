@@ -1,0 +1,110 @@
+"""A fence as clients see it: its committed state, and recent events."""
+
+from collections import deque
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from ..records import NO_TIME
+from .records import Consumer, FenceEvent, FenceRow, KeptFence
+
+if TYPE_CHECKING:
+    from ..hull import Hull
+    from .subjects import Subjects
+
+# Bytes that an event takes in memory, about, without the keys of a snapshot.
+EVENT_BYTES, KEY_BYTES = 400, 20
+
+
+class Fence:
+    """One fence from its creation to its deletion.
+
+    Args:
+        row: its identity and settings.
+        recent_bytes: the memory for its recent events.
+
+    Attributes:
+        row: its identity and settings, as stored.
+        area: the hull that is its area, or None.
+        subjects: the hulls whose keys it compares, by name.
+        last: the sequence of the last committed event, 0 before the first.
+        first: the sequence of the oldest event that is kept; last + 1 if none is.
+        time: the time of the last event, NO_TIME before the first.
+        inside: the number of subjects inside, as of the last commit.
+        consumers: its consumers, as of the last commit.
+        unsaved: the number of events since who is inside was last stored.
+        ended: whether it has been deleted.
+    """
+
+    def __init__(self, row: FenceRow, recent_bytes: int) -> None:
+        self.row = row
+        self.area: Hull | None = None
+        self.subjects: dict[str, Subjects] = {}
+        self.last = 0
+        self.first = 1
+        self.time = NO_TIME
+        self.inside = 0
+        self.consumers: dict[str, Consumer] = {}
+        self.unsaved = 0
+        self.ended = False
+        self._recent_bytes = recent_bytes
+        self._recent: deque[FenceEvent] = deque()
+        self._bytes = 0
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.row.name
+
+    @property
+    def number(self) -> int:
+        """Its number."""
+        return self.row.number
+
+    @property
+    def subject_count(self) -> int:
+        """The number of keys that it compares. O(hulls)."""
+        return sum(each.hull.counts.points for each in self.subjects.values())
+
+    def restored(self, kept: KeptFence) -> None:
+        """Take over what the storage has; who is inside belongs to the subjects."""
+        self.row = kept.row
+        self.last, self.first = kept.last, kept.first
+        self.consumers = dict(kept.consumers)
+        self.unsaved = len(kept.events)
+        if kept.events:
+            self.time = max(self.time, kept.events[-1].time)
+        self._recent.clear()
+        self._bytes = 0
+
+    def published(self, events: list[FenceEvent]) -> None:
+        """Record committed events."""
+        self.last = events[-1].sequence
+        self.time = events[-1].time
+        self.unsaved += len(events)
+        self._recent += events
+        self._bytes += sum(map(_size, events))
+        while self._bytes > self._recent_bytes and len(self._recent) > 1:
+            self._bytes -= _size(self._recent.popleft())
+
+    def recent(self, after: int, most: int) -> list[FenceEvent] | None:
+        """At most that many committed events after a sequence; None if the first of them is not in memory."""
+        after = max(after, self.first - 1)
+        if after >= self.last:
+            return []
+        if not self._recent or self._recent[0].sequence > after + 1:
+            return None
+        start = after + 1 - self._recent[0].sequence
+        return list(islice(self._recent, start, start + most))
+
+    @property
+    def oldest_recent(self) -> int:
+        """The sequence of the oldest event in memory; that of the next one if there is none."""
+        return self._recent[0].sequence if self._recent else self.last + 1
+
+    def backlog(self, consumer: Consumer) -> int:
+        """The number of events that are kept and not acknowledged."""
+        return self.last - max(consumer.acknowledged, self.first - 1)
+
+
+def _size(event: FenceEvent) -> int:
+    return EVENT_BYTES + KEY_BYTES * sum(len(each.keys) for each in event.inside)

@@ -1,0 +1,209 @@
+"""The part of a trip at one fence."""
+
+from collections.abc import Iterator
+
+from dynhull import Crossings
+from dynhull.keys import key_list
+
+from ..changes import FenceChange
+from ..records import NO_TIME
+from .fence import Fence
+from .records import (
+    AddFence,
+    AppendEvents,
+    Cause,
+    ChangeFence,
+    Consumer,
+    DropConsumer,
+    DropEvents,
+    DropFence,
+    EventType,
+    FenceEvent,
+    FenceRow,
+    Inside,
+    KeptFence,
+    Members,
+    PutConsumer,
+)
+from .subjects import Subjects, keyed
+
+TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS}
+
+
+class FenceLeg:
+    """What a trip does to one fence.
+
+    Args:
+        fence: the fence.
+
+    Attributes:
+        fence: the fence.
+        row: its identity and settings after the trip.
+        created, deleted: whether the trip creates or deletes it.
+        events: the events that it makes.
+        consumers: its consumers after the trip.
+        first: the oldest event that is kept after the trip.
+        inside: who is inside of a new fence that says nothing about it.
+    """
+
+    def __init__(self, fence: Fence, *, created: bool = False) -> None:
+        self.fence = fence
+        self.row: FenceRow = fence.row
+        self.created = created
+        self.deleted = False
+        self.events: list[FenceEvent] = []
+        self.consumers = fence.consumers
+        self.first = fence.first
+        self.inside = Inside()
+
+    @property
+    def last(self) -> int:
+        """The sequence of the last event."""
+        return self.events[-1].sequence if self.events else self.fence.last
+
+    @property
+    def area_revision(self) -> int:
+        """The revision of the area's hull, 0 for other areas."""
+        return 0 if self.fence.area is None else self.fence.area.state.counts.revision
+
+    def time(self, now: int) -> int:
+        """The time of an event that is made now: never before the one before it."""
+        return max(now, self.events[-1].time if self.events else self.fence.time)
+
+    def crossed(self, subjects: Subjects, crossings: Crossings, rows: slice, cause: int, now: int) -> None:
+        """Make an event of each of some crossings, whose causes are `cause` if that is not 0."""
+        sequence, time = self.last, self.time(now)
+        hull, area_revision = subjects.hull, self.area_revision
+        revision = hull.state.counts.revision
+        keys = crossings.keys[rows]
+        times = subjects.times(keys)
+        columns = zip(
+            crossings.changes[rows].tolist(),
+            crossings.causes[rows].tolist(),
+            key_list(keys),
+            crossings.points[rows].tolist(),
+            crossings.previous[rows].tolist(),
+            crossings.distances[rows].tolist(),
+            [NO_TIME] * len(keys) if times is None else times.tolist(),
+            strict=True,
+        )
+        append = self.events.append
+        for change, causes, key, (x, y), (before_x, before_y), distance, event_time in columns:
+            sequence += 1
+            gone = x != x  # NaN
+            append(
+                FenceEvent(
+                    sequence,
+                    TYPES[change],
+                    _caused(causes, cause),
+                    hull.name,
+                    key,
+                    revision,
+                    area_revision,
+                    None if gone else (x, y),
+                    None if before_x != before_x else (before_x, before_y),
+                    None if gone else distance,
+                    event_time,
+                    time,
+                )
+            )
+
+    def entered(self, subjects: Subjects, now: int) -> None:
+        """Make an event of each subject that is inside of a new fence."""
+        sequence, time = self.last, self.time(now)
+        keys = subjects.index.inside(self.fence.number)
+        times = subjects.times(keys)
+        event_times = [NO_TIME] * len(keys) if times is None else times.tolist()
+        points = keyed(subjects.hull.state).positions(keys).tolist()
+        hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
+        for key, (x, y), event_time in zip(key_list(keys), points, event_times, strict=True):
+            sequence += 1
+            self.events.append(
+                FenceEvent(
+                    sequence,
+                    EventType.ENTER,
+                    Cause.CREATED,
+                    hull,
+                    key,
+                    revision,
+                    self.area_revision,
+                    (x, y),
+                    None,
+                    0.0,
+                    event_time,
+                    time,
+                )
+            )
+
+    def summed_up(self, kind: EventType, cause: int, now: int) -> None:
+        """Make one event of all subjects that are inside."""
+        event = FenceEvent(
+            self.last + 1,
+            kind,
+            cause,
+            "",
+            None,
+            0,
+            self.area_revision,
+            None,
+            None,
+            None,
+            NO_TIME,
+            self.time(now),
+            inside=tuple(members(self.fence)),
+        )
+        self.events.append(event)
+
+    def changes(self) -> Iterator[FenceChange]:
+        """The changes to commit."""
+        fence, number = self.fence, self.fence.number
+        if self.deleted:
+            yield DropFence(number)
+            return
+        if self.created:
+            yield AddFence(self.row, self.inside)
+        elif self.row is not fence.row:
+            yield ChangeFence(self.row)
+        if self.events:
+            yield AppendEvents(number, self.events)
+        if self.first != fence.first:
+            yield DropEvents(number, self.first)
+        if self.consumers is not fence.consumers:
+            for name, consumer in self.consumers.items():
+                if fence.consumers.get(name) != consumer:
+                    yield PutConsumer(number, consumer)
+            for name in fence.consumers.keys() - self.consumers.keys():
+                yield DropConsumer(number, name)
+
+    def acknowledge(self, consumer: Consumer) -> None:
+        """Put a consumer in the place of the one of its name."""
+        self.consumers = self.consumers | {consumer.name: consumer}
+
+    def landed(self, found: KeptFence | None) -> bool:
+        """Whether the changes were committed, given the fence in the storage."""
+        if self.deleted or found is None:
+            return self.deleted and found is None
+        return (found.row, found.last, found.consumers) == (self.row, self.last, self.consumers)
+
+    def publish(self) -> None:
+        """Make the changes, which are committed, those of the fence."""
+        fence = self.fence
+        fence.row, fence.consumers, fence.first = self.row, self.consumers, self.first
+        fence.ended = self.deleted
+        if self.events:
+            fence.published(self.events)
+        if not self.deleted:
+            fence.inside = sum(each.index.count(fence.number) for each in fence.subjects.values())
+
+
+def members(fence: Fence) -> Iterator[Members]:
+    """The subjects that are inside, by hull."""
+    for subjects in fence.subjects.values():
+        keys = subjects.index.inside(fence.number)
+        if len(keys):
+            yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision)
+
+
+def _caused(causes: int, instead: int) -> int:
+    """The causes of a crossing; a replaced area is not one that moved."""
+    return causes & ~Cause.AREA | instead if instead else causes

@@ -1,0 +1,365 @@
+"""A trip on hulls with fences: its batches, and the events that follow from them, are committed together."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynhull import Crossings
+
+from ..batch import Applied
+from ..changes import Change
+from ..errors import (
+    ConsumerNotFoundError,
+    FenceExistsError,
+    FenceNotFoundError,
+    FenceReplacedError,
+    HullFencedError,
+    HullNotFoundError,
+    HullUnsuitableError,
+    InvalidFenceError,
+    LimitExceededError,
+    SequenceAheadError,
+)
+from ..events import DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
+from ..hull import Hull
+from ..hull_state import HullState
+from ..limits import FenceLimits
+from ..trip import Leg, Trip, write
+from .config import FenceConfig, PolygonArea
+from .fence import Fence
+from .fence_leg import FenceLeg, members
+from .line import Line
+from .records import Cause, Consumer, EventType, FenceRow, Inside, KeptFence
+from .requests import (
+    STRUCTURAL,
+    CreateFence,
+    DeleteFence,
+    DropConsumer,
+    DropEvents,
+    FenceRequest,
+    PutConsumer,
+    ReadFence,
+    ReplaceFence,
+)
+from .subjects import Subjects, lay
+
+POINT_BYTES = 16
+# How the library names a ring.
+RING = re.compile(r"polygon (\d+)(?: ring (\d+))? (.*)", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What a trip knows of fences when it begins.
+
+    Attributes:
+        lines: the lines of its queues.
+        fences: the fences that its requests name; None for those that do not exist.
+        number: the number of a new fence.
+        refusal: the reason if no more fences are allowed.
+        limits: the limits on fences.
+    """
+
+    lines: Sequence[Line]
+    fences: dict[str, Fence | None]
+    number: int
+    refusal: Exception | None
+    limits: FenceLimits
+
+
+class LineTrip(Trip):
+    """Runs requests in order; after each revision the fences say what it means for them.
+
+    Args:
+        legs: the hulls that the requests name.
+        requests: the requests to run.
+        now: seconds on a monotonic clock.
+        pause: seconds before the storage is examined again.
+        ground: what there is of fences.
+
+    Attributes:
+        fence_legs: the fences that it changes, by number.
+        examined: the numbers of the fences that are examined after a failure.
+        structural: whether it changes which hulls share a queue.
+        creates: the number of fences that it creates, at most.
+        weight: the number of subjects that it may concern beside the rows of its requests.
+    """
+
+    __slots__ = ("_by_name", "_ground", "creates", "examined", "fence_legs", "structural", "weight")
+
+    def __init__(self, legs: list[Leg], requests: list[Request], now: float, pause: float, ground: Ground) -> None:
+        super().__init__(legs, requests, now, pause, None)
+        self.fence_legs: dict[int, FenceLeg] = {}
+        self._ground = ground
+        self._by_name = {leg.name: leg for leg in legs}
+        self.examined: list[int] = []
+        self.structural = isinstance(requests[0], STRUCTURAL)
+        self.creates = int(isinstance(requests[0], CreateFence))
+        self.weight = sum(line.weight(leg.name) for line in ground.lines for leg in legs)
+
+    @property
+    def lines(self) -> Sequence[Line]:
+        """The lines of its queues."""
+        return self._ground.lines
+
+    def changes(self) -> list[Change]:
+        """The changes to commit."""
+        return [
+            *(change for leg in self.legs for change in leg.changes()),
+            *(change for leg in self.fence_legs.values() for change in leg.changes()),
+        ]
+
+    def touched(self) -> dict[str, Subjects]:
+        """The hulls by name whose subjects may differ from what the storage has, if the trip is not committed."""
+        if not (self.applied or self.torn):
+            return {}
+        touched: dict[str, Subjects] = {}
+        for line in self.lines:
+            for name in self._by_name:
+                if name in line.subjects:
+                    touched[name] = line.subjects[name]
+                if name in line.areas:
+                    for fence in line.areas[name].fences.values():
+                        touched |= fence.subjects
+        for leg in self.fence_legs.values():
+            if not leg.created:
+                touched |= leg.fence.subjects
+        return touched
+
+    def landed(self, states: list[HullState | None], fences: list[KeptFence | None]) -> bool:
+        """Whether the trip was committed, given what the storage has of its hulls and the examined fences."""
+        found = dict(zip(self.examined, fences, strict=True))
+        return super().landed(states, fences) and all(
+            leg.landed(found[number]) for number, leg in self.fence_legs.items()
+        )
+
+    def undo_created(self) -> None:
+        """Remove the areas of fences that were not created after all."""
+        for leg in self.fence_legs.values():
+            if leg.created:
+                for subjects in leg.fence.subjects.values():
+                    if leg.fence.number in subjects.index:
+                        subjects.index.drop(leg.fence.number)
+                    if not subjects.fences:
+                        subjects.index.detach()
+
+    # Hulls
+
+    def _leg(self, request: Request) -> Leg:
+        return self._by_name[request.hull.name if isinstance(request, ReadHull) else request.name]  # type: ignore[attr-defined]
+
+    def _apply(self, request: WriteBatch, hull: Hull, leg: Leg) -> Applied | None:
+        def expired() -> None:
+            self._watch([hull], request.arrived)
+
+        applied = write(request, hull, self._now, leg.records, expired)
+        if applied is not None and not applied.duplicate:
+            self._watch([hull], request.arrived)
+        return applied
+
+    def _write_together(self, request: WriteTogether) -> None:
+        super()._write_together(request)
+        hulls = [self._by_name[part.name].after for part in request.parts]
+        self._watch([hull for hull in hulls if hull is not None], request.parts[0].arrived)
+
+    def _expire(self, request: Expire, leg: Leg) -> int:
+        expired = super()._expire(request, leg)
+        if expired:
+            self._watch([request.hull], request.time)
+        return expired
+
+    def _watch(self, hulls: Sequence[Hull], now: int) -> None:
+        """Make the events of a change of these hulls."""
+        try:
+            for line in self.lines:
+                self._cross(line.changed(hulls), 0, now)
+        except BaseException:  # an index may have lost crossings
+            self._tear(hulls)
+            raise
+
+    def _cross(self, crossed: Iterable[tuple[Subjects, Crossings]], cause: int, now: int) -> None:
+        for subjects, crossings in crossed:
+            numbers = crossings.fences
+            starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1])).tolist()
+            for first, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
+                fence = subjects.fences[int(numbers[first])]
+                self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), cause, now)
+
+    def _tear(self, hulls: Iterable[Hull]) -> None:
+        self.torn = True
+        for hull in hulls:
+            hull.state.torn = True
+
+    def _fence_leg(self, fence: Fence) -> FenceLeg:
+        leg = self.fence_legs.get(fence.number)
+        if leg is None:
+            leg = self.fence_legs[fence.number] = FenceLeg(fence)
+        return leg
+
+    def _do(self, request: Request) -> object:
+        if isinstance(request, FenceRequest):
+            return self._do_fence(request)
+        if isinstance(request, DeleteHull):
+            self._refuse_deletion(request.name)
+        return super()._do(request)
+
+    def _refuse_deletion(self, name: str) -> None:
+        """Raise HullFencedError if a fence depends on the hull."""
+        for line in self.lines:
+            for fence in line.fences.values():
+                if fence.row.config.concerns(name):
+                    raise HullFencedError(name, fence.name)
+
+    # Fences
+
+    def _do_fence(self, request: FenceRequest) -> object:
+        if isinstance(request, CreateFence):
+            return self._create(request)
+        fence = self._ground.fences[request.name]
+        if fence is None:
+            if isinstance(request, DropEvents):
+                return None
+            raise FenceNotFoundError(request.name)
+        match request:
+            case ReadFence():
+                leg = self.fence_legs.get(fence.number)
+                return request.function(fence, fence.last if leg is None else leg.last)
+            case ReplaceFence():
+                return self._replace(request, fence)
+            case DeleteFence():
+                leg = self._fence_leg(fence)
+                leg.summed_up(EventType.CLOSED, 0, request.time)
+                leg.deleted = True
+                return None
+            case PutConsumer():
+                return self._put_consumer(request, self._fence_leg(fence))
+            case DropConsumer():
+                leg = self._fence_leg(fence)
+                if request.consumer not in leg.consumers:
+                    raise ConsumerNotFoundError(fence.name, request.consumer)
+                leg.consumers = {name: each for name, each in leg.consumers.items() if name != request.consumer}
+                return None
+            case DropEvents():
+                self._drop_events(request, fence)
+                return None
+        raise AssertionError(f"not a request: {request}")
+
+    def _create(self, request: CreateFence) -> Fence:
+        ground, config = self._ground, request.config
+        if ground.fences[request.name] is not None:
+            raise FenceExistsError(request.name)
+        if ground.refusal is not None:
+            raise ground.refusal
+        row = FenceRow(ground.number, request.name, request.birth.uid, request.birth.created, config)
+        fence = Fence(row, ground.limits.fence_history_bytes)
+        leg = FenceLeg(fence, created=True)
+        fence.area = self._area(config)
+        subjects = self._subjects(config)
+        fence.subjects = {subjects.hull.name: subjects}
+        try:
+            _lay(subjects, row.number, config, fence.area)
+        except BaseException:
+            self.fence_legs[row.number] = leg
+            self.undo_created()
+            del self.fence_legs[row.number]
+            raise
+        self.fence_legs[row.number] = leg
+        if config.initial == "snapshot":
+            leg.summed_up(EventType.SNAPSHOT, Cause.CREATED, request.time)
+        elif config.initial == "events":
+            leg.entered(subjects, request.time)
+        else:
+            leg.inside = Inside(0, tuple(members(fence)))
+        return fence
+
+    def _replace(self, request: ReplaceFence, fence: Fence) -> Fence:
+        leg, config = self._fence_leg(fence), request.config
+        if config == leg.row.config:
+            return fence
+        if (config.kind, config.subjects) != (leg.row.config.kind, leg.row.config.subjects):
+            raise InvalidFenceError("subjects", config.subjects, "the subjects of a fence stay the same")
+        area = self._area(config)
+        for subjects in fence.subjects.values():
+            _lay(subjects, fence.number, config, area)
+            self.applied = True
+        leg.row = replace(leg.row, config=config)
+        fence.area = area
+        try:
+            for subjects in fence.subjects.values():
+                self._cross([(subjects, subjects.index.take())], Cause.CHANGED, request.time)
+        except BaseException:
+            self._tear(())
+            raise
+        return fence
+
+    def _area(self, config: FenceConfig) -> Hull | None:
+        """The hull that is the area; raises HullNotFoundError."""
+        name = config.area_hull
+        return None if name is None else self._hull(name)
+
+    def _hull(self, name: str) -> Hull:
+        hull = self._by_name[name].after
+        if hull is None:
+            raise HullNotFoundError(name)
+        return hull
+
+    def _subjects(self, config: FenceConfig) -> Subjects:
+        hull = self._hull(config.subjects)
+        if hull.row.settings.identity == "multiset":
+            raise HullUnsuitableError(hull.name, "has points without keys", field="config.subject_hull")
+        for line in self.lines:
+            known = line.subjects.get(hull.name)
+            if known is not None:
+                return known
+        return Subjects(hull)
+
+    def _put_consumer(self, request: PutConsumer, leg: FenceLeg) -> Consumer:
+        fence = leg.fence
+        if request.uid and request.uid != fence.row.uid:
+            raise FenceReplacedError(fence.name, fence.row.uid)
+        known = leg.consumers.get(request.consumer)
+        if known is None and len(leg.consumers) >= self._ground.limits.max_fence_consumers:
+            raise LimitExceededError("max_fence_consumers", self._ground.limits.max_fence_consumers)
+        if request.sequence is not None and request.sequence > leg.last:
+            raise SequenceAheadError("sequence", request.sequence, leg.last)
+        acknowledged = leg.first - 1 if known is None else known.acknowledged
+        lost = 0 if known is None else known.lost
+        consumer = Consumer(request.consumer, max(acknowledged, request.sequence or 0), lost)
+        if consumer != known:
+            leg.acknowledge(consumer)
+        return consumer
+
+    def _drop_events(self, request: DropEvents, fence: Fence) -> None:
+        leg = self._fence_leg(fence)
+        if fence is not request.fence or request.first <= leg.first:
+            return
+        dropped = request.first - 1
+        for name, consumer in leg.consumers.items():
+            lost = dropped - max(consumer.acknowledged, leg.first - 1)
+            if lost > 0:
+                leg.acknowledge(Consumer(name, consumer.acknowledged, consumer.lost + lost))
+        leg.first = request.first
+
+
+def _lay(subjects: Subjects, number: int, config: FenceConfig, area: Hull | None) -> None:
+    vertices = None if area is None else area.state.vertices()
+    try:
+        lay(subjects.index, number, config, vertices)
+    except ValueError as error:
+        raise _invalid(config, str(error)) from None
+
+
+def _invalid(config: FenceConfig, message: str) -> InvalidFenceError:
+    """The error of an area that the library refuses."""
+    named = RING.match(message)
+    if named is None or not isinstance(config.area, PolygonArea):
+        return InvalidFenceError("area", "", message)
+    polygon, ring, problem = named.groups()
+    field = f"polygon_area.polygons[{polygon}]"
+    rings = config.area.polygons[int(polygon)]
+    if ring is None:
+        return InvalidFenceError(field, f"{len(rings)} rings", problem)
+    part = "exterior" if ring == "0" else f"holes[{int(ring) - 1}]"
+    return InvalidFenceError(f"{field}.{part}", f"{len(rings[int(ring)]) // POINT_BYTES} corners", problem)

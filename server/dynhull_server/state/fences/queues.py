@@ -1,0 +1,68 @@
+"""Which names share a queue, and in which order requests wait when queues are joined."""
+
+from collections.abc import Iterable, Sequence
+
+from ..events import Request
+from .fence import Fence
+from .requests import PREFIX
+
+
+def components(names: Sequence[str], fences: Iterable[Fence]) -> list[tuple[list[str], list[Fence]]]:
+    """Groups of names that fences join, each with these fences; a name that no fence concerns is alone.
+
+    Args:
+        names: names of hulls, and of the queues of fences.
+        fences: the fences; the hulls that they depend on are among the names.
+    """
+    first = {name: name for name in names}
+
+    def find(name: str) -> str:
+        while first[name] != name:
+            first[name] = name = first[first[name]]
+        return name
+
+    fences = list(fences)
+    for fence in fences:
+        key = find(PREFIX + fence.name)
+        for name in depends_on(fence):
+            first[find(name)] = key
+    groups: dict[str, tuple[list[str], list[Fence]]] = {}
+    for name in names:
+        groups.setdefault(find(name), ([], []))[0].append(name)
+    for fence in fences:
+        groups[find(PREFIX + fence.name)][1].append(fence)
+    return list(groups.values())
+
+
+def depends_on(fence: Fence) -> list[str]:
+    """The names of the hulls that a fence depends on."""
+    return [*fence.subjects, *([] if fence.area is None else [fence.area.name])]
+
+
+def merged(queues: Sequence[list[Request]]) -> list[Request]:
+    """The requests of some queues in one order that is that of each of them. O(requests * queues).
+
+    A request that waits in several of the queues comes once.
+    """
+    places: dict[int, int] = {}
+    for queue in queues:
+        for request in queue:
+            places[id(request)] = places.get(id(request), 0) + 1
+    at = [0] * len(queues)
+    ordered: list[Request] = []
+    while any(place < len(queue) for place, queue in zip(at, queues, strict=True)):
+        # Requests enter all of their queues in one step, so one of those in front is in front of all of its queues.
+        fronts: dict[int, list[int]] = {}
+        for number, queue in enumerate(queues):
+            while at[number] < len(queue) and places[id(queue[at[number]])] == 1:
+                ordered.append(queue[at[number]])
+                at[number] += 1
+            if at[number] < len(queue):
+                fronts.setdefault(id(queue[at[number]]), []).append(number)
+        for key, numbers in fronts.items():
+            if places[key] == len(numbers):
+                ordered.append(queues[numbers[0]][at[numbers[0]]])
+                for number in numbers:
+                    at[number] += 1
+                break
+    return ordered

@@ -1,0 +1,207 @@
+"""What the storage keeps of fences: their settings, events, consumers, and who is inside."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
+from typing import NamedTuple
+
+from ..records import NO_TIME, Keys
+from .config import FenceConfig
+
+Key = str | int
+Position = tuple[float, float]
+
+
+class EventType(IntEnum):
+    """What happened; the numbers are those of the contract, and stored."""
+
+    ENTER = 1
+    EXIT = 2
+    CROSS = 3
+    DWELL = 4
+    BEGIN = 5
+    CEASE = 6
+    SNAPSHOT = 7
+    CLOSED = 8
+
+
+class Cause(IntFlag):
+    """Why it happened: a set. The first five are those of `dynhull.Crossings`."""
+
+    MOVED = 1
+    AREA = 2
+    APPEARED = 4
+    REMOVED = 8
+    EXPIRED = 16
+    CREATED = 32
+    CHANGED = 64
+    TIME = 128
+
+
+class Members(NamedTuple):
+    """Some keys of one hull, ascending, and the revision of the hull."""
+
+    hull: str
+    keys: Keys
+    revision: int
+
+
+class FenceEvent(NamedTuple):
+    """One event.
+
+    Attributes:
+        sequence: counted per fence from 1.
+        type: what happened.
+        causes: why.
+        hull: the name of the subject's hull; empty where there is no subject.
+        key: the key of the subject, or None.
+        subject_revision, area_revision: the revisions of the two hulls; 0 where there is none.
+        position, previous: the position of the subject, and that at the revision before; None where it has none.
+        distance: the distance from the position to the area; None if the subject is gone.
+        event_time: the time of the position, NO_TIME if it has none.
+        time: when the event was made, in microseconds since 1970 by the server's clock.
+        first_time: when the subject changed its side, if the event waited for a confirmation; otherwise NO_TIME.
+        inside: the subjects that were inside, in a snapshot and at the end.
+    """
+
+    sequence: int
+    type: EventType
+    causes: int
+    hull: str
+    key: Key | None
+    subject_revision: int
+    area_revision: int
+    position: Position | None
+    previous: Position | None
+    distance: float | None
+    event_time: int
+    time: int
+    first_time: int = NO_TIME
+    inside: tuple[Members, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FenceRow:
+    """A fence as stored.
+
+    Attributes:
+        number: its number, never used for another fence or hull.
+        name: its name.
+        uid: distinguishes it from other fences of its name.
+        created: seconds since 1970.
+        config: its settings.
+    """
+
+    number: int
+    name: str
+    uid: str
+    created: float
+    config: FenceConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Consumer:
+    """A durable reader of a fence.
+
+    Attributes:
+        name: its name.
+        acknowledged: the last sequence it has acknowledged.
+        lost: the number of events that were dropped before it acknowledged them.
+    """
+
+    name: str
+    acknowledged: int = 0
+    lost: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Inside:
+    """The subjects that were inside after an event.
+
+    Attributes:
+        sequence: the sequence of that event.
+        members: the subjects, by hull.
+    """
+
+    sequence: int = 0
+    members: tuple[Members, ...] = ()
+
+
+@dataclass(slots=True)
+class KeptFence:
+    """A fence in the storage.
+
+    Attributes:
+        row: the fence.
+        inside: the subjects that were inside after an event.
+        events: the events after that one, all of them.
+        first: the sequence of the oldest event that is kept; that of the next event if there is none.
+        consumers: its consumers.
+    """
+
+    row: FenceRow
+    inside: Inside = field(default_factory=Inside)
+    events: list[FenceEvent] = field(default_factory=list)
+    first: int = 1
+    consumers: dict[str, Consumer] = field(default_factory=dict)
+
+    @property
+    def last(self) -> int:
+        """The sequence of the last event, 0 before the first."""
+        return self.events[-1].sequence if self.events else self.inside.sequence
+
+
+# Changes of fences, committed like those of hulls.
+
+
+@dataclass(frozen=True, slots=True)
+class AddFence:
+    """A new fence, and who is inside of it."""
+
+    row: FenceRow
+    inside: Inside
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeFence:
+    """New settings of a fence."""
+
+    row: FenceRow
+
+
+@dataclass(frozen=True, slots=True)
+class DropFence:
+    """The deletion of a fence with its events and consumers."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class AppendEvents:
+    """Events of consecutive sequences."""
+
+    number: int
+    events: list[FenceEvent]
+
+
+@dataclass(frozen=True, slots=True)
+class DropEvents:
+    """The deletion of the events before the sequence `first`; perhaps some of them stay."""
+
+    number: int
+    first: int
+
+
+@dataclass(frozen=True, slots=True)
+class PutConsumer:
+    """A consumer, new or changed."""
+
+    number: int
+    consumer: Consumer
+
+
+@dataclass(frozen=True, slots=True)
+class DropConsumer:
+    """The deletion of a consumer."""
+
+    number: int
+    name: str

@@ -1,0 +1,71 @@
+"""Fences as the storage has them, after a start or a failed commit.
+
+With a margin the side of a subject depends on its way, so it is never recomputed from positions: it is what was stored,
+and the events since.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from dynhull import FenceIndex
+from dynhull.keys import key_list
+
+from ..hull_state import HullState
+from .records import EventType, KeptFence, Key
+from .subjects import Subjects, keyed, lay
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """Fences as the storage has them.
+
+    Attributes:
+        kept: the fences by number.
+        indexes: the index of each hull with subjects, by name.
+    """
+
+    kept: Mapping[int, KeptFence]
+    indexes: dict[str, FenceIndex]
+
+
+def restore(subjects: Iterable[Subjects], states: Mapping[str, HullState], kept: Mapping[int, KeptFence]) -> Restored:
+    """Indexes with the subjects inside that the storage has.
+
+    Args:
+        subjects: the hulls whose subjects are restored.
+        states: the states of hulls by name, where they are not the hulls' own.
+        kept: all fences of these hulls, by number.
+
+    Raises:
+        RuntimeError: who is inside, as stored, contradicts the positions.
+    """
+    inside = {number: members_after(each) for number, each in kept.items()}
+    indexes = {}
+    for each in subjects:
+        state = states.get(each.hull.name)
+        if state is None:  # the hull itself stays
+            each.index.detach()
+            state = each.hull.state
+        index = indexes[each.hull.name] = FenceIndex(keyed(state))
+        for number, fence in each.fences.items():
+            config = kept[number].row.config
+            vertices = None
+            if fence.area is not None:
+                vertices = states.get(fence.area.name, fence.area.state).vertices()
+            lay(index, number, config, vertices, each.keys(inside[number].get(each.hull.name, ())))
+        if len(index.take()):
+            raise RuntimeError(f"the subjects inside, as stored, contradict the keys of the hull {each.hull.name!r}")
+    return Restored(kept, indexes)
+
+
+def members_after(kept: KeptFence) -> dict[str, set[Key]]:
+    """The subjects that are inside after the last event, by hull. O(those stored + events)."""
+    inside: dict[str, set[Key]] = {each.hull: set(key_list(each.keys)) for each in kept.inside.members}
+    for event in kept.events:
+        if event.type is EventType.SNAPSHOT:
+            inside = {each.hull: set(key_list(each.keys)) for each in event.inside}
+        elif event.key is not None and event.type is EventType.ENTER:
+            inside.setdefault(event.hull, set()).add(event.key)
+        elif event.key is not None and event.type is EventType.EXIT:
+            inside[event.hull].remove(event.key)
+    return inside

@@ -1,0 +1,395 @@
+"""The rows of fences: which there are, and how changes of fences become statements."""
+
+from array import array
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Self
+
+from ...state.changes import FenceChange
+from ...state.fences.records import (
+    AddFence,
+    AppendEvents,
+    ChangeFence,
+    Consumer,
+    DropConsumer,
+    DropEvents,
+    DropFence,
+    FenceRow,
+    Inside,
+    Members,
+    PutConsumer,
+)
+from ..port import NotCommittedError
+from .encoding import checksum, weight
+from .event_rows import encode_events, encode_inside
+from .fence_rows import consumer_values, values
+from .schema import INSERT_CONSUMER, INSERT_EVENTS, INSERT_FENCE, INSERT_INSIDE
+
+if TYPE_CHECKING:
+    from .ledger import Ledger
+
+Statement = tuple[str, tuple[Any, ...]]
+# Keys in a row of those who are inside: about half a megabyte, a commit that delays later ones only briefly.
+KEYS_A_ROW = 16_384
+
+
+@dataclass(slots=True)
+class InsideRows:
+    """Who was inside after an event, in `parts` rows. It is complete once it has all of them.
+
+    Attributes:
+        sequence: the sequence of the event.
+        parts: the number of rows.
+        places: the row numbers by part.
+        sum: the sum of their weights.
+    """
+
+    sequence: int
+    parts: int
+    places: dict[int, int] = field(default_factory=dict)
+    sum: int = 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether all parts are there."""
+        return len(self.places) == self.parts
+
+
+@dataclass(slots=True)
+class FenceRows:
+    """The rows of one fence.
+
+    Attributes:
+        row: the row of the fence itself.
+        weight: its weight.
+        sum: the sum of the weights of all rows of the fence.
+        count: the number of all rows of the fence.
+        firsts: the first sequence in each row of events, ascending.
+        places, weights: the numbers and the weights of these rows.
+        last: the newest sequence.
+        insides: who was inside, by sequence.
+        consumers: each consumer with its row number and weight.
+    """
+
+    row: FenceRow
+    weight: int
+    sum: int
+    count: int = 1
+    firsts: "array[int]" = field(default_factory=lambda: array("q"))
+    places: "array[int]" = field(default_factory=lambda: array("q"))
+    weights: "array[int]" = field(default_factory=lambda: array("q"))
+    last: int = 0
+    insides: dict[int, InsideRows] = field(default_factory=dict)
+    consumers: dict[str, tuple[Consumer, int, int]] = field(default_factory=dict)
+
+    @property
+    def first(self) -> int:
+        """The sequence of the oldest event; that of the next one if there is none."""
+        return self.firsts[0] if self.firsts else self.last + 1
+
+    @property
+    def base(self) -> int:
+        """The newest sequence at which it is known who was inside; 0, when nobody was, if no row says so."""
+        return max((each.sequence for each in self.insides.values() if each.complete), default=0)
+
+    def boundary(self, first: int) -> int:
+        """The sequence at which a row begins that is nearest before `first`, such that the rows before it may go."""
+        limit = min(first, self.base + 1)
+        if limit > self.last:
+            return self.last + 1
+        row = bisect_right(self.firsts, limit) - 1
+        return self.firsts[row] if row >= 0 else self.first
+
+    def since(self, sequence: int) -> Self:
+        """A copy that has, of the rows of events, only those with events after a sequence."""
+        start = max(bisect_right(self.firsts, sequence + 1) - 1, 0)
+        insides = {key: replace(each, places=dict(each.places)) for key, each in self.insides.items()}
+        return replace(
+            self,
+            firsts=self.firsts[start:],
+            places=self.places[start:],
+            weights=array("q"),
+            insides=insides,
+            consumers=dict(self.consumers),
+        )
+
+    def append(self, first: int, last: int, place: int, each: int) -> None:
+        """Add a row of events."""
+        self.firsts.append(first)
+        self.places.append(place)
+        self.weights.append(each)
+        self.last = last
+        self._plus(1, each)
+
+    def drop(self, rows: int) -> None:
+        """Remove the oldest rows of events."""
+        self._plus(-rows, -sum(self.weights[:rows]))
+        del self.firsts[:rows], self.places[:rows], self.weights[:rows]
+
+    def put_inside(self, sequence: int, parts: int, part: int, place: int, each: int) -> None:
+        """Add a row of those who are inside."""
+        rows = self.insides.setdefault(sequence, InsideRows(sequence, parts))
+        rows.places[part] = place
+        rows.sum += each
+        self._plus(1, each)
+
+    def drop_inside(self, sequence: int) -> None:
+        """Remove who was inside after an event."""
+        rows = self.insides.pop(sequence)
+        self._plus(-len(rows.places), -rows.sum)
+
+    def put_consumer(self, consumer: Consumer, place: int, each: int) -> None:
+        """Add or change a consumer."""
+        self.drop_consumer(consumer.name)
+        self.consumers[consumer.name] = consumer, place, each
+        self._plus(1, each)
+
+    def drop_consumer(self, name: str) -> None:
+        """Remove a consumer, if there is one of that name."""
+        known = self.consumers.pop(name, None)
+        if known is not None:
+            self._plus(-1, -known[2])
+
+    def change(self, row: FenceRow, each: int) -> None:
+        """Change the row of the fence itself."""
+        self._plus(0, each - self.weight)
+        self.row, self.weight = row, each
+
+    def _plus(self, rows: int, weights: int) -> None:
+        self.count += rows
+        self.sum += weights
+
+
+@dataclass(frozen=True, slots=True)
+class PutInside:
+    """Step: a part of those who are inside of a fence."""
+
+    number: int
+    sequence: int
+    parts: int
+    part: int
+    place: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class DropInside:
+    """Step: deletes who was inside of a fence after an event."""
+
+    number: int
+    sequence: int
+
+
+FenceStep = PutInside | DropInside
+
+
+@dataclass(slots=True)
+class _Now:
+    """A fence after a part of the changes; `rows` is its present state in the ledger.
+
+    Attributes:
+        rows: its present state in the ledger.
+        count, sum: the number of all its rows, and the sum of their weights.
+        last: the newest sequence.
+        dropped: the number of its oldest rows of events that are deleted.
+        consumers: the row number and weight of each changed consumer, None for a deleted one.
+        deleted: whether it is deleted.
+    """
+
+    rows: FenceRows
+    count: int
+    sum: int
+    last: int
+    dropped: int = 0
+    consumers: dict[str, tuple[int, int] | None] = field(default_factory=dict)
+    deleted: bool = False
+
+    def consumer(self, name: str) -> tuple[int, int] | None:
+        """The row number and weight of a consumer, None if there is none."""
+        if name in self.consumers:
+            return self.consumers[name]
+        known = self.rows.consumers.get(name)
+        return None if known is None else known[1:]
+
+
+class FenceChanges:
+    """The part of a group of changes that concerns fences.
+
+    Args:
+        ledger: the rows as of the last commit; it does not change before the effects.
+        statements: receives the SQL statements.
+        effects: receives the updates of the ledger.
+
+    Attributes:
+        rows, sum: what the changes add to the number of rows and to the sum of their weights.
+        next_number: a number greater than those of new fences.
+    """
+
+    def __init__(self, ledger: "Ledger", statements: list[Statement], effects: list[Callable[[], object]]) -> None:
+        self._ledger = ledger
+        self._statements = statements
+        self._effects = effects
+        self._now: dict[int, _Now] = {}
+        self.rows = self.sum = self.next_number = 0
+
+    def take(self, change: FenceChange | FenceStep) -> None:
+        """Add a change."""
+        if isinstance(change, AddFence):
+            self._add(change)
+            return
+        number = change.row.number if isinstance(change, ChangeFence) else change.number
+        now = self._fence(number)
+        if now is not None:
+            self._carry_out(change, now)
+        elif not isinstance(change, PutInside | DropInside):  # those may come after the deletion
+            raise NotCommittedError(f"there is no fence {number}")
+
+    def _fence(self, number: int) -> _Now | None:
+        """A fence after the changes so far, None if it does not exist."""
+        now = self._now.get(number)
+        if now is None and (rows := self._ledger.fences.get(number)):
+            now = self._now[number] = _Now(rows, rows.count, rows.sum, rows.last)
+        return None if now is None or now.deleted else now
+
+    def _plus(self, now: _Now, rows: int, weights: int) -> None:
+        now.count += rows
+        now.sum += weights
+        self.rows += rows
+        self.sum += weights
+
+    def _add(self, change: AddFence) -> None:
+        row = change.row
+        if self._fence(row.number):
+            raise NotCommittedError(f"fence {row.number} already exists")
+        *columns, stored = values(row)
+        each = weight(stored, row.number)
+        rows = FenceRows(row, each, each, last=change.inside.sequence)
+        now = self._now[row.number] = _Now(rows, 0, 0, rows.last)
+        self._plus(now, 1, each)
+        self.next_number = max(self.next_number, row.number + 1)
+        self._statements.append((INSERT_FENCE, (*columns, stored)))
+        self._effects.append(lambda: self._ledger.fences.__setitem__(row.number, rows))
+        for step in inside_steps(row.number, change.inside, lambda: next(self._ledger.inside_ids)):
+            self._put_inside(step, now)
+
+    def _carry_out(self, change: FenceChange | FenceStep, now: _Now) -> None:
+        match change:
+            case AppendEvents():
+                self._append(change, now)
+            case ChangeFence():
+                self._change(change.row, now)
+            case DropFence():
+                self._drop_fence(change.number, now)
+            case DropEvents():
+                self._drop_events(change.first, now)
+            case PutConsumer():
+                self._put_consumer(change.consumer, change.number, now)
+            case DropConsumer():
+                self._drop_consumer(change.name, now)
+                now.consumers[change.name] = None
+                self._effects.append(lambda: now.rows.drop_consumer(change.name))
+            case PutInside():
+                self._put_inside(change, now)
+            case DropInside():
+                self._drop_inside(change.sequence, now)
+
+    def _append(self, change: AppendEvents, now: _Now) -> None:
+        first, last = change.events[0].sequence, change.events[-1].sequence
+        if first != now.last + 1 or last - first + 1 != len(change.events):
+            raise NotCommittedError(
+                f"events {first} to {last} of fence {now.rows.row.name} do not follow event {now.last}"
+            )
+        payload = encode_events(change.events, now.rows.row.config.subjects)
+        keys = change.number, first, last
+        stored = checksum(payload, *keys)
+        each, place = weight(stored, *keys), next(self._ledger.event_ids)
+        now.last = last
+        self._plus(now, 1, each)
+        self._statements.append((INSERT_EVENTS, (place, *keys, stored, payload)))
+        self._effects.append(lambda: now.rows.append(first, last, place, each))
+
+    def _change(self, row: FenceRow, now: _Now) -> None:
+        *columns, stored = values(row)
+        each = weight(stored, row.number)
+        self._statements.append(("DELETE FROM fences WHERE id = ?", (row.number,)))
+        self._statements.append((INSERT_FENCE, (*columns, stored)))
+        self._plus(now, 0, each - now.rows.weight)
+        self._effects.append(lambda: now.rows.change(row, each))
+
+    def _drop_fence(self, number: int, now: _Now) -> None:
+        """Delete the row of the fence. `sweep` drops the rest."""
+        now.deleted = True
+        self._plus(now, -now.count, -now.sum)
+        self._statements.append(("DELETE FROM fences WHERE id = ?", (number,)))
+
+        def bury() -> None:
+            gone, dead = self._ledger.fences.pop(number), self._ledger.dead
+            dead["events"] += gone.places
+            dead["insides"].extend(place for each in gone.insides.values() for place in each.places.values())
+            dead["consumers"].extend(place for _, place, _ in gone.consumers.values())
+
+        self._effects.append(bury)
+
+    def _drop_events(self, first: int, now: _Now) -> None:
+        rows = now.rows
+        limit = min(first, rows.base + 1)
+        count = len(rows.firsts) if limit > rows.last else bisect_right(rows.firsts, limit) - 1
+        places, weights = rows.places[now.dropped : count], rows.weights[now.dropped : count]
+        if not places:
+            return
+        now.dropped = count
+        self._plus(now, -len(places), -sum(weights))
+        self._delete_rows("events", places)
+        self._effects.append(lambda: rows.drop(len(places)))
+
+    def _put_consumer(self, consumer: Consumer, number: int, now: _Now) -> None:
+        self._drop_consumer(consumer.name, now)
+        *columns, stored = consumer_values(number, consumer)
+        place, each = next(self._ledger.consumer_ids), weight(stored, number)
+        now.consumers[consumer.name] = place, each
+        self._plus(now, 1, each)
+        self._statements.append((INSERT_CONSUMER, (place, *columns, stored)))
+        self._effects.append(lambda: now.rows.put_consumer(consumer, place, each))
+
+    def _drop_consumer(self, name: str, now: _Now) -> None:
+        known = now.consumer(name)
+        if known is not None:
+            place, each = known
+            self._plus(now, -1, -each)
+            self._delete_rows("consumers", [place])
+
+    def _put_inside(self, step: PutInside, now: _Now) -> None:
+        keys = step.number, step.sequence, step.part, step.parts
+        stored = checksum(step.payload, *keys)
+        each = weight(stored, *keys)
+        self._plus(now, 1, each)
+        self._statements.append((INSERT_INSIDE, (step.place, *keys, stored, step.payload)))
+        self._effects.append(lambda: now.rows.put_inside(step.sequence, step.parts, step.part, step.place, each))
+
+    def _drop_inside(self, sequence: int, now: _Now) -> None:
+        known = now.rows.insides.get(sequence)
+        if known is not None:
+            self._plus(now, -len(known.places), -known.sum)
+            self._delete_rows("insides", known.places.values())
+            self._effects.append(lambda: now.rows.drop_inside(sequence))
+
+    def _delete_rows(self, table: str, places: Iterable[int]) -> None:
+        sql = f"DELETE FROM {table} WHERE rowid = ?"  # noqa: S608  (ours)
+        self._statements += [(sql, (place,)) for place in places]
+
+
+def inside_steps(number: int, inside: Inside, place: Callable[[], int]) -> list[PutInside]:
+    """The rows of those who are inside; none where nobody is, before the first event."""
+    if not inside.members and not inside.sequence:
+        return []
+    pieces = [
+        Members(each.hull, each.keys[start : start + KEYS_A_ROW], each.revision)
+        for each in inside.members
+        for start in range(0, len(each.keys), KEYS_A_ROW)
+    ]
+    rows = [[piece] for piece in pieces] or [[]]
+    return [
+        PutInside(number, inside.sequence, len(rows), part, place(), encode_inside(row))
+        for part, row in enumerate(rows)
+    ]
