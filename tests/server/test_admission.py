@@ -5,7 +5,6 @@ import json
 import re
 import socket
 import ssl
-import subprocess
 import sys
 import threading
 import urllib.error
@@ -23,7 +22,7 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from refusal import refusal
-from server_process import Server, server_process
+from server_process import Server, finished, server_process
 
 from dynhull_client import HullClient
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -108,7 +107,7 @@ def test_messages_of_strangers_take_no_memory(flooded: Server, method: str, toke
 
     before = memory("VmRSS")
     command = [sys.executable, FLOOD, flooded.address, token, method, str(CALLS), str(BYTES)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    ended = finished(command)
     refused = "RESOURCE_EXHAUSTED" if "health" in method else "UNAUTHENTICATED"
     assert json.loads(ended.stdout) == {refused: CALLS}
     assert memory("VmHWM") - before < MOST_BYTES

@@ -131,10 +131,15 @@ def test_a_real_prometheus_scrapes_it(tmp_path: Path) -> None:
                     log += prometheus.stderr.readline()
                     listening = re.search(r'msg="Listening on" address=(\S+)', log)
                 api = listening[1]
-                found = {}
-                while found.get("dynhull_points") != 5:
+                found: dict[str, float] = {}
+
+                def has_scraped() -> bool:
                     answer = json.loads(fetch(f"http://{api}/api/v1/query?query=%7Bjob%3D%22dynhull%22%7D"))
-                    found = {each["metric"]["__name__"]: float(each["value"][1]) for each in answer["data"]["result"]}
+                    for each in answer["data"]["result"]:
+                        found[each["metric"]["__name__"]] = float(each["value"][1])
+                    return found.get("dynhull_points") == 5
+
+                wait_until(has_scraped)
                 assert found["up"] == 1
                 assert found["dynhull_hulls"] == 1
             finally:

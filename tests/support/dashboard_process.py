@@ -4,12 +4,14 @@ import subprocess
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from urllib.parse import urlencode
 
 from forked import COMMAND, Process
 from patience import PATIENCE
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, BrowserContext, Page
 
+DESKTOP = {"viewport": {"width": 1440, "height": 900}}
 PATIENCE_OF_BROWSER = 30_000  # milliseconds
 LOUD = "warning", "error"
 VERTICES = """name => {
@@ -38,20 +40,26 @@ def dashboard_process(address: str, *options: str) -> Iterator[str]:
             assert "Failed sending message" not in errors.read()  # pages may close at any time
 
 
+@cache
+def desktop(browser: Browser) -> BrowserContext:
+    """Pages share this one, so that the browser compiles the page's scripts once."""
+    return browser.new_context(**DESKTOP)
+
+
 @contextmanager
 def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[Page]:
     """The page with these hulls. It must not raise an error, nor log a warning to the browser's console."""
     failures: list[object] = []
-    context = browser.new_context(**{"viewport": {"width": 1440, "height": 900}, **look})
-    context.set_default_timeout(PATIENCE_OF_BROWSER)
+    context = browser.new_context(**{**DESKTOP, **look}) if look else desktop(browser)
     page = context.new_page()
+    page.set_default_timeout(PATIENCE_OF_BROWSER)
     page.on("pageerror", lambda error: failures.append(error))
     page.on("console", lambda message: failures.append(message.text) if message.type in LOUD else None)
     page.goto(f"{url}?{urlencode([('hull', hull) for hull in hulls])}")
     try:
         yield page
     finally:
-        context.close()
+        (context if look else page).close()
     assert failures == []
 
 

@@ -1,4 +1,4 @@
-"""`dynhull` commands, each in a process of its own that starts fast.
+"""`dynhull` commands and programs that use dynhull, each in a process of its own that starts fast.
 
 Importing what a server needs takes a second of processor time; forking a process that has imported it takes a few
 milliseconds. On Linux the commands of the tests are forked from this file, which runs as a process for each worker.
@@ -11,6 +11,7 @@ import importlib
 import inspect
 import json
 import os
+import runpy
 import socket
 import subprocess
 import sys
@@ -33,17 +34,19 @@ REQUEST_BYTES = 2**18
 
 
 class Process(subprocess.Popen[str]):
-    """`subprocess.Popen`, but the process is forked if it runs `COMMAND` in the environment of this one."""
+    """`subprocess.Popen`, but a process that runs `COMMAND` or a Python file, in our environment, is forked."""
 
     def _execute_child(self, *arguments: object) -> None:
         call = inspect.signature(super()._execute_child).bind(*arguments).arguments
         ours = [call[each] for each in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
-        if sys.platform != "linux" or call["args"][0] != COMMAND or call["env"] is not None:
+        command = list(map(str, call["args"]))
+        is_ours = command[0] == COMMAND or (command[0] == sys.executable and command[1].endswith(".py"))
+        if sys.platform != "linux" or not is_ours or call["env"] is not None:
             super()._execute_child(*arguments)
             return
         files = [number if given == -1 else given for number, given in enumerate((ours[0], ours[3], ours[5]))]
         try:
-            self.pid = _fork(list(map(str, call["args"])), str(call["cwd"] or Path.cwd()), files)
+            self.pid = _fork(command, str(call["cwd"] or Path.cwd()), files)
         finally:
             self._close_pipe_fds(*ours)
         self._child_created = True
@@ -88,7 +91,7 @@ def _wait_to_be(connection: socket.socket) -> None:
         if not request:
             sys.exit()
         command, folder, environment = json.loads(request)
-        _import_for(command[1:2])
+        _import_for(command)
         reads, writes = os.pipe()
         if (middle := os.fork()) == 0:
             if (process := os.fork()) != 0:
@@ -106,9 +109,10 @@ def _wait_to_be(connection: socket.socket) -> None:
             os.close(each)
 
 
-def _import_for(names: list[str]) -> None:
+def _import_for(command: list[str]) -> None:
+    importlib.import_module("dynhull_client" if command[0] == sys.executable else "dynhull_cli.commands")
     for entry in entry_points(group="dynhull.commands"):
-        if entry.name in names:
+        if entry.name in command:
             for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
                 importlib.import_module(module)
     gc.freeze()  # a collection would write to, and so copy, all of the memory that the processes share
@@ -122,7 +126,8 @@ def _become(command: list[str], folder: str, environment: dict[str, str], files:
     os.environ.clear()
     os.environ.update(environment)
     time.tzset()
-    sys.argv = command
+    sys.argv = command[command[0] == sys.executable :]
+    sys.path[0] = str(Path(sys.argv[0]).parent)
     sys.stdin, sys.stdout, sys.stderr = (
         open(number, mode, buffering, encoding=old.encoding, errors=old.errors, closefd=False)  # noqa: SIM115
         for number, mode, buffering, old in ((0, "r", -1, sys.stdin), (1, "w", -1, sys.stdout), (2, "w", 1, sys.stderr))
@@ -139,15 +144,13 @@ def _leave(code: int) -> NoReturn:
 
 
 if __name__ == "__main__":
-    from dynhull_cli.main import main
-
     # OpenBLAS, which numpy starts, ends its threads before a fork.
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
-    sys.path[0] = str(Path(COMMAND).parent)
     _wait_to_be(socket.socket(fileno=int(sys.argv[1])))
     try:
-        main()
+        runpy.run_path(sys.argv[0], run_name="__main__")
     except SystemExit as end:
-        if isinstance(end.code, int):
-            _leave(end.code)
-        raise
+        if not isinstance(end.code, int):
+            raise
+        _leave(end.code)
+    _leave(0)

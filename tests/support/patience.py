@@ -4,10 +4,13 @@ import time
 from collections.abc import Callable
 
 PATIENCE = 60  # seconds
+LONGEST_PAUSE = 0.05  # seconds: conditions may be calls, and take processor time from what they wait for
 
 
 def wait_until(condition: Callable[[], object]) -> None:
     end = time.monotonic() + PATIENCE
+    pause = 0.001
     while not condition():
         assert time.monotonic() < end, f"not within {PATIENCE} s"
-        time.sleep(0.001)
+        time.sleep(pause)
+        pause = min(1.5 * pause, LONGEST_PAUSE)

@@ -58,7 +58,11 @@ def server_process(
 
 def run(*arguments: object, given: str = "") -> subprocess.CompletedProcess[str]:
     """The `dynhull` command, to its end, with `given` as its standard input."""
-    command = [COMMAND, *map(str, arguments)]
+    return finished([COMMAND, *map(str, arguments)], given)
+
+
+def finished(command: Sequence[str], given: str = "") -> subprocess.CompletedProcess[str]:
+    """Run any command to its end."""
     with Process(command, stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True) as process:
         output, errors = process.communicate(given, timeout=PATIENCE)
     return subprocess.CompletedProcess(command, process.returncode, output, errors)
