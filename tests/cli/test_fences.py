@@ -1,10 +1,14 @@
 """`dynhull fences` as users run it."""
 
+import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from command_line import dynhull
+from fence_server import fence_server
 
+GEOJSON = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 3], [0, 0]]]}}
 TRIANGLE = "POLYGON ((0 0, 4 0, 4 3, 0 0))"
 
 
@@ -54,3 +58,65 @@ def test_bad_files_are_named(text: str, complaint: str, tmp_path: Path, monkeypa
 def test_ack_needs_a_name() -> None:
     done = dynhull("fences", "watch", "zone", "--ack", "--address", "127.0.0.1:1")
     assert (done.exit_code, done.stderr) == (2, "error: --ack needs --consumer: who acknowledges?\n")
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with fence_server() as server:
+        yield server.address
+
+
+def ran(*arguments: object) -> list[str]:
+    """The lines that `dynhull fences` prints; it must succeed."""
+    done = dynhull("fences", *arguments)
+    assert done.exit_code == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def move(name: str, key: str, x: float, y: float) -> None:
+    assert dynhull("put", name, key, x, y).exit_code == 0
+
+
+@pytest.mark.usefixtures("served")
+def test_the_life_of_a_fence(name: str, tmp_path: Path) -> None:
+    assert dynhull("create", name, "--keyed", "str").exit_code == 0
+    move(name, "truck", 3, 1)
+    create = ("create", name, "--polygon", TRIANGLE, "--subjects", name)
+    assert ran(*create) == [f"{name}: created, 1 inside"]
+    assert dynhull("fences", *create).exit_code == 1
+    assert ran(*create, "--exist-ok") == [f"{name}: exists, 1 inside"]
+    move(name, "truck", 9, 9)
+
+    assert ran("list", name) == [f"{name}\tpolygon, 3 corners\t{name}\t0\t2\t0"]
+    (listed,) = ran("list", name, "--json")
+    (shown,) = ran("show", name, "--json")
+    assert json.loads(listed) == json.loads(shown)
+    assert json.loads(shown)["area"]["coordinates"] == [[[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 0.0]]]
+
+    lines = [json.loads(line) for line in ran("watch", name, "--after", 0, "--events", 2, "--json")]
+    assert [(line["type"], line["sequence"]) for line in lines] == [("snapshot", 1), ("exit", 2)]
+    assert lines[0]["inside"] == [{"hull": name, "keys": ["truck"], "revision": 1}]
+    assert (lines[1]["key"], lines[1]["position"], lines[1]["cause"]) == ("truck", [9.0, 9.0], ["subject_moved"])
+
+    watch = ("watch", name, "--consumer", "alarm", "--events", 1, "--ack")
+    assert ran(*watch)[0].split("\t")[2:5] == ["snapshot", "", "1 key"]
+    assert ran(*watch)[0].split("\t")[2:] == ["exit", name, "truck", "9.0", "9.0", "subject_moved"]
+    assert ran("ack", name, "other", 1) == ["other: acknowledged 1, 1 event to come"]
+    assert "consumer\talarm: acknowledged 2, 0 events to come" in ran("show", name)
+
+    move(name, "truck", 3, 1)
+    assert ran("inside", name) == [f"{name}\ttruck"]
+    file = tmp_path / "zone.geojson"
+    file.write_text(json.dumps(GEOJSON))
+    assert ran("replace", name, "--polygon", file, "--subjects", name) == [f"{name}: replaced, 1 inside"]
+    assert ran("replace", name, "--circle", 0, 0, 1, "--subjects", name) == [f"{name}: replaced, 0 inside"]
+    (inside,) = ran("inside", name, "--json")
+    assert json.loads(inside) == {"sequence": 4, "subjects": []}
+
+    unsure = dynhull("fences", "delete", name)
+    assert (unsure.exit_code, "add --yes to delete" in unsure.stderr) == (2, True)
+    assert ran("delete", name, "--yes") == [f"{name}: deleted"]
+    assert ran("delete", name, "--yes", "--missing-ok") == []
+    missing = dynhull("fences", "show", name)
+    assert missing.exit_code == 1
+    assert "`dynhull fences list` shows the fences of the server" in missing.stderr

@@ -1,11 +1,8 @@
 """Areas of fences in the forms that people have them in; what is wrong with one is named, and nothing is sent."""
 
-import json
-
 import numpy as np
 import pytest
-from geopandas import GeoSeries
-from shapely.geometry import MultiPolygon, Point, box
+from shapely.geometry import Point
 from shapely.geometry import Polygon as Shape
 
 from dynhull_client import Circle, HullClient, Polygon, Prefix
@@ -101,30 +98,3 @@ def test_circles_and_prefixes_are_values() -> None:
         Circle(0, 0, -1)
     with pytest.raises(ValueError, match="the circle's y is inf: coordinates must"):
         Circle(0, float("inf"), 1)
-
-
-AREAS = {
-    "corners": (SQUARE, [Polygon(SQUARE)]),
-    "an array": (np.array(SQUARE), [Polygon(SQUARE)]),
-    "a polygon": (Polygon(SQUARE, [HOLE]), [Polygon(SQUARE, [HOLE])]),
-    "several": ([SQUARE, Polygon(HOLE)], [Polygon(SQUARE), Polygon(HOLE)]),
-    "shapely": (HOLED, [Polygon(SQUARE, [HOLE])]),
-    "shapely, several": (
-        MultiPolygon([HOLED, box(5, 5, 6, 6)]),
-        [Polygon(SQUARE, [HOLE]), Polygon([[6, 5], [6, 6], [5, 6], [5, 5]])],
-    ),
-    "geopandas": (GeoSeries([HOLED]), [Polygon(SQUARE, [HOLE])]),
-    "GeoJSON": (json.loads(json.dumps(HOLED.__geo_interface__)), [Polygon(SQUARE, [HOLE])]),
-    "GeoJSON with heights": (
-        {"type": "Polygon", "coordinates": [[[*corner, 7.0] for corner in SQUARE]]},
-        [Polygon(SQUARE)],
-    ),
-}
-
-
-@pytest.mark.parametrize("form", AREAS)
-def test_polygons_come_in_many_forms(form: str) -> None:
-    from dynhull_client._areas import as_area
-
-    given, polygons = AREAS[form]
-    assert as_area(given) == tuple(polygons)

@@ -79,6 +79,7 @@ EXPORTED = [
     "RevisionForgottenError",
     "Sampled",
     "Separation",
+    "SequenceAheadError",
     "SequenceGapError",
     "Sketch",
     "Snapshot",

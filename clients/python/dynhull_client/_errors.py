@@ -107,6 +107,15 @@ class FenceReplacedError(DynhullError, LookupError):
     """The fence was deleted, and another one has its name now: sequences begin again at 1."""
 
 
+class SequenceAheadError(DynhullError, ValueError):
+    """A sequence is after the last event of the fence, `last`."""
+
+    @property
+    def last(self) -> int | None:
+        """The sequence of the last event."""
+        return _number(self.metadata.get("last"))
+
+
 class ConsumerNotFoundError(DynhullError, LookupError):
     """The fence has no consumer of that name."""
 
@@ -166,6 +175,7 @@ BY_REASON: Mapping[str, type[DynhullError]] = {
     "PERMISSION_DENIED": PermissionDeniedError,
     "POINT_MISSING": PointMissingError,
     "REVISION_FORGOTTEN": RevisionForgottenError,
+    "SEQUENCE_AHEAD": SequenceAheadError,
     "SEQUENCE_GAP": SequenceGapError,
     "STARTING": UnavailableError,
     "STORAGE_FAILED": UnavailableError,

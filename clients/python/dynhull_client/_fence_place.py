@@ -21,6 +21,7 @@ class FencePlace(Place[FenceEvent]):
         self.request = pb.WatchFenceRequest()
         self.request.CopyFrom(watching.request)
         self._reports_progress = watching.request.HasField("progress_interval")
+        self._conflated = 0  # events that were left out since the last one
         self._closed = False
 
     def take(self, message: pb.WatchFenceResponse) -> Sequence[FenceEvent]:
@@ -33,9 +34,12 @@ class FencePlace(Place[FenceEvent]):
         if message.HasField("lost"):
             first, last = message.lost.first_sequence, message.lost.last_sequence
             events.append(FenceEvent("lost", last, name, uid, first=first, last=last))
+        self._conflated += message.conflated
         for i, event in enumerate(message.events, start=1):
-            conflated = message.conflated if i == len(message.events) else 0
+            conflated = self._conflated if i == len(message.events) else 0
             events.append(decode_fence_event(event, name, uid, conflated))
+        if message.events:
+            self._conflated = 0
         self.request.after_sequence = message.sequence
         self._closed = any(event.type == "closed" for event in events)
         if not events and self._reports_progress:
