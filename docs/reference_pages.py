@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 import grpc_tools
 import mkdocs_gen_files
@@ -25,18 +26,23 @@ def commands() -> Iterator[str]:
     from typer.testing import CliRunner
 
     from dynhull_cli.commands import app
-    from dynhull_cli.groups import Group
 
     yield "# Commands\n"
     names = [""]
     for entry in sorted(entry_points(group="dynhull.commands")):
-        command = entry.load()
-        parts = command.commands if isinstance(command, Group) else ()
-        names += [entry.name, *(f"{entry.name} {part}" for part in parts)]
+        names += named(entry.name, entry.load())
     for name in names:
         title = f"dynhull {name}".strip()
         help_text = CliRunner().invoke(app, [*name.split(), "--help"], prog_name="dynhull").output
         yield f"## {title}\n\n```text\n{help_text.strip()}\n```\n"
+
+
+def named(name: str, command: Any) -> Iterator[str]:
+    """The name of a command, then those of the commands of a group, and of the commands beside it."""
+    yield name
+    for parts in (getattr(command, "commands", {}), getattr(command, "beside", {})):
+        for part, inner in parts.items():
+            yield from named(f"{name} {part}", inner)
 
 
 def described() -> FileDescriptorSet:

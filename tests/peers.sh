@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What the tests talk to and pip cannot install: a real Prometheus and browser, systemd's checks, a clock that can be
-# set back, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
+# set back, message brokers, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
 # that need what is missing are skipped, and say so.
 set -uo pipefail
 cd "$(dirname "$0")"
@@ -12,6 +12,8 @@ command -v prometheus >/dev/null && command -v promtool >/dev/null || packages+=
 command -v chromium >/dev/null || packages+=(chromium)
 command -v systemd-analyze >/dev/null || packages+=(systemd)
 command -v faketime >/dev/null || packages+=(faketime)
+command -v mosquitto >/dev/null || packages+=(mosquitto)
+command -v nats-server >/dev/null || packages+=(nats-server)
 command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
 if [ ${#packages[@]} -gt 0 ]; then

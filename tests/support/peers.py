@@ -15,6 +15,8 @@ JAVASCRIPT = Path(__file__).parents[1] / "javascript"
 INSTALLED_BY = {
     "chromium": "Debian's package chromium",
     "faketime": "Debian's package faketime",
+    "mosquitto": "Debian's package mosquitto",
+    "nats-server": "Debian's package nats-server",
     "node": "Debian's package nodejs",
     "prometheus": "Debian's package prometheus",
     "promtool": "Debian's package prometheus",

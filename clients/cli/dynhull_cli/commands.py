@@ -81,8 +81,9 @@ class Deferred(TyperCommand):
         self._entry = entry
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
-        """The context of the imported command."""
-        return _imported(self._entry).make_context(info_name, args, parent, **extra)
+        """The context of the imported command, or of the one beside it that the first argument names."""
+        command, words = _imported(self._entry, args)
+        return command.make_context(" ".join([info_name, *words]), args[len(words) :], parent, **extra)
 
 
 @cache
@@ -108,15 +109,19 @@ def _described(entry: EntryPoint, text: str | None) -> str | None:
     return f"Another name for `dynhull {first.name}`. {text}"
 
 
-def _imported(entry: EntryPoint) -> Any:
+def _imported(entry: EntryPoint, args: list[str]) -> tuple[Any, list[str]]:
+    """The command, and the arguments that chose it."""
     try:
         function = entry.load()
     except ModuleNotFoundError as error:
         anything = {"allow_extra_args": True, "ignore_unknown_options": True}
         command = _typer()
         command.command(entry.name, context_settings=anything)(_not_installed(entry, error))
-        return typer.main.get_command(command)
-    return typer.main.get_command(_made(entry, entry.name, function))
+        return typer.main.get_command(command), []
+    others = getattr(function, "beside", {})
+    if args and args[0] in others:
+        return typer.main.get_command(_made(entry, args[0], others[args[0]])), args[:1]
+    return typer.main.get_command(_made(entry, entry.name, function)), []
 
 
 def _made(entry: EntryPoint, name: str, function: Callable[..., None] | Group) -> typer.Typer:

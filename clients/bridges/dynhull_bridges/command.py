@@ -1,0 +1,221 @@
+"""`dynhull relay`."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dynhull_cli.connected import AsJson, Connect, connecting, fail
+from dynhull_cli.durations import duration
+from dynhull_cli.exits import Exit
+from dynhull_cli.groups import beside, group
+from dynhull_cli.json_lines import json_line
+
+
+class LogForm(StrEnum):
+    """The forms of log lines."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+To = Annotated[
+    str,
+    typer.Option(
+        metavar="URL|FILE|-",
+        help="Receiver: http(s)://, mqtt(s)://HOST/TOPIC, nats://HOST/SUBJECT, a file, or - for standard output. "
+        "{fence} and {type} are filled in.",
+    ),
+]
+State = Annotated[Path, typer.Option(help="Folder for dead letters.", file_okay=False, envvar="DYNHULL_RELAY_STATE")]
+Secrets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--secret",
+        envvar="DYNHULL_WEBHOOK_SECRET",
+        help="Secret whsec_... that signs webhooks; several while receivers change theirs. The environment keeps it "
+        "out of the list of processes.",
+        show_envvar=True,
+    ),
+]
+Unsigned = Annotated[bool, typer.Option("--unsigned", help="Send webhooks without a signature.")]
+AllowPrivate = Annotated[
+    bool, typer.Option("--allow-private", help="Allow webhooks to private, loopback and link-local addresses.")
+]
+Timeout = Annotated[str, typer.Option(help="How long a delivery may take.")]
+
+
+def list_dead_letters(state: State = Path("dynhull-relay"), as_json: AsJson = False) -> None:
+    """List dead letters, the oldest first: id, time, receiver, attempts and the last answer.
+
+    dynhull relay dead-letters list --json | jq .event
+    """
+    import json
+    from datetime import UTC, datetime
+
+    from .dead_letters import StateFolder
+
+    try:
+        letters = StateFolder(state).dead_letters()
+    except ValueError as error:
+        fail(Exit.FAILED, str(error))
+    for each in letters:
+        time = datetime.fromtimestamp(each.time, UTC).isoformat(timespec="seconds")
+        if as_json:
+            typer.echo(
+                json_line(
+                    id=each.letter.id,
+                    time=time,
+                    to=each.place,
+                    attempts=each.attempts,
+                    reason=each.reason,
+                    event=json.loads(each.letter.text),
+                )
+            )
+        else:
+            typer.echo(f"{each.letter.id}\t{time}\t{each.place}\t{each.attempts}\t{each.reason}")
+
+
+def send(
+    to: To,
+    ids: Annotated[list[str] | None, typer.Argument(metavar="ID", help="Only these. Default: all.")] = None,
+    state: State = Path("dynhull-relay"),
+    secret: Secrets = None,
+    unsigned: Unsigned = False,
+    allow_private: AllowPrivate = False,
+    timeout: Timeout = "30s",
+) -> None:
+    """Send dead letters again, the oldest first, with their ids, and remove those that arrive.
+
+        dynhull relay dead-letters send --to https://alarms.example/hook
+
+    The command ends at the first that does not arrive, with exit code 1.
+    """
+    import asyncio
+
+    from .dead_letters import StateFolder
+    from .relay import send_again, target_of
+    from .signatures import read_secret
+
+    async def run() -> tuple[int, str | None]:
+        target = target_of(
+            to,
+            keys=[read_secret(each) for each in secret or ()],
+            unsigned=unsigned,
+            batch=1,
+            timeout=_seconds(timeout, "--timeout"),
+            allow_private=allow_private,
+        )
+        found = StateFolder(state).dead_letters()
+        unknown = set(ids or ()) - {each.letter.id for each in found}
+        if unknown:
+            raise ValueError(f"{state} has no dead letter {', '.join(sorted(unknown))}")
+        return await send_again([each for each in found if not ids or each.letter.id in ids], target)
+
+    try:
+        sent, reason = asyncio.run(run())
+    except (ValueError, OSError) as error:
+        fail(Exit.UNUSABLE, str(error))
+    typer.echo(f"{sent} sent")
+    if reason is not None:
+        fail(Exit.FAILED, f"the next one did not arrive: {reason}")
+
+
+@group(list=list_dead_letters, send=send)
+def dead_letters() -> None:
+    """List the events that a receiver refused, or send them again."""
+
+
+@beside({"dead-letters": dead_letters})
+@connecting
+def relay(
+    connect: Connect,
+    fences: Annotated[list[str], typer.Argument(metavar="FENCE", help="Names of the fences.")],
+    consumer: Annotated[
+        str, typer.Option(help="Name of the durable consumer. The server keeps what it has not acknowledged.")
+    ],
+    to: To,
+    state: State = Path("dynhull-relay"),
+    secret: Secrets = None,
+    unsigned: Unsigned = False,
+    allow_private: AllowPrivate = False,
+    batch: Annotated[int, typer.Option(min=1, max=1000, help="Most events in one webhook.")] = 1,
+    timeout: Timeout = "30s",
+    attempts: Annotated[
+        int,
+        typer.Option(min=1, help="How often an event that the receiver refuses is tried before it is a dead letter."),
+    ] = 5,
+    first_pause: Annotated[str, typer.Option(help="Pause before a delivery is repeated; doubled each time ...")] = "1s",
+    longest_pause: Annotated[str, typer.Option(help="... up to this.")] = "1h",
+    enable: Annotated[
+        bool, typer.Option("--enable", help="Deliver again to receivers that answered 410 Gone earlier.")
+    ] = False,
+    grace: Annotated[str, typer.Option(help="How long a delivery may still take after SIGTERM.")] = "10s",
+    metrics_port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port of the metrics page; 0 for a free one.")
+    ] = None,
+    metrics_host: Annotated[str, typer.Option(help="Address of the metrics page.")] = "127.0.0.1",
+    log_format: Annotated[LogForm, typer.Option(help="Form of the log on standard error.")] = LogForm.TEXT,
+) -> None:
+    """Deliver the events of fences to webhooks, MQTT, NATS JetStream or a file, at least once and in order per fence.
+
+        dynhull relay depot --consumer alarm --to https://alarms.example/hook
+        dynhull relay depot yard --consumer plant --to 'mqtt://broker/plant/{fence}/{type}'
+
+    An event is acknowledged after it was delivered. Whatever is killed, it arrives, perhaps twice but with the same id.
+    What fails is repeated until it succeeds; only refusals (HTTP 400 to 499) end as dead letters, see
+    `dynhull relay dead-letters`. Bodies are CloudEvents 1.0 in JSON; webhooks are signed as Standard Webhooks are.
+
+    The relay ends when all fences are deleted, or after SIGTERM; exit code 1 if a receiver answered 410 Gone.
+    """
+    import asyncio
+
+    from dynhull_client import AsyncHullClient
+
+    from . import logs
+    from .dead_letters import StateFolder
+    from .lane import Patience
+    from .relay import run, target_of
+    from .signatures import read_secret
+    from .target import without_secrets
+
+    keys = [read_secret(each) for each in secret or ()]
+    patience = Patience(attempts, _seconds(first_pause, "--first-pause"), _seconds(longest_pause, "--longest-pause"))
+    folder = StateFolder(state)
+    if enable:
+        folder.enable()
+    logs.configure(log_format.value)
+
+    async def serve() -> bool:
+        target = target_of(
+            to,
+            keys=keys,
+            unsigned=unsigned,
+            batch=batch,
+            timeout=_seconds(timeout, "--timeout"),
+            allow_private=allow_private,
+        )
+        page = None if metrics_port is None else (metrics_host, metrics_port)
+        async with connect(AsyncHullClient) as client:
+            return await run(
+                client,
+                fences,
+                consumer,
+                target,
+                without_secrets(to),
+                patience,
+                folder,
+                metrics=page,
+                grace=_seconds(grace, "--grace"),
+            )
+
+    if not asyncio.run(serve()):
+        fail(Exit.FAILED, "a receiver wants no more events: the server keeps them for the consumer")
+
+
+def _seconds(text: str, option: str) -> float:
+    span = duration(text, option)
+    if span is None or span.total_seconds() <= 0:
+        raise ValueError(f"{option} {text!r} must be more than 0")
+    return span.total_seconds()

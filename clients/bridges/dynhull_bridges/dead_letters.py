@@ -1,0 +1,102 @@
+"""Dead letters: events that a receiver refused, kept as files, and receivers that are gone."""
+
+import json
+import os
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from .letters import Letter, read_letter
+
+UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+
+
+@dataclass(frozen=True, slots=True)
+class DeadLetter:
+    """An event that was refused.
+
+    Attributes:
+        letter: the event.
+        place: where it was to go.
+        reason: why it was refused the last time.
+        attempts: how often it was tried.
+        time: when it was given up, in seconds since 1970.
+        path: its file.
+    """
+
+    letter: Letter
+    place: str
+    reason: str
+    attempts: int
+    time: float
+    path: Path
+
+
+class StateFolder:
+    """The folder in which a relay keeps what must survive it and is not on the server.
+
+    Each dead letter is a file of its own, so that a relay may add some while others are sent again.
+
+    Args:
+        path: the folder; it is created when there is something to keep.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._letters = path / "dead-letters"
+        self._gone = path / "gone.json"
+
+    def bury(self, letter: Letter, place: str, reason: str, attempts: int) -> None:
+        """Keep an event that was refused. It is on the disk when this returns."""
+        now = time.time()
+        members = {"place": place, "reason": reason, "attempts": attempts, "time": now, "event": letter.text}
+        _store(self._letters / f"{time.time_ns():020}-{UNSAFE.sub('_', letter.id)}.json", members)
+
+    def dead_letters(self) -> list[DeadLetter]:
+        """All dead letters, the oldest first; ValueError names a file that is none."""
+        found = []
+        for path in sorted(self._letters.glob("*.json")):
+            try:
+                kept = json.loads(path.read_text("utf-8"))
+                event = read_letter(kept["event"])
+                found.append(DeadLetter(event, kept["place"], kept["reason"], kept["attempts"], kept["time"], path))
+            except (KeyError, TypeError, ValueError):
+                raise ValueError(f"{path} is not a dead letter") from None
+        return found
+
+    def gone(self) -> dict[str, str]:
+        """The fences whose receiver wants nothing any more, each with the receiver, and what it answered."""
+        if not self._gone.exists():
+            return {}
+        found = json.loads(self._gone.read_text("utf-8"))
+        return {str(fence): str(answer) for fence, answer in found.items()}
+
+    def disable(self, fence: str, to: str, answer: str) -> None:
+        """Remember that the receiver of a fence is gone."""
+        _store(self._gone, self.gone() | {gone_key(fence, to): answer})
+
+    def enable(self) -> None:
+        """Forget which receivers are gone."""
+        self._gone.unlink(missing_ok=True)
+
+
+def gone_key(fence: str, to: str) -> str:
+    """What `StateFolder.gone` calls a fence and its receiver."""
+    return f"{fence} to {to}"
+
+
+def _store(path: Path, members: dict[str, object] | dict[str, str]) -> None:
+    """Write a file as a whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".unfinished")
+    with unfinished.open("w", encoding="utf-8") as file:
+        json.dump(members, file)
+        file.flush()
+        os.fsync(file.fileno())
+    unfinished.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

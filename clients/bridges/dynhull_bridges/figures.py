@@ -1,0 +1,47 @@
+"""The metrics of a relay, as a page for Prometheus."""
+
+import time
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, start_http_server
+
+from dynhull_client import FenceConsumer
+
+
+class Figures:
+    """Counts of what the relay has done, and how far it is behind."""
+
+    def __init__(self) -> None:
+        self._registry = CollectorRegistry()
+        names = ["fence"]
+
+        def counter(name: str, text: str) -> Counter:
+            return Counter(f"dynhull_relay_{name}", text, names, registry=self._registry)
+
+        self.delivered = counter("delivered", "Events that the receiver has.")
+        self.failed = counter("failed", "Deliveries that failed and are repeated.")
+        self.dead = counter("dead", "Events that became dead letters.")
+        self.lost = counter("lost", "Events that the server dropped before they could be delivered.")
+        self._backlog = Gauge(
+            "dynhull_relay_backlog", "Events that are not acknowledged.", names, registry=self._registry
+        )
+        self._oldest = Gauge(
+            "dynhull_relay_oldest_seconds", "Age of the oldest of them; 0 without any.", names, registry=self._registry
+        )
+
+    def add(self, fence: str) -> None:
+        """Show a fence from the start, not only after its first event."""
+        for each in (self.delivered, self.failed, self.dead, self.lost):
+            each.labels(fence)
+
+    def behind(self, fence: str, consumer: FenceConsumer) -> None:
+        """Note what the server says about the consumer."""
+        oldest = consumer.oldest
+        self._backlog.labels(fence).set(consumer.backlog)
+        self._oldest.labels(fence).set_function(
+            lambda: 0.0 if oldest is None else max(0.0, time.time() - oldest.timestamp())
+        )
+
+    def serve(self, host: str, port: int) -> int:
+        """Serve the page from another thread, and return its port."""
+        server, _ = start_http_server(port, host, self._registry)
+        return int(server.server_port)

@@ -1,0 +1,90 @@
+"""Delivery to NATS JetStream: an event counts as delivered when a stream has stored it."""
+
+import asyncio
+from collections.abc import Sequence
+from urllib.parse import urlsplit
+
+import nats
+from nats.aio.client import Client
+from nats.errors import Error, MaxPayloadError
+from nats.js.errors import NoStreamResponseError
+
+from .letters import CONTENT_TYPE, Letter
+from .target import NotDeliveredError, RefusedError, filled, without_secrets
+
+SUBJECT = "dynhull.{fence}.{type}"
+
+
+class JetStream:
+    """Publishes to the subject in nats://[USER:PASSWORD@]HOST[:PORT][/SUBJECT], or tls:// for TLS.
+
+    {fence} and {type} in the subject are filled in. The header Nats-Msg-Id has the id of the event, so that the stream
+    drops repetitions within its duplicate window. All fences share one connection.
+    """
+
+    most = 1
+
+    def __init__(self, url: str, timeout: float) -> None:
+        parts = urlsplit(url)
+        if not parts.hostname:
+            raise ValueError(f"--to {without_secrets(url)} has no host")
+        self._server = parts._replace(path="").geturl()
+        self._subject = parts.path.removeprefix("/") or SUBJECT
+        if {"*", ">"} & set(self._subject):
+            raise ValueError(f"the subject {self._subject!r} has a wildcard, * or >: events go to one subject")
+        self._timeout = timeout
+        self._client: Client | None = None
+        self._connecting = asyncio.Lock()
+
+    async def deliver(self, letters: Sequence[Letter]) -> None:
+        """Publish the letters, each after the one before was stored."""
+        client = await self._connected()
+        for each in letters:
+            subject = filled(self._subject, each)
+            headers = {"Nats-Msg-Id": each.id, "Content-Type": CONTENT_TYPE}
+            try:
+                await client.jetstream(timeout=self._timeout).publish(subject, each.text.encode(), headers=headers)
+            except MaxPayloadError:
+                raise RefusedError(f"NATS: {len(each.text.encode())} bytes are too many for the server") from None
+            except NoStreamResponseError:
+                raise NotDeliveredError(f"NATS: no stream stores the subject {subject}; create one") from None
+            except (Error, OSError, TimeoutError) as error:
+                await self._disconnect(client)
+                raise NotDeliveredError(f"NATS: {error}") from None
+
+    def place(self, letter: Letter) -> str:
+        """The server and the subject."""
+        return f"{without_secrets(self._server)}/{filled(self._subject, letter)}"
+
+    async def close(self) -> None:
+        """Disconnect."""
+        if self._client is not None:
+            await self._disconnect(self._client)
+
+    async def _connected(self) -> Client:
+        async with self._connecting:
+            if self._client is None:
+                try:
+                    self._client = await nats.connect(
+                        self._server,
+                        # Lanes repeat their deliveries themselves; without a limit, the first connect never returns.
+                        allow_reconnect=False,
+                        max_reconnect_attempts=1,
+                        reconnect_time_wait=0,
+                        connect_timeout=self._timeout,
+                        error_cb=_quiet,
+                    )
+                except (Error, OSError, TimeoutError) as error:
+                    raise NotDeliveredError(f"NATS: {type(error).__name__}: {error}") from None
+            return self._client
+
+    async def _disconnect(self, client: Client) -> None:
+        """Give up a connection, unless another fence has done so already."""
+        async with self._connecting:
+            if self._client is client:
+                self._client = None
+                await client.close()
+
+
+async def _quiet(_: Exception) -> None:
+    """The delivery that fails reports the error."""

@@ -1,0 +1,232 @@
+"""One fence of a relay: its events go to the target one after the other, whatever happens to other fences."""
+
+import asyncio
+import random
+from collections.abc import Awaitable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+import structlog
+
+from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, UnavailableError
+
+from .dead_letters import StateFolder
+from .figures import Figures
+from .letters import Letter, letter
+from .target import GoneError, NotDeliveredError, RefusedError, Target
+
+LONGEST_RETRY_AFTER = 86400.0  # seconds
+FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER = 0.1, 5.0
+SECONDS_BETWEEN_LOOKS = 5.0
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How often and how fast deliveries are repeated.
+
+    Attributes:
+        attempts: how often letters that the receiver refuses are tried before they are dead letters.
+        first_pause: the seconds before the first repetition,
+        longest_pause: doubled each time up to this.
+    """
+
+    attempts: int
+    first_pause: float
+    longest_pause: float
+
+
+class Lane:
+    """Delivers the events of one fence in order, and acknowledges them once the target has them.
+
+    Args:
+        client: the client of the server.
+        fence: the name of the fence.
+        consumer: the name of the durable consumer.
+        target: the receiver.
+        to: the name of the receiver.
+        patience: when to repeat a delivery.
+        folder: where dead letters are kept.
+        figures: the metrics.
+        stop: set when the relay shall end.
+    """
+
+    def __init__(
+        self,
+        client: AsyncHullClient,
+        fence: str,
+        consumer: str,
+        target: Target,
+        to: str,
+        patience: Patience,
+        folder: StateFolder,
+        figures: Figures,
+        stop: asyncio.Event,
+    ) -> None:
+        self.disabled = False
+        self._client = client
+        self._fence = fence
+        self._consumer = consumer
+        self._target = target
+        self._to = to
+        self._patience = patience
+        self._folder = folder
+        self._figures = figures
+        self._stop = stop
+        self._log = structlog.get_logger("dynhull_relay").bind(fence=fence)
+        # Bounded: while the receiver is slow, the server keeps the events.
+        self._arrived: asyncio.Queue[FenceEvent | None] = asyncio.Queue(2 * target.most)
+        self._done: FenceEvent | None = None
+        self._acknowledged: FenceEvent | None = None
+        self._news = asyncio.Event()
+        self._begun = False
+        figures.add(fence)
+
+    async def run(self) -> None:
+        """Deliver until the fence is deleted, its receiver is gone, or the relay stops.
+
+        Raises:
+            DynhullError: the server refuses to send the events, of a fence that does not exist for example.
+            ReaderGoneError: nobody reads standard output any more.
+        """
+        async with asyncio.TaskGroup() as group:
+            helpers = [group.create_task(each) for each in (self._read(), self._acknowledge(), self._look())]
+            try:
+                while events := await self._next():
+                    await self._deliver(events)
+                    if self.disabled:
+                        break
+            finally:
+                for each in helpers:
+                    each.cancel()
+        with suppress(DynhullError):  # the events are delivered again, then
+            await self._acknowledge_now()
+
+    async def _read(self) -> None:
+        """Put the events into the queue, from the server that is there."""
+        pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+        while True:
+            try:
+                async with self._client.watch_fence(self._fence, self._consumer) as watch:
+                    async for event in watch:
+                        self._begun = True
+                        pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+                        if not self._is_done(event):
+                            await self._arrived.put(event)
+                await self._arrived.put(None)
+                return
+            except DynhullError as error:
+                if not self._begun and not isinstance(error, UnavailableError):
+                    raise
+                self._log.warning("no events from the server, trying again", error=str(error))
+            await asyncio.sleep(next(pauses))
+
+    def _is_done(self, event: FenceEvent) -> bool:
+        """Whether it was delivered, though not yet acknowledged, before the watch began again."""
+        return self._done is not None and event.uid == self._done.uid and event.sequence <= self._done.sequence
+
+    async def _next(self) -> list[FenceEvent]:
+        """The next events, as many as are there and go into one delivery; none at the end."""
+        if self._stop.is_set():
+            return []
+        first = await self._unless_stopped(self._arrived.get())
+        found = [] if first is None else [first]
+        while found and len(found) < self._target.most and not self._arrived.empty():
+            more = self._arrived.get_nowait()
+            if more is None:
+                self._arrived.put_nowait(None)
+                break
+            found.append(more)
+        return found
+
+    async def _deliver(self, events: list[FenceEvent]) -> None:
+        """Deliver events, however long it takes."""
+        letters = [letter(each) for each in events]
+        pauses = _pauses(self._patience.first_pause, self._patience.longest_pause)
+        refusals = 0
+        while not self._stop.is_set():
+            try:
+                await self._target.deliver(letters)
+            except GoneError as error:
+                self._folder.disable(self._fence, self._to, str(error))
+                self._log.error("the receiver is gone: no more deliveries", to=self._to, answer=str(error))
+                self.disabled = True
+                return
+            except NotDeliveredError as error:
+                self._figures.failed.labels(self._fence).inc()
+                refusals += isinstance(error, RefusedError)
+                if refusals >= self._patience.attempts:
+                    self._bury(letters, str(error), refusals)
+                    break
+                pause = max(next(pauses), min(error.retry_after or 0.0, LONGEST_RETRY_AFTER))
+                self._log.warning(
+                    "not delivered, trying again", id=letters[0].id, error=str(error), pause=round(pause, 3)
+                )
+                await self._unless_stopped(asyncio.sleep(pause))
+            else:
+                self._figures.delivered.labels(self._fence).inc(len(letters))
+                break
+        else:
+            return
+        self._figures.lost.labels(self._fence).inc(sum(e.last - e.first + 1 for e in events if e.type == "lost"))
+        self._done = events[-1]
+        self._news.set()
+
+    def _bury(self, letters: list[Letter], reason: str, attempts: int) -> None:
+        for each in letters:
+            self._folder.bury(each, self._target.place(each), reason, attempts)
+        self._figures.dead.labels(self._fence).inc(len(letters))
+        self._log.error("refused: a dead letter now", id=letters[0].id, letters=len(letters), error=reason)
+
+    async def _acknowledge(self) -> None:
+        """Acknowledge what is delivered: during one call to the server more is delivered, so calls are few."""
+        pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            try:
+                await self._acknowledge_now()
+                pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+            except DynhullError as error:
+                self._log.warning("not acknowledged, trying again", error=str(error))
+                self._news.set()
+                await asyncio.sleep(next(pauses))
+
+    async def _acknowledge_now(self) -> None:
+        done = self._done
+        if done is not None and done is not self._acknowledged and done.type != "closed":
+            consumer = await self._client.ack_fence(self._fence, self._consumer, done.sequence, uid=done.uid)
+            self._acknowledged = done
+            self._figures.behind(self._fence, consumer)
+
+    async def _look(self) -> None:
+        """Ask the server how far the consumer is behind, now and then: it may be all that moves."""
+        while True:
+            with suppress(DynhullError):  # the reader reports it
+                fence = await self._client.get_fence(self._fence)
+                self._begun = True
+                for each in fence.consumers:
+                    if each.name == self._consumer:
+                        self._figures.behind(self._fence, each)
+            await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
+
+    async def _unless_stopped(self, awaited: Awaitable[Result]) -> Result | None:
+        """What is awaited; None if the relay is stopped before."""
+        task = asyncio.ensure_future(awaited)
+        stopping = asyncio.ensure_future(self._stop.wait())
+        try:
+            await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
+            return task.result() if task.done() else None
+        finally:
+            task.cancel()
+            stopping.cancel()
+
+
+def _pauses(first: float, longest: float) -> Iterator[float]:
+    """Seconds before each repetition: doubled each time, less a random part, so that many do not come back at once."""
+    pause = first
+    while True:
+        yield pause * random.uniform(0.5, 1)  # noqa: S311  # no secret
+        pause = min(2 * pause, longest)

@@ -1,0 +1,22 @@
+"""Logging to standard error, as text or JSON."""
+
+import logging
+import sys
+from typing import Any
+
+import structlog
+
+
+def configure(form: str) -> None:
+    """Log as "text" or "json"."""
+    render: Any = structlog.processors.JSONRenderer()
+    if form == "text":
+        plain = structlog.dev.plain_traceback
+        render = structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty(), exception_formatter=plain)
+    structlog.configure(
+        processors=[structlog.processors.add_log_level, structlog.processors.TimeStamper(fmt="iso", utc=True), render],
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+    )
+    # The relay reports lost connections itself, once each.
+    logging.getLogger("nats").setLevel(logging.CRITICAL)
+    logging.getLogger("mqtt").setLevel(logging.CRITICAL)

@@ -1,0 +1,143 @@
+"""A relay: a durable consumer of fences that delivers their events to one kind of receiver."""
+
+import asyncio
+import signal
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import structlog
+
+from dynhull_client import AsyncHullClient
+
+from .dead_letters import DeadLetter, StateFolder, gone_key
+from .figures import Figures
+from .lane import Lane, Patience
+from .target import GoneError, NotDeliveredError, ReaderGoneError, Target
+
+log = structlog.get_logger("dynhull_relay")
+
+
+def target_of(
+    to: str, *, keys: Sequence[bytes], unsigned: bool, batch: int, timeout: float, allow_private: bool
+) -> Target:
+    """The target that a URL, a path or a dash stands for. Call it in a running event loop.
+
+    Raises:
+        ValueError: there is no such target, or an option does not suit it.
+        OSError: the file cannot be opened.
+    """
+    scheme = urlsplit(to).scheme
+    if scheme in ("http", "https"):
+        from .webhook import Webhook
+
+        if not keys and not unsigned:
+            raise ValueError("webhooks are signed: give --secret or DYNHULL_WEBHOOK_SECRET, or --unsigned")
+        return Webhook(to, keys, batch=batch, timeout=timeout, allow_private=allow_private)
+    if keys or batch > 1:
+        raise ValueError("--secret and --batch are for webhooks (http and https)")
+    match scheme:
+        case "mqtt" | "mqtts":
+            from .mqtt import Mqtt
+
+            return Mqtt(to, timeout)
+        case "nats" | "tls":
+            from .jetstream import JetStream
+
+            return JetStream(to, timeout)
+        case "" | "file":
+            from .lines import LinesFile, StandardOutput
+
+            return StandardOutput() if to == "-" else LinesFile(Path(to.removeprefix("file://")))
+        case _:
+            raise ValueError(f"--to {scheme}: must be a URL of http, https, mqtt, mqtts, nats or tls, a file or -")
+
+
+async def run(
+    client: AsyncHullClient,
+    fences: Sequence[str],
+    consumer: str,
+    target: Target,
+    to: str,
+    patience: Patience,
+    folder: StateFolder,
+    *,
+    metrics: tuple[str, int] | None,
+    grace: float,
+) -> bool:
+    """Deliver the events of the fences until all are deleted, or a signal ends the relay.
+
+    Returns:
+        Whether every receiver wanted its events; False if one is gone.
+
+    Raises:
+        DynhullError: the server refuses to send the events.
+        ValueError: the receivers of all fences were gone earlier, and have not been enabled since then.
+    """
+    gone = folder.gone()
+    wanted = [fence for fence in dict.fromkeys(fences) if gone_key(fence, to) not in gone]
+    if not wanted:
+        raise ValueError(f"{to} answered {gone[gone_key(fences[0], to)]}: --enable delivers to it again")
+    for fence in set(fences).difference(wanted):
+        log.error("the receiver is gone: no deliveries; --enable delivers to it again", fence=fence, to=to)
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    figures = Figures()
+    lanes = [Lane(client, each, consumer, target, to, patience, folder, figures, stop) for each in wanted]
+    port = {} if metrics is None else {"metrics_port": figures.serve(*metrics)}
+    log.info("relaying", fences=wanted, to=to, consumer=consumer, **port)
+    running = [asyncio.create_task(lane.run()) for lane in lanes]
+    ending = asyncio.create_task(_end(stop, running, grace))
+    try:
+        await asyncio.gather(*running)
+    except ExceptionGroup as group:
+        error = _first(group)
+        if not isinstance(error, ReaderGoneError):
+            raise error from None
+    except asyncio.CancelledError:
+        log.warning("a delivery took longer than --grace: it will be repeated")
+    finally:
+        ending.cancel()
+        for each in running:
+            each.cancel()
+        await asyncio.gather(*running, return_exceptions=True)
+        await target.close()
+    log.info("stopped")
+    return len(wanted) == len(set(fences)) and not any(lane.disabled for lane in lanes)
+
+
+async def send_again(letters: Sequence[DeadLetter], target: Target) -> tuple[int, str | None]:
+    """Deliver dead letters and remove those that have arrived, until the first that does not.
+
+    Returns:
+        The number of letters that have arrived, and why the next one has not.
+    """
+    sent = 0
+    try:
+        for each in letters:
+            await target.deliver([each.letter])
+            each.path.unlink()
+            sent += 1
+    except (NotDeliveredError, GoneError) as error:
+        return sent, str(error)
+    finally:
+        await target.close()
+    return sent, None
+
+
+async def _end(stop: asyncio.Event, running: Sequence[asyncio.Task[None]], grace: float) -> None:
+    """After a signal, let deliveries that are under way finish, within the grace period."""
+    await stop.wait()
+    with suppress(TimeoutError):
+        await asyncio.wait_for(asyncio.shield(asyncio.wait(running)), grace)
+    for each in running:
+        each.cancel()
+
+
+def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
+    """The first error in a group of groups."""
+    error = group.exceptions[0]
+    return _first(error) if isinstance(error, BaseExceptionGroup) else error

@@ -1,0 +1,65 @@
+"""What the relay delivers to: the interface, and how a delivery fails."""
+
+from collections.abc import Sequence
+from typing import Protocol
+from urllib.parse import urlsplit
+
+from .letters import Letter
+
+
+class NotDeliveredError(Exception):
+    """A delivery failed for now: it is repeated until it succeeds.
+
+    Attributes:
+        retry_after: the seconds that the receiver asked to wait; None if it did not.
+    """
+
+    def __init__(self, message: str, retry_after: float | None = None) -> None:
+        super().__init__(message)
+        self.retry_after = retry_after
+
+
+class RefusedError(NotDeliveredError):
+    """The receiver does not want these letters: after some attempts they become dead letters."""
+
+
+class GoneError(Exception):
+    """The receiver wants nothing any more."""
+
+
+class ReaderGoneError(Exception):
+    """Nobody reads standard output any more."""
+
+
+class Target(Protocol):
+    """A receiver of letters. Several fences may share one; each awaits its own deliveries.
+
+    Attributes:
+        most: the largest number of letters in one delivery.
+    """
+
+    most: int
+
+    async def deliver(self, letters: Sequence[Letter]) -> None:
+        """Return once the receiver has the letters, which are of one fence and in order, for good.
+
+        Raises:
+            NotDeliveredError: some may not have arrived. GoneError, ReaderGoneError: none will any more.
+        """
+
+    def place(self, letter: Letter) -> str:
+        """Where a letter goes, without secrets: for messages, and to name what is gone."""
+
+    async def close(self) -> None:
+        """Release what the target holds."""
+
+
+def filled(template: str, letter: Letter) -> str:
+    """A URL, topic or subject with the name of the fence and the type of the event filled in."""
+    return template.replace("{fence}", letter.fence).replace("{type}", letter.type)
+
+
+def without_secrets(url: str) -> str:
+    """A URL without user, password and query."""
+    parts = urlsplit(url)
+    return parts._replace(netloc=parts.netloc.rpartition("@")[2], query="").geturl()

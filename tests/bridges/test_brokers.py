@@ -1,0 +1,148 @@
+"""Events of fences arrive at a real MQTT broker and in a real stream of NATS, also when these are killed."""
+
+import asyncio
+import json
+import socket
+import subprocess
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import aiomqtt
+import nats
+import pytest
+from patience import PATIENCE, wait_until
+from peers import program
+from relay_process import FAST, acknowledged, fence, pass_through, relay_process
+
+from dynhull_client import HullClient
+
+KEYS = ["a", "b", "c"]
+
+
+@pytest.fixture
+def client(address: str, name: str) -> Iterator[HullClient]:
+    with HullClient(address) as client:
+        fence(client, name)
+        yield client
+
+
+@pytest.fixture
+def port() -> int:
+    """A port that a broker can have again after it was killed."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return int(free.getsockname()[1])
+
+
+@contextmanager
+def broker(command: Sequence[object], port: int) -> Iterator[subprocess.Popen[bytes]]:
+    """A broker in a process of its own, once it listens."""
+    with subprocess.Popen([*map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            wait_until(lambda: listens(port))
+            yield process
+        finally:
+            process.kill()
+            process.wait(PATIENCE)
+
+
+def listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+class Subscriber:
+    """Collects what the broker has for a persistent session."""
+
+    def __init__(self, port: int) -> None:
+        self.messages: list[tuple[str, dict[str, Any]]] = []
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._run(port)), daemon=True)
+        self._thread.start()
+        assert self._ready.wait(PATIENCE)
+
+    async def _run(self, port: int) -> None:
+        try:
+            async with aiomqtt.Client("127.0.0.1", port) as client:
+                await client.subscribe("#", qos=1)
+                self._ready.set()
+                async for message in client.messages:
+                    self.messages.append((str(message.topic), json.loads(message.payload)))
+        except aiomqtt.MqttError:  # the broker was killed
+            return
+
+
+def test_mqtt(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
+    config = tmp_path / "mosquitto.conf"
+    config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
+    command = [program("mosquitto"), "-c", config]
+    to = ("--to", f"mqtt://127.0.0.1:{port}", "--timeout", "1s", *FAST)
+    with relay_process(address, tmp_path, name, *to) as relay:
+        pass_through(client, name, KEYS)
+        relay.wait_for("not delivered, trying again")
+        with broker(command, port):
+            subscriber = Subscriber(port)
+            wait_until(lambda: acknowledged(client, name) == 6)
+        pass_through(client, name, KEYS)
+        with broker(command, port):
+            again = Subscriber(port)
+            wait_until(lambda: acknowledged(client, name) == 12)
+            wait_until(lambda: again.messages and again.messages[-1][1]["data"]["sequence"] == 12)
+    seen = [message["data"]["sequence"] for _, message in subscriber.messages + again.messages]
+    assert seen == sorted(seen)
+    assert {topic for topic, _ in again.messages} <= {f"dynhull/{name}/enter", f"dynhull/{name}/exit"}
+
+
+def test_mqtt_has_each_event(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
+    config = tmp_path / "mosquitto.conf"
+    config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
+    with broker([program("mosquitto"), "-c", config], port):
+        subscriber = Subscriber(port)
+        with relay_process(address, tmp_path, name, "--to", f"mqtt://127.0.0.1:{port}/plant/{{type}}"):
+            pass_through(client, name, KEYS)
+            wait_until(lambda: acknowledged(client, name) == 6)
+        wait_until(lambda: len(subscriber.messages) == 6)
+    assert [message["data"]["sequence"] for _, message in subscriber.messages] == [1, 2, 3, 4, 5, 6]
+    assert {topic for topic, _ in subscriber.messages} == {"plant/enter", "plant/exit"}
+
+
+def test_nats(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
+    command = [program("nats-server"), "-js", "-a", "127.0.0.1", "-p", port, "-sd", tmp_path / "nats"]
+    to = ("--to", f"nats://127.0.0.1:{port}/events.{{fence}}", "--timeout", "1s", *FAST)
+    with relay_process(address, tmp_path, name, *to) as relay:
+        pass_through(client, name, KEYS)
+        relay.wait_for("not delivered, trying again")
+        with broker(command, port):
+            wait_until(lambda: any("no stream stores" in line["error"] for line in relay.said(TRYING)))
+            asyncio.run(make_stream(port))
+            wait_until(lambda: acknowledged(client, name) == 6)
+        pass_through(client, name, KEYS)
+        with broker(command, port):
+            wait_until(lambda: acknowledged(client, name) == 12)
+            client.delete_consumer(name, "test")  # as if nothing had been acknowledged: all events are sent again
+            relay.process.terminate()
+            relay.process.wait(PATIENCE)
+            with relay_process(address, tmp_path, name, *to):
+                wait_until(lambda: acknowledged(client, name) == 12)
+            stored = asyncio.run(read_stream(port))
+    assert [event["data"]["sequence"] for event in stored] == list(range(1, 13)), "each is stored once"
+
+
+TRYING = "not delivered, trying again"
+
+
+async def make_stream(port: int) -> None:
+    connection = await nats.connect(f"nats://127.0.0.1:{port}")
+    await connection.jetstream().add_stream(name="events", subjects=["events.>"])
+    await connection.close()
+
+
+async def read_stream(port: int) -> list[dict[str, Any]]:
+    connection = await nats.connect(f"nats://127.0.0.1:{port}")
+    stream = connection.jetstream()
+    count = (await stream.stream_info("events")).state.messages
+    found = [json.loads((await stream.get_msg("events", seq)).data) for seq in range(1, count + 1)]
+    await connection.close()
+    return found
