@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from forked import COMMAND, Process
 from patience import PATIENCE
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, Page
 
 DESKTOP = {"viewport": {"width": 1440, "height": 900}}
 PATIENCE_OF_BROWSER = 30_000  # milliseconds
@@ -41,25 +41,36 @@ def dashboard_process(address: str, *options: str) -> Iterator[str]:
 
 
 @cache
-def desktop(browser: Browser) -> BrowserContext:
-    """Pages share this one, so that the browser compiles the page's scripts once."""
-    return browser.new_context(**DESKTOP)
+def _idle(_: Browser) -> list[Page]:
+    """Pages that show nothing. A page that is used again needs half of the processor time of a new one."""
+    return []
 
 
 @contextmanager
 def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[Page]:
     """The page with these hulls. It must not raise an error, nor log a warning to the browser's console."""
     failures: list[object] = []
-    context = browser.new_context(**{**DESKTOP, **look}) if look else desktop(browser)
-    page = context.new_page()
+    idle = [] if look else _idle(browser)
+    page = idle.pop() if idle else browser.new_context(**{**DESKTOP, **look}).new_page()
+    listeners = {
+        "pageerror": lambda error: failures.append(error),
+        "console": lambda message: failures.append(message.text) if message.type in LOUD else None,
+    }
+    for event, listener in listeners.items():
+        page.on(event, listener)
     page.set_default_timeout(PATIENCE_OF_BROWSER)
-    page.on("pageerror", lambda error: failures.append(error))
-    page.on("console", lambda message: failures.append(message.text) if message.type in LOUD else None)
+    page.mouse.move(0, 0)
     page.goto(f"{url}?{urlencode([('hull', hull) for hull in hulls])}")
     try:
         yield page
     finally:
-        (context if look else page).close()
+        for event, listener in listeners.items():
+            page.remove_listener(event, listener)
+        if look:
+            page.context.close()
+        else:
+            page.goto("about:blank")
+            idle.append(page)
     assert failures == []
 
 

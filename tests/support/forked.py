@@ -1,7 +1,8 @@
 """`dynhull` commands and programs that use dynhull, each in a process of its own that starts fast.
 
-Importing what a server needs takes a second of processor time; forking a process that has imported it takes a few
-milliseconds. On Linux the commands of the tests are forked from this file, which runs as a process for each worker.
+Most of the processor time of a short-lived server goes into importing what it needs; a fork of a process that has
+imported it needs a tenth. On Linux the commands of the tests are forked from this file, which runs as a process for
+each worker of the tests.
 """
 
 import atexit
@@ -135,7 +136,7 @@ def _become(command: list[str], folder: str, environment: dict[str, str], files:
 
 
 def _leave(code: int) -> NoReturn:
-    """End this process as Python would, but without the half second in which it takes the modules apart."""
+    """End this process as Python would, but without the time in which it takes the modules apart."""
     threading._shutdown()
     atexit._run_exitfuncs()
     sys.stdout.flush()
