@@ -33,6 +33,8 @@ COLLECTION = {
     "type": "FeatureCollection",
     "features": [{"type": "Feature", "properties": {}, "geometry": each} for each in FEATURES],
 }
+RING = [[0, 0], *([1, 0.001 * i] for i in range(1000)), [0, 0]]
+LONG_LINES = 2 * (json.dumps({"type": "Polygon", "coordinates": [RING]}) + "\n")
 LATIN = "Länge,Breite\n1.5,2\n3,4.25\n-5,6\n".encode("latin-1")
 
 
@@ -119,6 +121,12 @@ def test_what_may_surprise_is_said(tmp_path, name, content, options, points, sai
     ("file", "content", "options", "message"),
     [
         ("a.csv", "\n\n", [], "a.csv is empty"),
+        ("a.geojson", "", [], "a.geojson is empty"),
+        ("a.parquet", "", [], "a.parquet is empty"),
+        ("a.json.gz", gzip.compress(b""), [], "a.json.gz is empty"),
+        ("a.json", '{"x": [1, 2],\n"y": [3, 4]}', [], "a.json has no points: it is a JSON object without features"),
+        ("a.geojson", '{"features": [], "type": "FeatureCollection"}', [], "a.geojson has no points"),
+        ("a.geojson", LONG_LINES, ["--vertices"], "if each line is a row or a feature, add --format ndjson"),
         ("a.csv", COMMA, ["--delimiter", "ab"], "--delimiter 'ab' is not one character"),
         ("a.csv", COMMA, ["--decimal", ";"], "--decimal ';' is neither"),
         ("a.csv", COMMA, ["--encoding", "klingon"], "there is no encoding 'klingon'"),
@@ -231,6 +239,42 @@ def test_geojson_that_is_no_geometry(tmp_path, name):
     done = dynhull("load", name, path, "--vertices", "--dry-run")
     assert done.exit_code == 2
     assert "has no points" in done.stderr
+
+
+@pytest.mark.usefixtures("served")
+@pytest.mark.parametrize("indent", [None, 2])
+@pytest.mark.parametrize("suffix", ["geojson", "json"])
+def test_geojson_without_a_collection(tmp_path, name, suffix, indent):
+    path = tmp_path / f"points.{suffix}"
+    feature = {"type": "Feature", "properties": {}, "geometry": FEATURES[2]}
+    for value, vertices in ((feature, 3), (FEATURES[2], 3), (FEATURES[5], 1), (FEATURES[0], 2)):
+        path.write_text(json.dumps(value, indent=indent))
+        done = dynhull("load", name, path, "--vertices", "--json", "--again")
+        assert (done.exit_code, json.loads(done.stdout)["loaded"]) == (0, vertices), done.stderr
+    done = dynhull("load", name, path, "--dry-run")
+    assert done.exit_code == 2
+    assert "1: its geometry is MultiPoint, not a Point (--vertices takes the vertices of every geometry)" in done.stderr
+
+
+def test_geojson_a_line(tmp_path, served, name):
+    path = tmp_path / "points.geojson"
+    lines = [json.dumps({"type": "Point", "coordinates": each}) + "\n" for each in TRIANGLE]
+    for mark in ("", "\x1e"):  # the mark of text sequences, RFC 8142
+        path.write_text("".join(mark + line for line in lines))
+        done = dynhull("load", name, path, "--replace")
+        assert done.exit_code == 0, done.stderr
+        with HullClient(served) as client:
+            assert client.get_hull(name).vertices.tolist() == TRIANGLE
+    path.write_text(LONG_LINES)  # the advice of the error works
+    done = dynhull("load", name, path, "--vertices", "--format", "ndjson", "--replace", "--json")
+    assert (done.exit_code, json.loads(done.stdout)["points"]) == (0, 2002), done.stderr
+
+
+@pytest.mark.parametrize("file", ["points", "points.xlsx", "points.csv"])
+def test_a_file_that_does_not_exist(tmp_path, file):
+    done = dynhull("load", "a", tmp_path / file, "--dry-run")
+    assert done.exit_code == 2
+    assert done.stderr == f"error: {tmp_path / file}: No such file or directory\n"
 
 
 def test_a_compressed_pipe(tmp_path, served, name):

@@ -158,6 +158,26 @@ def test_help_works_without_the_extra() -> None:
     assert 'needs the extra "server"' in run_without("dynhull_server.flags", "serve", "--help").stdout
 
 
+def test_a_name_that_is_nearly_a_command() -> None:
+    done = dynhull("lsit")
+    assert done.exit_code == 2
+    assert "No such command 'lsit'. Did you mean 'list'?" in done.stderr
+    assert "Did you mean" not in dynhull("xyzzy").stderr
+
+
+def test_every_example_of_the_help_has_a_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
+    examples = 0
+    for entry in entry_points(group="dynhull.commands"):
+        written = (entry.load().__doc__ or "").splitlines()
+        shown = [line.strip() for line in dynhull(entry.name, "--help").stdout.splitlines()]
+        for line in written:
+            if line.startswith(" " * 8 + "dynhull "):
+                assert line.strip() in shown, entry.name
+                examples += 1
+    assert examples > 20
+
+
 def test_without_a_command_line() -> None:
     result = run_without("typer", "serve")
     assert result.returncode == 2

@@ -74,6 +74,15 @@ def test_a_name_that_cannot_be_one_is_an_error(address: str) -> None:
     assert "--origin is '*.example.org': expected HOST or HOST:PORT" in ended.stderr
 
 
+def test_a_port_in_use_is_named(address: str, dashboard: str) -> None:
+    port = dashboard.rpartition(":")[2]
+    ended = run("dashboard", "--port", port, "--address", address)
+    assert ended.returncode == 2
+    assert ended.stderr == (
+        f"error: cannot listen on 127.0.0.1:{port}: another program uses this port: choose another with --port\n"
+    )
+
+
 @pytest.mark.parametrize("path", ["/", "/hulls"])
 def test_its_own_names_are_answered(dashboard: str, path: str) -> None:
     expected = http.HTTPStatus.SWITCHING_PROTOCOLS if path == "/hulls" else http.HTTPStatus.OK

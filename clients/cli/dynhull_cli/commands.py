@@ -6,10 +6,12 @@ A package brings its own commands, so that no client has to import the server to
 import ast
 import inspect
 from collections.abc import Callable
+from difflib import get_close_matches
 from functools import cache, wraps
 from importlib.metadata import EntryPoint, entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
+from textwrap import dedent
 from typing import Annotated, Any
 
 import typer
@@ -66,6 +68,13 @@ class InstalledCommands(Flags, TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """The command of that name, or None."""
         return Deferred(_installed()[cmd_name]) if cmd_name in _installed() else None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the arguments name. Where there is none, the error names those that are written like it."""
+        near = [] if args[0] in _installed() else get_close_matches(args[0], self.list_commands(ctx))
+        if near and not ctx.resilient_parsing:
+            ctx.fail(f"No such command {args[0]!r}. Did you mean {' or '.join(map(repr, near))}?")
+        return super().resolve_command(ctx, args)
 
 
 class Deferred(TyperCommand):
@@ -127,7 +136,7 @@ def _imported(entry: EntryPoint, args: list[str]) -> tuple[Any, list[str]]:
 def _made(entry: EntryPoint, name: str, function: Callable[..., None] | Group) -> typer.Typer:
     """The command of a function; of a group, the group with its commands."""
     if isinstance(function, Group):
-        group = _typer(name=name, cls=CommandGroup, no_args_is_help=True, help=inspect.cleandoc(function.text))
+        group = _typer(name=name, cls=CommandGroup, no_args_is_help=True, help=_with_examples(function.text))
         group.callback()(lambda: None)  # without one, typer makes a group of one command that command
         for each, part in function.commands.items():
             if isinstance(part, Group):
@@ -142,7 +151,15 @@ def _made(entry: EntryPoint, name: str, function: Callable[..., None] | Group) -
 
 def _add(app: typer.Typer, entry: EntryPoint, name: str, function: Callable[..., None], text: str | None) -> None:
     settings = getattr(function, "context_settings", None)
-    app.command(name, cls=Command, help=text, context_settings=settings)(_explaining(entry, function))
+    app.command(name, cls=Command, help=_with_examples(text), context_settings=settings)(_explaining(entry, function))
+
+
+def _with_examples(text: str | None) -> str:
+    """The help with its indented paragraphs between fences: typer takes the indent of the first one for a slip."""
+    paragraphs = inspect.cleandoc(text or "").split("\n\n")
+    return "\n\n".join(
+        f"```text\n{dedent(paragraph)}\n```" if paragraph.startswith("    ") else paragraph for paragraph in paragraphs
+    )
 
 
 def _typer(**more: Any) -> typer.Typer:

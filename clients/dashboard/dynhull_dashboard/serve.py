@@ -1,8 +1,10 @@
 """The dashboard's HTTP server, which is Bokeh's."""
 
 import asyncio
+import errno
 import logging
 import signal
+import socket
 from collections.abc import Sequence
 from functools import partial
 
@@ -34,13 +36,14 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
 
     Raises:
         ValueError: if one of `origins` is not a name.
+        OSError: it cannot listen there.
     """
     # Bokeh warns of each message that it could not send to a page that was closed, which is no fault.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    sockets = bind_sockets(port, host)
+    sockets = _listen(host, port)
     port = sockets[0].getsockname()[1]
     name = f"[{host}]" if ":" in host else host
     hosts = [f"{each}:{port}" for each in (name, *LOOPBACK)]
@@ -55,6 +58,16 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     await stop.wait()
     server.stop()
     await hub.close()
+
+
+def _listen(host: str, port: int) -> list[socket.socket]:
+    try:
+        return bind_sockets(port, host)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        if error.errno == errno.EADDRINUSE:
+            reason = "another program uses this port: choose another with --port"
+        raise OSError(f"cannot listen on {host}:{port}: {reason}") from None
 
 
 def _show(hub: Hub, document: Document) -> None:

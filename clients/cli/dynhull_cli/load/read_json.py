@@ -2,6 +2,7 @@
 
 import codecs
 import json
+import re
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import IO, Any
@@ -17,6 +18,8 @@ from .labels import label_reader
 from .source import Source
 
 PREFIX = 4096  # bytes, which show the kind of JSON
+RECORD_SEPARATOR = b"\x1e"  # before each line of a GeoJSON text sequence (RFC 8142)
+ALONE = re.compile(rb'"type"\s*:\s*"(Feature|(Multi)?(Point|LineString|Polygon)|GeometryCollection)"')
 
 
 def read_json(source: Source) -> Chunks:
@@ -24,14 +27,23 @@ def read_json(source: Source) -> Chunks:
     start = _skip_byte_order_mark(source.file).lstrip()
     if start.startswith(b"["):
         return _read_items(source, "item", "item", _row_reader(source))
-    first, ended, _ = start.partition(b"\n")
-    return read_ndjson(source) if ended and _is_row(first) else read_geojson(source)
+    if _is_row(start.partition(b"\n")[0]):
+        return read_ndjson(source)
+    if b'"features"' not in start and ALONE.search(start):
+        return _read_items(source, "", "feature", _row_reader(source))
+    return _read_collection(source)
 
 
-def read_geojson(source: Source) -> Chunks:
+def _read_collection(source: Source) -> Chunks:
     """Chunks of points of the features of a FeatureCollection, which is never in memory as a whole."""
-    _skip_byte_order_mark(source.file)
-    return _read_items(source, "features.item", "feature", lambda value: _of_feature(value, source.options.vertices))
+    empty = True
+    for chunk in _read_items(
+        source, "features.item", "feature", lambda value: _of_feature(value, source.options.vertices)
+    ):
+        empty = False
+        yield chunk
+    if empty:
+        raise ValueError(f"{source.name} has no points: it is a JSON object without features")
 
 
 def read_ndjson(source: Source) -> Chunks:
@@ -67,7 +79,10 @@ def _numbered_items(source: Source, path: str, place: str) -> Iterator[tuple[int
         for read, item in enumerate(ijson.items(source.file, path), start=1):
             yield read, item
     except ijson.JSONError as error:
-        raise ValueError(f"{source.name} is not valid JSON after {plural(read, place)}: {_cause(error)}") from None
+        lines = "; if each line is a row or a feature, add --format ndjson" if "trailing garbage" in str(error) else ""
+        raise ValueError(
+            f"{source.name} is not valid JSON after {plural(read, place)}: {_cause(error)}{lines}"
+        ) from None
 
 
 def _cause(error: ijson.JSONError) -> str:
@@ -82,7 +97,7 @@ class _Line:
     """A line of JSON, parsed when its value is first asked for."""
 
     def __init__(self, line: bytes) -> None:
-        self._line = line
+        self._line = line.removeprefix(RECORD_SEPARATOR)
 
     @cached_property
     def value(self) -> Any:
@@ -147,7 +162,7 @@ def _of_feature(feature: Any, every_vertex: bool) -> list[Position]:
 def _is_row(line: bytes) -> bool:
     """Whether a line is a JSON value by itself, and not a whole FeatureCollection."""
     try:
-        value = json.loads(line)
+        value = json.loads(line.removeprefix(RECORD_SEPARATOR))
     except ValueError:
         return False
     return not (isinstance(value, dict) and value.get("type") == "FeatureCollection")

@@ -141,6 +141,7 @@ def _format_of(name: str) -> Format:
         return Format.CSV
     suffix = Path(name.lower().removesuffix(".gz")).suffix
     if suffix not in SUFFIXES:
+        Path(name).stat()  # a file that does not exist is the first thing to report
         raise ValueError(f"{name}: the name must end in {', '.join(SUFFIXES)}; otherwise give the format with --format")
     return SUFFIXES[suffix]
 
@@ -153,6 +154,8 @@ def _source(
         if kind is Format.PARQUET:
             raise ValueError(f"{name} is compressed, and Parquet is read from its end: decompress it with gunzip")
         file = cast("IO[bytes]", gzip.GzipFile(fileobj=stored))
+    if not peek(file, 1):
+        raise ValueError(f"{name} is empty")
     if kind not in TABLES and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
         raise ValueError(f"{name} is UTF-16, and JSON is UTF-8: convert it with iconv -f UTF-16 -t UTF-8")
     return Source(name, file, stored, size, kind, options, integer_keys)
@@ -175,14 +178,10 @@ def _reader(kind: Format) -> Reader:
             from .read_parquet import read_parquet
 
             return read_parquet
-        case Format.JSON:
+        case Format.JSON | Format.GEOJSON:
             from .read_json import read_json
 
             return read_json
-        case Format.GEOJSON:
-            from .read_json import read_geojson
-
-            return read_geojson
         case Format.NDJSON:
             from .read_json import read_ndjson
 
