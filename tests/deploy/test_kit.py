@@ -10,6 +10,7 @@ from forked import COMMAND
 from metrics import fetch, measured
 from patience import PATIENCE
 from peers import program
+from relay_process import relay_process
 
 from dynhull_client import HullClient
 
@@ -48,13 +49,16 @@ def test_prometheus_understands_the_grafana_dashboard(tmp_path: Path) -> None:
     assert f"{len(rules)} rules found" in accepted("promtool", "check", "rules", file)
 
 
-def test_what_is_asked_for_is_there() -> None:
+def test_what_is_asked_for_is_there(tmp_path: Path) -> None:
     with measured() as (server, address), HullClient(server.address) as client:
         client.create_hull("a")
         client.apply("a", insert=[[0, 0]])
         with client.watch("a") as watch:
             next(watch)
             there = {*NAME.findall(fetch(f"http://{address}/metrics"))}
+    with relay_process("127.0.0.1:1", tmp_path, "a", "--to", "-", "--metrics-port", 0) as relay:
+        port = relay.wait_for("relaying")["metrics_port"]
+        there |= {*NAME.findall(fetch(f"http://127.0.0.1:{port}/metrics"))}
     asked = {*NAME.findall("\n".join(expressions())), *NAME.findall((KIT / "prometheus/alerts.yml").read_text())}
     assert len(asked) > 10
     assert asked <= there
