@@ -278,7 +278,9 @@ def test_tls(tmp_path):
         where = ["--address", server.address]
         assert dynhull("top", *where, "--tls-ca", tmp_path / "ca").exit_code == 0
         assert dynhull("top", *where).exit_code == 3
-        assert dynhull("top", *where, "--tls").exit_code == 3
+        untrusted = dynhull("top", *where, "--tls")
+        assert untrusted.exit_code == 3
+        assert "name its authority's file with --tls-ca" in untrusted.stderr
         assert dynhull("top", "--address", f"https://{server.address}", "--tls-ca", tmp_path / "ca").exit_code == 0
         # gRPC reads the certificates that the machine trusts once in a process.
         trusting = {**os.environ, "GRPC_DEFAULT_SSL_ROOTS_FILE_PATH": str(tmp_path / "ca")}

@@ -165,6 +165,21 @@ def test_a_name_that_is_nearly_a_command() -> None:
     assert "Did you mean" not in dynhull("xyzzy").stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (["create", "k", "--keyed", "float"], "Invalid value for '--keyed': 'float' is not one of 'str', 'int'."),
+        (["frontier", "k", "--rate", "high"], "Invalid value for '--rate': 'high'. Input should be"),
+        (["serve", "--port", "high"], "Invalid value for '--port': 'high'. Input should be"),
+    ],
+)
+def test_a_value_of_the_wrong_kind_is_shown(command: list[str], message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    done = dynhull(*command)
+    assert done.exit_code == 2
+    assert message in done.stderr
+
+
 def test_every_example_of_the_help_has_a_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "120")
     examples = 0

@@ -48,6 +48,17 @@ class Flags:
 class Command(Flags, TyperCommand):
     """A command."""
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments that are left; an error about a value shows the value, which typer's does not."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            errors: Any = getattr(error.__cause__, "errors", None)  # of pydantic, which typer asks
+            if errors is not None:
+                message, value = error.message.removeprefix("Value error, "), repr(errors()[0]["input"])
+                error.message = message if value in message else f"{value}. {message}"
+            raise
+
 
 class CommandGroup(Flags, TyperGroup):
     """A command that only groups others."""

@@ -90,6 +90,10 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
             encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
             about_tls = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
             advice = f"Is it running (dynhull serve), is the address right (--address), {about_tls}?"
+            if "CERTIFICATE_VERIFY_FAILED" in str(error):
+                advice = (
+                    "This machine does not trust the server's certificate: name its authority's file with --tls-ca."
+                )
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
         except sdk.UnauthenticatedError as error:
             fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
