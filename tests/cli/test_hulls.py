@@ -84,6 +84,12 @@ def test_a_terminal_shows_a_table_and_is_not_read_from_unasked(name):
     code, shown = on_a_terminal("insert", name, answer=b"")
     assert code == 2
     assert "or - to type them in" in shown
+    code, shown = on_a_terminal("load", name, answer=b"")
+    assert code == 2
+    assert "give its name, or - to type the points in" in shown
+    code, shown = on_a_terminal("load", name, "-", answer=b"1,2\n\x04")
+    assert code == 0
+    assert "1 point loaded" in shown
 
 
 def test_addresses_as_people_write_them(served, name):

@@ -1,5 +1,6 @@
 """The command: `dynhull load`."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,12 +25,12 @@ def load(
     client: "HullClient",
     name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull; created if there is none.")],
     file: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="FILE",
-            help="A .csv, .tsv, .txt, .parquet, .json, .geojson or .ndjson file; - for standard input.",
+            help="A .csv, .tsv, .txt, .parquet, .json, .geojson or .ndjson file. Default, or -: standard input.",
         ),
-    ] = STANDARD_INPUT,
+    ] = None,
     format: Annotated[  # noqa: A002
         Format | None, _input("Format. Default: by the name of the file; csv for standard input.")
     ] = None,
@@ -120,10 +121,12 @@ def load(
     if expires is not None and key is None:
         raise ValueError("--expires is given with --key: only keys leave at times of their own")
     options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires)
+    if file is None and sys.stdin.isatty():
+        raise ValueError("no file: give its name, or - to type the points in")
     integers = not dry_run and key is not None and _has_integer_keys(client, name)
     with (
         integers_of_any_size(),
-        open_source(file, format, options, integer_keys=integers) as source,
+        open_source(STANDARD_INPUT if file is None else file, format, options, integer_keys=integers) as source,
         open_bad_rows(bad_rows, source) as bad_file,
     ):
         bad = BadRows(bad_file, max_bad)
