@@ -3,13 +3,16 @@
 import base64
 import json
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
+from fence_server import fence_server
 from metrics import scrape
 from patience import wait_until
 from receiver import Received, Receiver, receiver
@@ -189,6 +192,58 @@ def test_a_stalled_endpoint_of_one_fence_holds_up_no_other(
         pass_through(client, name, KEYS)
         wait_until(lambda: acknowledged(client, name) == 10 and acknowledged(client, slow) == 2)
     assert {request.path for request in endpoint.accepted} == {f"/hook/{name}", f"/hook/{slow}"}
+
+
+def test_sigterm_lets_a_delivery_finish(
+    client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path
+) -> None:
+    with relay_process(address, tmp_path, name, "--to", endpoint.url, *PLAIN) as relay:
+
+        def answer(_: Received) -> tuple[int, dict[str, str]]:
+            relay.process.terminate()
+            time.sleep(0.2)  # the signal arrives while the relay waits for this answer
+            return 200, {}
+
+        endpoint.answer = answer
+        pass_through(client, name, KEYS)
+        relay.process.wait()
+    assert sequences(endpoint, name) == [1]
+    assert acknowledged(client, name) == 1
+
+
+def test_sigterm_ends_a_pause(client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path) -> None:
+    endpoint.answer = lambda _: (503, {"Retry-After": "3600"})
+    with relay_process(address, tmp_path, name, "--to", endpoint.url, *PLAIN) as relay:
+        pass_through(client, name, KEYS)
+        assert relay.wait_for("not delivered, trying again")["pause"] == 3600
+        relay.process.terminate()
+        relay.process.wait(10)
+    assert acknowledged(client, name) == 0
+
+
+def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path, endpoint: Receiver) -> None:
+    hold, total = threading.Event(), 4000
+
+    def answer(_: Received) -> tuple[int, dict[str, str]]:
+        hold.wait()
+        return 200, {}
+
+    endpoint.answer = answer
+    options = ("--max-watch-lag", "0.5", "--metrics-port", "0")
+    with fence_server(*options) as server, HullClient(server.address) as client:
+        metrics = server.process.stdout.readline().split("/")[2]
+        fence(client, "a")
+        keys = [f"{i:0200}" for i in range(total)]
+        with relay_process(server.address, tmp_path, "a", "--to", endpoint.url, "--batch", 100, *PLAIN) as relay:
+            wait_until(lambda: client.get_fence("a").consumers)
+            for _ in range(5):
+                client.put("a", keys, np.ones((total, 2)))
+                client.put("a", keys, 9 * np.ones((total, 2)))
+            wait_until(lambda: scrape(metrics)["dynhull_watch_lag_seconds"] > 0.5)
+            hold.set()
+            wait_until(lambda: acknowledged(client, "a") == 10 * total)
+            assert relay.said("no events from the server, trying again")
+    assert sequences(endpoint, "a") == list(range(1, 10 * total + 1))
 
 
 def test_batches(client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path) -> None:

@@ -9,7 +9,14 @@ from typing import TypeVar
 
 import structlog
 
-from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, UnavailableError
+from dynhull_client import (
+    AsyncHullClient,
+    DeadlineError,
+    DynhullError,
+    FenceEvent,
+    OutcomeUnknownError,
+    UnavailableError,
+)
 
 from .dead_letters import StateFolder
 from .figures import Figures
@@ -78,6 +85,7 @@ class Lane:
         self._log = structlog.get_logger("dynhull_relay").bind(fence=fence)
         # Bounded: while the receiver is slow, the server keeps the events.
         self._arrived: asyncio.Queue[FenceEvent | None] = asyncio.Queue(2 * target.most)
+        self._last: FenceEvent | None = None  # of those that have arrived
         self._done: FenceEvent | None = None
         self._acknowledged: FenceEvent | None = None
         self._news = asyncio.Event()
@@ -113,8 +121,9 @@ class Lane:
                     async for event in watch:
                         self._begun = True
                         pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
-                        if not self._is_done(event):
+                        if not self._is_known(event):
                             await self._arrived.put(event)
+                            self._last = event
                 await self._arrived.put(None)
                 return
             except DynhullError as error:
@@ -123,9 +132,10 @@ class Lane:
                 self._log.warning("no events from the server, trying again", error=str(error))
             await asyncio.sleep(next(pauses))
 
-    def _is_done(self, event: FenceEvent) -> bool:
-        """Whether it was delivered, though not yet acknowledged, before the watch began again."""
-        return self._done is not None and event.uid == self._done.uid and event.sequence <= self._done.sequence
+    def _is_known(self, event: FenceEvent) -> bool:
+        """Whether it arrived before the watch began again; acknowledgements may be behind."""
+        known = self._last
+        return known is not None and event.uid == known.uid and event.sequence <= known.sequence
 
     async def _next(self) -> list[FenceEvent]:
         """The next events, as many as are there and go into one delivery; none at the end."""
@@ -189,10 +199,12 @@ class Lane:
             try:
                 await self._acknowledge_now()
                 pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
-            except DynhullError as error:
+            except (UnavailableError, DeadlineError, OutcomeUnknownError) as error:
                 self._log.warning("not acknowledged, trying again", error=str(error))
                 self._news.set()
                 await asyncio.sleep(next(pauses))
+            except DynhullError as error:  # of a fence that was created again, for example: the next one counts
+                self._log.warning("not acknowledged", error=str(error))
 
     async def _acknowledge_now(self) -> None:
         done = self._done
