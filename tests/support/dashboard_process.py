@@ -2,7 +2,7 @@
 
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from urllib.parse import urlencode
@@ -47,8 +47,8 @@ def _idle(_: Browser) -> list[Page]:
 
 
 @contextmanager
-def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[Page]:
-    """The page with these hulls. It must not raise an error, nor log a warning to the browser's console."""
+def opened(browser: Browser, url: str, *hulls: str, fences: Sequence[str] = (), **look: object) -> Iterator[Page]:
+    """The page with these hulls and fences. It must not raise an error, nor log a warning to the browser's console."""
     failures: list[object] = []
     idle = [] if look else _idle(browser)
     page = idle.pop() if idle else browser.new_context(**{**DESKTOP, **look}).new_page()
@@ -60,7 +60,7 @@ def opened(browser: Browser, url: str, *hulls: str, **look: object) -> Iterator[
         page.on(event, listener)
     page.set_default_timeout(PATIENCE_OF_BROWSER)
     page.mouse.move(0, 0)
-    page.goto(f"{url}?{urlencode([('hull', hull) for hull in hulls])}")
+    page.goto(f"{url}?{urlencode({'hull': hulls, 'fence': fences}, doseq=True)}")
     try:
         yield page
     finally:

@@ -2,16 +2,16 @@
 
 import re
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from server_process import PATIENCE, Server, server_process
 
 
 @contextmanager
-def measured(*options: str) -> Iterator[tuple[Server, str]]:
+def measured(*options: str, wrap: Sequence[str] = ()) -> Iterator[tuple[Server, str]]:
     """A server, and the address of its metrics."""
-    with server_process("--metrics-port", "0", *options) as server:
+    with server_process("--metrics-port", "0", *options, wrap=wrap) as server:
         line = server.process.stdout.readline()
         yield server, re.fullmatch(r"metrics on http://(.*)/metrics\n", line).group(1)
 

@@ -1,9 +1,10 @@
-"""What the page says, and advises, where a hull or the server cannot be shown."""
+"""What the page says, and advises, where a hull, a fence or the server cannot be shown."""
 
 from collections.abc import Iterable
 
 from dynhull_client import (
     DynhullError,
+    FenceNotFoundError,
     HullNotFoundError,
     InvalidRequestError,
     PermissionDeniedError,
@@ -11,8 +12,18 @@ from dynhull_client import (
 )
 
 from .feed import HullFeed
+from .fence_feed import FenceFeed
+from .fence_list import FenceList
 from .server_metrics import ServerMetrics
 from .server_state import ServerState
+
+UNKNOWN_FENCE = FenceNotFoundError, InvalidRequestError  # the latter for what cannot be a name
+TOO_OLD = "This server has no fences: it is older than they are. Update it with pip install --upgrade dynhull"
+
+
+def is_unsupported(error: DynhullError) -> bool:
+    """Whether the server does not know the call."""
+    return error.code.name == "UNIMPLEMENTED"
 
 
 def about_server(address: str, error: DynhullError) -> str:
@@ -54,11 +65,47 @@ def about_hull(feed: HullFeed) -> str | None:
             return str(error)
 
 
-def about_picture(address: str, server: ServerState, feeds: Iterable[HullFeed]) -> str:
+def about_fence(feed: FenceFeed) -> str | None:
+    """For the table: why a fence cannot be followed, and what to do; None where it can."""
+    match feed.trouble:
+        case None:
+            return None if feed.fence is not None else "Waiting for the server"
+        case FenceNotFoundError() if feed.deleted:
+            return "Deleted. Remove it above, or create it again: it appears here by itself"
+        case error if isinstance(error, UNKNOWN_FENCE):
+            return "No such fence. Check the name, or create the fence: it appears here by itself"
+        case PermissionDeniedError() as error:
+            return f"{error}. Start the dashboard with a --token that may read this fence"
+        case error if is_unsupported(error):
+            return TOO_OLD
+        case error:
+            return str(error)
+
+
+def about_fences(address: str, fences: FenceList, shown: bool) -> str:
+    """Below the tables: why there are no fences to pick, and what to do; empty where there are."""
+    if fences.error is not None:
+        return f"{TOO_OLD}." if is_unsupported(fences.error) and not shown else ""
+    if not fences.listed or fences.fences or shown:
+        return ""
+    begin = f" whose names begin with {fences.prefix}" if fences.prefix else ""
+    return (
+        f"The server has no fences{begin} yet. Make one: dynhull fences create {fences.prefix}NAME --area HULL "
+        f"--subjects KEYED_HULL --address {address}"
+    )
+
+
+def about_picture(
+    address: str, server: ServerState, feeds: Iterable[HullFeed], fences: Iterable[FenceFeed] = ()
+) -> str:
     """For the picture: why it is empty, and what to do; empty where it is not, or where the banner says it."""
-    feeds = list(feeds)
+    feeds, fences = list(feeds), list(fences)
     if server.error is not None or not server.listed or any(feed.bounds for feed in feeds):
         return ""
+    if any(fence.area.bounds for fence in fences):
+        return ""
+    if not feeds and (unknown := [fence.name for fence in fences if isinstance(fence.trouble, UNKNOWN_FENCE)]):
+        return f"The server has no fence {unknown[0]}. Check the name, or pick another fence above."
     if empty := [feed.name for feed in feeds if feed.trouble is None and feed.followed]:
         return f"{empty[0]} has no points yet. Add some: dynhull load {empty[0]} FILE.csv --address {address}"
     if missing := [feed.name for feed in feeds if isinstance(feed.trouble, HullNotFoundError | InvalidRequestError)]:

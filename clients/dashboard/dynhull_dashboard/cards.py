@@ -17,6 +17,7 @@ MARKERS = {
     "triangle": '<path d="M20 2.5l5.5 10h-11z"/>',
     "diamond": '<path d="M20 2l4.5 6-4.5 6-4.5-6z"/>',
     "inverted_triangle": '<path d="M20 13.5l5.5-10h-11z"/>',
+    "star": '<path d="M20 1.5l1.9 4.3 4.7.5-3.5 3.1 1 4.6-4.1-2.4-4.1 2.4 1-4.6-3.5-3.1 4.7-.5z"/>',
     "hex": '<path d="M20 2.5l5 2.8v5.4l-5 2.8-5-2.8V5.3z"/>',
 }
 HEADINGS = ("Revision", "Points", "Vertices", "Area ({area})", "Batches/s")
@@ -50,6 +51,12 @@ def _figures(feed: HullFeed) -> tuple[str, ...]:
     drawn = len(outline.points)
     vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
     return f"{feed.revision:,}", f"{feed.points:,}", vertices, _number(feed.area), _number(feed.rate, RATE_DIGITS)
+
+
+def symbol(look: Look) -> str:
+    """The marker alone as SVG."""
+    marker = MARKERS[look.marker]
+    return f'<svg width="16" height="16" viewBox="12 0 16 16" fill="{look.colour}" aria-hidden="true">{marker}</svg>'
 
 
 def key(look: Look) -> str:

@@ -1,10 +1,13 @@
-"""The picture, and where a key is, in words."""
+"""The picture, fences, and where a key is, in words."""
 
 from collections.abc import Iterable
 
-from dynhull_client import HullNotFoundError
+from dynhull_cli.fences.shown import area_text, subjects_text
+from dynhull_client import Fence, HullNotFoundError
 
+from .event_rows import shortened
 from .feed import HullFeed
+from .fence_feed import FenceFeed
 from .search import Sighting, State
 
 SHAPES = {1: "a single point", 2: "a segment"}
@@ -19,9 +22,12 @@ SENTENCES = {
 }
 
 
-def describe(feeds: Iterable[HullFeed]) -> str:
-    """One sentence for each hull."""
-    return " ".join(_sentence(feed) for feed in feeds)
+EVENTS = {"enter": "{} entered", "exit": "{} left", "cross": "{} passed through", "dwell": "{} stayed"}
+
+
+def describe(hulls: Iterable[HullFeed], fences: Iterable[FenceFeed] = ()) -> str:
+    """One sentence for each hull, up to three for each fence."""
+    return " ".join([*(_sentence(feed) for feed in hulls), *(_fence(feed) for feed in fences)])
 
 
 def _sentence(feed: HullFeed) -> str:
@@ -33,6 +39,27 @@ def _sentence(feed: HullFeed) -> str:
         f"{feed.name}: {shape} around {feed.points:,} points, x from {left:.6g} to {right:.6g}, "
         f"y from {bottom:.6g} to {top:.6g}, at revision {feed.revision:,}."
     )
+
+
+def _fence(feed: FenceFeed) -> str:
+    if feed.fence is None:
+        return f"Fence {feed.name}: {'deleted' if feed.deleted else 'nothing drawn'}."
+    margin = f", margin {feed.fence.margin:g}" if feed.fence.margin else ""
+    area = f"Fence {feed.name}: {area_text(feed.fence)}{margin}. {_inside(feed, feed.fence)}."
+    last = feed.events.last
+    if last is None or last.type not in EVENTS:
+        return area
+    cause = f", since {last.cause}" if last.cause else ""
+    return f"{area} Last event: {EVENTS[last.type].format(last.key)}{cause}."
+
+
+def _inside(feed: FenceFeed, fence: Fence) -> str:
+    if fence.other_hull is not None:
+        together = "near each other" if fence.near else "intersecting"
+        return f"{fence.area} and {fence.other_hull} are {together if fence.inside else 'apart'}"
+    keys = [str(key) for each in feed.inside.subjects for key in each.keys] if feed.inside else []
+    names = f": {shortened(keys)}" if keys else ""
+    return f"{feed.inside_count:,} of {fence.subject_count:,} keys of {subjects_text(fence)} inside{names}"
 
 
 def describe_key(key: str, feed: HullFeed, sighting: Sighting) -> list[str]:

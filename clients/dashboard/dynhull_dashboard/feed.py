@@ -1,10 +1,8 @@
 """One hull, watched once for all viewers."""
 
 import asyncio
-import logging
 import math
 import time
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +23,7 @@ from dynhull_client import (
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
 from .outline import Box, apart, drawn
+from .repeating import repeat
 from .search import KeySearch
 
 MAX_RATE = 10.0
@@ -36,13 +35,8 @@ SAMPLE_SIZE = 2_000
 FEW_POINTS_SECONDS, MANY_POINTS_SECONDS = 0.1, 2.0
 SEARCH_SECONDS = 0.2
 VERIFY_SECONDS = 30.0
-# Samples and verifications cost the server time in proportion to the points. A pause of this many times their duration
-# keeps them below a twentieth of it.
-PAUSE_FACTOR = 19
 
 NO_POINTS = HullCopy().vertices
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +108,9 @@ class HullFeed:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._follow())
             tasks.create_task(self._count())
-            tasks.create_task(self._repeat(self._sample, self._sample_pause, asyncio.Event()))
-            tasks.create_task(self._repeat(self._verify, lambda: VERIFY_SECONDS, self._verify_now))
-            tasks.create_task(self._repeat(self._find, lambda: SEARCH_SECONDS, self.search.asked))
+            tasks.create_task(repeat(self.name, self._sample, self._sample_pause))
+            tasks.create_task(repeat(self.name, self._verify, lambda: VERIFY_SECONDS, self._verify_now))
+            tasks.create_task(repeat(self.name, self._find, lambda: SEARCH_SECONDS, self.search.asked))
 
     @property
     def trouble(self) -> DynhullError | None:
@@ -196,20 +190,3 @@ class HullFeed:
     async def _verify(self) -> None:
         outcome = await self._client.verify(self.name, timeout=None)
         self.verified = Verified(outcome, time.monotonic())
-
-    async def _repeat(
-        self, work: Callable[[], Awaitable[None]], pause: Callable[[], float], at_once: asyncio.Event
-    ) -> None:
-        """Repeat `work` with a pause in between, longer after work that took long; setting `at_once` ends the pause."""
-        while True:
-            begun = time.monotonic()
-            try:
-                await work()
-            except DynhullError as error:  # the watch fails for the same reason, which the page shows
-                log.info("%s: %s", self.name, error)
-            took = time.monotonic() - begun
-            try:
-                await asyncio.wait_for(at_once.wait(), max(pause(), PAUSE_FACTOR * took))
-            except TimeoutError:
-                continue
-            at_once.clear()

@@ -1,24 +1,33 @@
-"""State shared by all viewers: one connection to the server, and one watch per hull on view."""
+"""State shared by all viewers: one connection to the server, and one watch per hull and fence on view."""
 
 import asyncio
-from collections import Counter
+from functools import partial
 
 from dynhull_client import AsyncHullClient
 
 from .feed import HullFeed
+from .feeds import Feeds
+from .fence_feed import FenceFeed
+from .fence_list import FenceList
 from .server_metrics import ServerMetrics
 from .server_state import ServerState
 from .units import NO_UNITS, Units
 
 
 class Hub:
-    """The feeds, by hull.
+    """The feeds, by hull and by fence.
 
     Args:
         client: the connection.
-        prefix: only hulls whose names begin with it can be picked.
+        prefix: only hulls and fences whose names begin with it can be picked.
         metrics_url: the server's metrics page for Prometheus; None for none.
         units: the units of the coordinates.
+
+    Attributes:
+        server: the server's hulls.
+        fence_list: the server's fences.
+        hulls: the feeds of the hulls on view.
+        fences: the feeds of the fences on view.
     """
 
     def __init__(
@@ -27,29 +36,13 @@ class Hub:
         self.address = client.address
         self.units = units
         self.server = ServerState(client, prefix)
+        self.fence_list = FenceList(client, prefix)
         self.metrics = None if metrics_url is None else ServerMetrics(metrics_url)
-        self._client = client
-        self._feeds: dict[str, HullFeed] = {}
-        self._viewers: Counter[str] = Counter()
-        self._closing: set[asyncio.Task[None]] = set()
-
-    def open_feed(self, name: str) -> HullFeed:
-        """The feed of a hull, shared with its other viewers. Release it once for each call."""
-        if name not in self._feeds:
-            self._feeds[name] = HullFeed(self._client, name)
-        self._viewers[name] += 1
-        return self._feeds[name]
-
-    def release_feed(self, name: str) -> None:
-        """End one viewer's use of a feed; the last one closes it."""
-        self._viewers[name] -= 1
-        if not self._viewers[name]:
-            task = asyncio.create_task(self._feeds.pop(name).close())
-            self._closing.add(task)
-            task.add_done_callback(self._closing.discard)
+        self.hulls = Feeds(partial(HullFeed, client))
+        self.fences = Feeds(partial(FenceFeed, client))
 
     async def close(self) -> None:
         """Stop all background tasks."""
-        await asyncio.gather(self.server.close(), *(feed.close() for feed in self._feeds.values()), *self._closing)
+        await asyncio.gather(self.server.close(), self.fence_list.close(), self.hulls.close(), self.fences.close())
         if self.metrics is not None:
             await self.metrics.close()

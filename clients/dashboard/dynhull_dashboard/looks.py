@@ -25,3 +25,9 @@ LOOKS = (
 # Series of the whole server belong to no hull. This grey has a contrast above 3:1 with the light and the dark page.
 NEUTRAL = "#7d8590"
 MEAN, PERCENTILE = Look(NEUTRAL, ()), Look(NEUTRAL, (6, 3))
+
+# Fences, and the subjects inside them, have one colour, whose contrast is above 4:1 with the light and the dark page.
+# Their names in the picture, and dashes, distinguish them.
+FENCE_COLOUR = "#9b5de5"
+INSIDE = Look(FENCE_COLOUR, (), "star")
+FENCE_LOOKS = tuple(Look(FENCE_COLOUR, dash) for dash in ((), (8, 3), (2, 3), (10, 3, 2, 3), (14, 4), (5, 2, 5, 6)))

@@ -2,21 +2,34 @@ const find = selector => document.querySelector(selector)
 const write = (selector, text) => { if (find(selector).textContent != text) find(selector).textContent = text }
 const MOST_OFFERED = 20
 let socket
-function follow(plane, labels) {
+function follow(plane, labels, fences, events) {
   const shown = new WebSocket(`${location.origin.replace(/^http/, "ws")}${location.pathname.replace(/\/$/, "")}/hulls?`
-    + new URLSearchParams(plane.tags.map(name => ["hull", name])))
-  socket?.close()
+    + new URLSearchParams(plane.tags))
+  if (socket) end(socket)
   socket = shown
   shown.onmessage = ({data}) => {
-    const {source, revision, x, y, keys} = JSON.parse(data)
-    const drawn = labels.source(source)
-    const key = keys ?? x.map(() => "")
-    const title = key.map(name => name && `${name}: `)
-    if (!drawn) return
-    drawn.data = {x, y, revision: x.map(() => revision), title, key, label: x.map(() => ""), side: x.map(() => "left")}
+    if (shown != socket) return
+    const message = JSON.parse(data)
+    if (message.kind == "events") return events.take(message)
+    if (message.kind) fences.take(message)
+    else draw_hull(labels, message)
+    fences.draw()
     labels.place()
   }
-  shown.onclose = () => shown == socket && setTimeout(follow, 1000, plane, labels)
+  shown.onclose = () => shown == socket && setTimeout(follow, 1000, plane, labels, fences, events)
+}
+// A browser complains of a socket that is closed before it is open.
+function end(old) {
+  if (old.readyState == WebSocket.CONNECTING) old.onopen = () => old.close()
+  else old.close()
+}
+function draw_hull(labels, {source, revision, x, y, keys}) {
+  const drawn = labels.source(source)
+  const each = value => x.map(() => value)
+  const key = keys ?? each("")
+  const title = key.map(name => name && `${name}: `)
+  const hull = each(source.replace(/^(vertices|points) of /, ""))
+  if (drawn) drawn.data = {x, y, revision: each(revision), title, key, hull, label: each(""), side: each("left")}
 }
 function chip([name, key], remove) {
   const item = document.createElement("li"), line = document.createElement("span")
@@ -29,25 +42,26 @@ function chip([name, key], remove) {
   item.append(line, name, button)
   return item
 }
-function start_picker(model) {
-  const field = find(".picker [list]")
-  const names = () => model.legend.map(([name]) => name)
-  const remove = removed => model.picked = names().filter(name => name != removed)
+// The chips and the field of a picker. `names` are the properties of the model that it shows and changes.
+function start_picker(model, {form, noun, most, offered, picked, legend}) {
+  const field = find(`${form} [list]`)
+  const names = () => model[legend].map(([name]) => name)
+  const remove = removed => model[picked] = names().filter(name => name != removed)
   const add = () => {
-    if (field.value && !names().includes(field.value)) model.picked = [...names(), field.value]
+    if (field.value && !names().includes(field.value)) model[picked] = [...names(), field.value]
     field.value = ""
   }
   const show = () => {
-    const full = model.legend.length >= find(".page").dataset.mostHulls
-    find(".picker ul").replaceChildren(...model.legend.map(each => chip(each, remove)))
+    const full = model[legend].length >= most
+    find(`${form} ul`).replaceChildren(...model[legend].map(each => chip(each, remove)))
     field.disabled = full
-    field.placeholder = full ? "Remove a hull to pick another" : "Pick hulls"
+    field.placeholder = full ? `Remove a ${noun} to pick another` : `Pick ${noun}s`
   }
-  const offer = () => find("#offered").replaceChildren(...model.offered.map(name => new Option(name, name)))
-  field.addEventListener("change", () => model.offered.includes(field.value) && add())
-  find(".picker").addEventListener("submit", event => { event.preventDefault(); add() })
-  model.properties.legend.change.connect(show)
-  model.properties.offered.change.connect(offer)
+  const offer = () => field.list.replaceChildren(...model[offered].map(name => new Option(name, name)))
+  field.addEventListener("change", () => model[offered].includes(field.value) && add())
+  find(form).addEventListener("submit", event => { event.preventDefault(); add() })
+  model.properties[legend].change.connect(show)
+  model.properties[offered].change.connect(offer)
   show()
   offer()
 }
@@ -55,8 +69,9 @@ function start_finder(model, plane, labels) {
   const field = find(".finder input")
   const look = () => model.sought = field.value
   const offer = () => {
-    const sources = plane.tags.flatMap(name => [`vertices of ${name}`, `points of ${name}`])
-    const keys = sources.flatMap(name => labels.source(name)?.data.key ?? [])
+    const hulls = shown_names(plane, "hull").flatMap(name => [`vertices of ${name}`, `points of ${name}`])
+    const inside = shown_names(plane, "fence").map(name => `inside of ${name}`)
+    const keys = [...hulls, ...inside].flatMap(name => labels.source(name)?.data.key ?? [])
     const names = keys.filter(key => key && key.startsWith(field.value))
     const offered = [...new Set(names)].sort().slice(0, MOST_OFFERED)
     find("#keys").replaceChildren(...offered.map(key => new Option(key, key)))
@@ -78,14 +93,20 @@ function start_finder(model, plane, labels) {
   find(".finder").addEventListener("submit", event => { event.preventDefault(); look() })
   model.properties.found.change.connect(show)
   show()
+  return key => {
+    field.value = key
+    look()
+  }
 }
 function start_text(model) {
   const update = () => {
     write(".banner", model.banner)
     write(".note", model.note)
     write("#description", model.description)
+    write(".hint", model.fence_hint)
+    find(".page").classList.toggle("fenced", model.legend_fences.length > 0)
   }
-  for (const name of ["banner", "note", "description"]) model.properties[name].change.connect(update)
+  for (const name of ["banner", "note", "description", "fence_hint", "legend_fences"]) model.properties[name].change.connect(update)
   const box = find("[name=same_scale]")
   box.checked = model.same_scale
   box.onchange = () => model.same_scale = box.checked
@@ -105,12 +126,22 @@ document.addEventListener("DOMContentLoaded", function start() {
   const plane = page?.get_model_by_name("plane")
   if (!plane) return void setTimeout(start, 50)
   const model = page.get_model_by_name("page")
-  start_picker(model)
+  const {mostHulls, mostFences} = find(".page").dataset
+  start_picker(model, {form: ".hulls", noun: "hull", most: mostHulls, offered: "offered", picked: "picked",
+    legend: "legend"})
+  start_picker(model, {form: ".fences", noun: "fence", most: mostFences, offered: "offered_fences",
+    picked: "picked_fences", legend: "legend_fences"})
   start_text(model)
-  const labels = new Labels(plane)
-  start_finder(model, plane, labels)
-  follow(plane, labels)
-  plane.properties.tags.change.connect(() => follow(plane, labels))
+  const fences = new Fences(plane)
+  const labels = new Labels(plane, fences)
+  const events = new Events(start_finder(model, plane, labels))
+  const begin = () => {
+    fences.keep(shown_names(plane, "fence"))
+    events.keep(shown_names(plane, "fence"))
+    follow(plane, labels, fences, events)
+  }
+  begin()
+  plane.properties.tags.change.connect(begin)
   page.on_event("connection_lost", () => {
     write(".banner", "The dashboard does not answer. Check that dynhull dashboard still runs. The page shows what it "
       + "last received, and reconnects by itself.")

@@ -1,6 +1,6 @@
-"""The picture of the hulls."""
+"""The picture of the hulls and the fences."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from bokeh.models import (
     BoxZoomTool,
@@ -16,6 +16,8 @@ from bokeh.plotting import figure
 
 from .drawing import points_of, vertices_of
 from .feed import HullFeed
+from .fence_feed import FenceFeed
+from .fence_plane import DrawnFence, add_fence_names
 from .looks import Look
 from .outline import Box, frame_around
 from .rings import Rings
@@ -27,7 +29,9 @@ FILL_ALPHA, POINT_ALPHA = 0.12, 0.65
 AXIS_LABEL_HEIGHT = 24
 VERTEX_SIZE, POINT_SIZE = 8, 4
 EMPTY_FRAME: Box = (0.0, 0.0, 1.0, 1.0)
-TOOLTIPS = [("", "@title$name"), ("x", "@x{%.12g}"), ("y", "@y{%.12g}"), ("revision", "@revision")]
+PLACE = [("x", "@x{%.12g}"), ("y", "@y{%.12g}")]
+TOOLTIPS = [("", "@title$name"), *PLACE, ("revision", "@revision")]
+INSIDE_TOOLTIPS = [("", "@title$name"), *PLACE]
 
 
 class DrawnHull:
@@ -63,7 +67,7 @@ class DrawnHull:
 
 
 class Plane:
-    """The plot, and the hulls in it.
+    """The plot, and the hulls and fences in it.
 
     Args:
         units: the units of the axes.
@@ -74,7 +78,8 @@ class Plane:
         self._frame: Box | None = None
         self._same_scale = same_scale
         self._drawn: dict[str, DrawnHull] = {}
-        self._hover = HoverTool(renderers=[], tooltips=TOOLTIPS, formatters={"@x": "printf", "@y": "printf"})
+        self._fences: dict[str, tuple[FenceFeed, DrawnFence]] = {}
+        self._hover, self._hover_inside = _hover(TOOLTIPS), _hover(INSIDE_TOOLTIPS)
         self._box_zoom = BoxZoomTool(match_aspect=same_scale)
         zoom = WheelZoomTool()
         x, y = DataRange1d(range_padding=0), DataRange1d(range_padding=0)
@@ -84,7 +89,7 @@ class Plane:
             sizing_mode="stretch_both",
             x_range=x,
             y_range=y,
-            tools=[PanTool(), zoom, self._box_zoom, ResetTool(), SaveTool(), self._hover],
+            tools=[PanTool(), zoom, self._box_zoom, ResetTool(), SaveTool(), self._hover, self._hover_inside],
             active_scroll=zoom,
             toolbar_location="above",
         )
@@ -99,19 +104,27 @@ class Plane:
         corners = self.plot.scatter(source=self._corners, alpha=0)
         x.renderers = [corners]
         y.renderers = [corners]
+        add_fence_names(self.plot)
         self._rings = Rings(self.plot)
 
     def show(self, feed: HullFeed, look: Look) -> None:
         """Add a hull."""
         self._drawn[feed.name] = DrawnHull(self.plot, feed, look)
-        self._name_hulls()
+        self._name_sources()
 
     def hide(self, name: str) -> None:
         """Remove a hull."""
-        gone = self._drawn.pop(name)
-        self._name_hulls()
-        self.plot.renderers = [each for each in self.plot.renderers if each not in gone.renderers]
-        self._frame = None
+        self._remove(self._drawn.pop(name).renderers)
+
+    def show_fence(self, feed: FenceFeed, look: Look) -> None:
+        """Add a fence."""
+        self._fences[feed.name] = feed, DrawnFence(self.plot, feed.name, look)
+        self._name_sources()
+
+    def hide_fence(self, name: str) -> None:
+        """Remove a fence."""
+        _, drawn = self._fences.pop(name)
+        self._remove(drawn.renderers)
 
     def set_same_scale(self, same_scale: bool) -> None:
         """Draw both axes to one scale, or let each fill its side of the picture."""
@@ -124,16 +137,28 @@ class Plane:
         self._rings.draw(key, sightings, self._frame or EMPTY_FRAME)
 
     def update(self) -> None:
-        """Adjust the frame to the hulls."""
+        """Adjust the frame to the hulls and the fences."""
         boxes = [drawn.feed.bounds for drawn in self._drawn.values()]
+        boxes += [feed.area.bounds for feed, _ in self._fences.values()]
         frame = frame_around([box for box in boxes if box is not None], self._frame, self._same_scale)
         if frame is not None and frame is not self._frame:
             self._frame = frame
             self._corners.data = _corners(frame)
 
-    def _name_hulls(self) -> None:
+    def _remove(self, gone: Sequence[object]) -> None:
+        self._name_sources()
+        self.plot.renderers = [each for each in self.plot.renderers if each not in gone]
+        self._frame = None
+
+    def _name_sources(self) -> None:
         self._hover.renderers = [marker for drawn in self._drawn.values() for marker in drawn.markers]
-        self.plot.tags = list(self._drawn)  # the page asks for the hulls named here
+        self._hover_inside.renderers = [drawn.marks for _, drawn in self._fences.values()]
+        # The page asks for the hulls and fences named here.
+        self.plot.tags = [*(["hull", name] for name in self._drawn), *(["fence", name] for name in self._fences)]
+
+
+def _hover(tooltips: list[tuple[str, str]]) -> HoverTool:
+    return HoverTool(renderers=[], tooltips=tooltips, formatters={"@x": "printf", "@y": "printf"})
 
 
 def _corners(frame: Box) -> dict[str, list[float]]:
@@ -143,5 +168,7 @@ def _corners(frame: Box) -> dict[str, list[float]]:
 def _source(name: str) -> ColumnDataSource:
     """An empty data source. It is not synced: the page must not send back what the socket sent it."""
     return ColumnDataSource(
-        {"x": [], "y": [], "revision": [], "title": [], "key": [], "label": [], "side": []}, name=name, syncable=False
+        {"x": [], "y": [], "revision": [], "title": [], "key": [], "hull": [], "label": [], "side": []},
+        name=name,
+        syncable=False,
     )

@@ -75,5 +75,8 @@ def _show(hub: Hub, document: Document) -> None:
     assert isinstance(context, BokehSessionContext)
     assert context.request is not None
     arguments = context.request.arguments
-    picked, keys = ([each.decode(errors="replace") for each in arguments.get(name, [])] for name in ("hull", "key"))
-    Page(document, hub, list(dict.fromkeys(picked)), keys[0] if keys else "")
+    hulls, fences, keys = (
+        list(dict.fromkeys(each.decode(errors="replace") for each in arguments.get(name, [])))
+        for name in ("hull", "fence", "key")
+    )
+    Page(document, hub, hulls, fences, keys[0] if keys else "")

@@ -65,10 +65,11 @@ def area_text(fence: Fence) -> str:
     if isinstance(fence.area, str):
         return f"hull {fence.area}"
     if isinstance(fence.area, Circle):
-        return f"circle {fence.area.x:g} {fence.area.y:g} {fence.area.r:g}"
+        return f"circle around ({fence.area.x:g}, {fence.area.y:g}), radius {fence.area.r:g}"
     corners = sum(len(each.exterior) + sum(map(len, each.holes)) for each in fence.area)
+    holes = sum(len(each.holes) for each in fence.area)
     several = f"{len(fence.area)} polygons" if len(fence.area) > 1 else "polygon"
-    return f"{several}, {plural(corners, 'corner')}"
+    return ", ".join([several, plural(corners, "corner"), *([plural(holes, "hole")] if holes else [])])
 
 
 def subjects_text(fence: Fence) -> str:

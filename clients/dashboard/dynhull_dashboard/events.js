@@ -1,0 +1,74 @@
+// The list of events, newest first.
+const EVENT_WORDS = {enter: "★ enter", exit: "☆ exit", cross: "⤭ cross", dwell: "⧗ dwell", begin: "★ begin",
+  cease: "☆ cease", snapshot: "≡ snapshot", closed: "✕ closed", lost: "⚠ lost"}
+class Events {
+  // `look_for` is called with a key that the viewer clicks.
+  constructor(look_for) {
+    this.look_for = look_for
+    this.rows = new Map()
+    this.shown = new Map()
+  }
+  take({fence, rows}) {
+    this.rows.set(fence, rows)
+    this.show_soon()
+  }
+  keep(names) {
+    for (const name of this.rows.keys()) if (!names.includes(name)) this.rows.delete(name)
+    this.show_soon()
+  }
+  show_soon() {
+    this.awaited ??= requestAnimationFrame(() => {
+      this.awaited = undefined
+      this.show()
+    })
+  }
+  show() {
+    const rows = [...this.rows].flatMap(([fence, rows]) => rows.map(row => ({row, fence})))
+    // Of one fence they are in order already, and stay so: sorting is stable.
+    const newest = rows.sort((one, two) => two.row[1] - one.row[1]).slice(0, find(".page").dataset.mostEvents)
+    const items = newest.map(({row, fence}) => [`${fence} ${row[0]}`, row, fence])
+    const wanted = new Set(items.map(([id]) => id))
+    for (const [id, element] of this.shown) {
+      if (wanted.has(id)) continue
+      element.remove()
+      this.shown.delete(id)
+    }
+    // Only new rows move: what the viewer reads, selects or has focused stays.
+    const body = find(".events tbody")
+    let next = body.firstElementChild
+    for (const [id, row, fence] of items) {
+      const known = this.shown.get(id)
+      if (known && known == next) next = next.nextElementSibling
+      else {
+        const element = known ?? this.element(row, fence)
+        this.shown.set(id, element)
+        body.insertBefore(element, next)
+      }
+    }
+    find(".events .none").hidden = items.length > 0
+  }
+  element([, at, type, key, text, cause], fence) {
+    const row = document.createElement("tr"), time = document.createElement("time")
+    const moment = new Date(at)
+    time.dateTime = time.title = moment.toISOString()
+    time.textContent = moment.toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})
+    row.className = type
+    row.append(cell("when", time), cell("type", EVENT_WORDS[type] ?? type), cell("subject", key ? this.button(key) : text),
+      cell("fence", fence), cell("cause", cause))
+    return row
+  }
+  button(key) {
+    const button = document.createElement("button")
+    button.type = "button"
+    button.textContent = key
+    button.title = "Find this key in the picture"
+    button.onclick = () => this.look_for(key)
+    return button
+  }
+}
+function cell(name, content) {
+  const made = document.createElement("td")
+  made.className = name
+  made.append(content)
+  return made
+}

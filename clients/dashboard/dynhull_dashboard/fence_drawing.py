@@ -1,0 +1,140 @@
+"""The area of a fence, and who is inside, as sent to the pages: serialized once for all of them."""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+
+from dynhull_client import Circle, Fence, Points, Prefix
+
+from .outline import MOST_DRAWN, Box
+
+CORNERS_OF_CIRCLE = 180
+LEAST_CORNERS = 3
+# Of more polygons the first ones are drawn.
+MOST_POLYGONS = MOST_DRAWN // LEAST_CORNERS
+
+Rings = list[Points]  # of one polygon: the exterior, then the holes
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """The area of a fence on the page.
+
+    Attributes:
+        message: the rings of the area and of its margin, and the hulls whose outlines belong to it, as JSON.
+        bounds: the smallest box around the area and its margin; None for a hull, whose feed knows it.
+        corners: the number of corners of the area's polygons.
+        drawn: the number of those that are drawn.
+    """
+
+    message: str
+    bounds: Box | None = None
+    corners: int = 0
+    drawn: int = 0
+
+
+def area_of(name: str, fence: Fence | None) -> Area:
+    """The area of the fence with this name, an empty one where there is none. Time linear in the corners."""
+    if fence is None:
+        return Area(_area_message(name))
+    margin = fence.margin if fence.other_hull is None else fence.near
+    polygons = _polygons(fence)
+    around = _around(polygons, margin)
+    message = _area_message(name, area_hulls(fence), margin, polygons, around)
+    if not polygons:
+        return Area(message)
+    outer = np.concatenate([rings[0] for rings in (*polygons, *around)])
+    left, bottom = outer.min(axis=0).tolist()
+    right, top = outer.max(axis=0).tolist()
+    drawn = 0 if isinstance(fence.area, Circle) else sum(len(ring) for rings in polygons for ring in rings)
+    return Area(message, (left, bottom, right, top), corner_count(fence), drawn)
+
+
+def _area_message(
+    name: str,
+    hulls: Sequence[str] = (),
+    margin: float = 0.0,
+    polygons: Sequence[Rings] = (),
+    around: Sequence[Rings] = (),
+) -> str:
+    (x, y), (margin_x, margin_y) = _columns(polygons), _columns(around)
+    rings = {"xs": x, "ys": y, "margin_xs": margin_x, "margin_ys": margin_y}
+    return json.dumps({"kind": "area", "fence": name, "hulls": hulls, "margin": margin, **rings})
+
+
+class Mark(NamedTuple):
+    """A subject inside: its hull, its key and its position."""
+
+    hull: str
+    key: str
+    x: float
+    y: float
+
+
+def marks_message(fence: str, marks: Sequence[Mark] = ()) -> str:
+    """The subjects inside as JSON."""
+    columns = {name: [getattr(mark, name) for mark in marks] for name in Mark._fields}
+    return json.dumps({"kind": "inside", "fence": fence, **columns})
+
+
+def area_hulls(fence: Fence) -> list[str]:
+    """The hulls whose outlines are the area; in a fence around another hull, both."""
+    area = [fence.area] if isinstance(fence.area, str) else []
+    return [*area, fence.other_hull] if fence.other_hull is not None else area
+
+
+def hulls_of(fence: Fence, known: Iterable[str]) -> list[str]:
+    """The hulls that show what the fence does: those of its area, and of its subjects among the `known` hulls."""
+    subjects = fence.subjects
+    if isinstance(subjects, Prefix):
+        found = sorted(name for name in known if name.startswith(subjects.text))
+    else:
+        found = [] if subjects is None else [subjects]
+    return list(dict.fromkeys([*area_hulls(fence), *found]))
+
+
+def corner_count(fence: Fence) -> int:
+    """The number of corners of the area's polygons."""
+    polygons = fence.area if isinstance(fence.area, tuple) else ()
+    return sum(len(ring) for each in polygons for ring in (each.exterior, *each.holes))
+
+
+def _polygons(fence: Fence) -> list[Rings]:
+    """The rings of the polygons to draw: the exterior, then the holes."""
+    if isinstance(fence.area, Circle):
+        return [[_circle(fence.area, fence.area.r)]]
+    if isinstance(fence.area, str):
+        return []
+    step = -(-corner_count(fence) // MOST_DRAWN)
+    return [
+        [ring[:: max(1, min(step, len(ring) // LEAST_CORNERS))] for ring in (each.exterior, *each.holes)]
+        for each in fence.area[:MOST_POLYGONS]
+    ]
+
+
+def _circle(circle: Circle, radius: float) -> Points:
+    angles = np.linspace(0, 2 * np.pi, CORNERS_OF_CIRCLE, endpoint=False)
+    return np.column_stack([circle.x + radius * np.cos(angles), circle.y + radius * np.sin(angles)])
+
+
+def _around(polygons: list[Rings], margin: float) -> list[Rings]:
+    """The rings at the distance of the margin outside of the polygons. For the eye: the server decides who has left."""
+    if not polygons or not margin:
+        return []
+    area = shapely.union_all([shapely.Polygon(rings[0], rings[1:]) for rings in polygons])
+    wider = shapely.buffer(area, margin)
+    return [
+        [np.asarray(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)]
+        for part in shapely.get_parts(wider)
+        if not part.is_empty
+    ]
+
+
+def _columns(polygons: Sequence[Rings]) -> tuple[list[Any], list[Any]]:
+    """The coordinates x and y as Bokeh has them, in nested lists. Each polygon is a row, for overlaps are no holes."""
+    x, y = ([[[ring[:, axis].tolist() for ring in rings]] for rings in polygons] for axis in (0, 1))
+    return x, y

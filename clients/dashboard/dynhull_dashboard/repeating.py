@@ -1,0 +1,40 @@
+"""Work that is repeated in the background."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+
+from dynhull_client import DynhullError
+
+# What is repeated costs the server time, some of it in proportion to the points. A pause of this many times its
+# duration keeps it below a twentieth of that time.
+PAUSE_FACTOR = 19
+
+log = logging.getLogger(__name__)
+
+
+async def repeat(
+    name: str, work: Callable[[], Awaitable[None]], pause: Callable[[], float], at_once: asyncio.Event | None = None
+) -> None:
+    """Repeat `work` with a pause in between, longer after work that took long; setting `at_once` ends the pause.
+
+    Args:
+        name: what the work is about, for the log.
+        work: may raise DynhullError, which is logged: the watch fails for the same reason, which the page shows.
+        pause: the least pause, in seconds.
+        at_once: cleared before the work begins.
+    """
+    at_once = at_once or asyncio.Event()
+    while True:
+        begun = time.monotonic()
+        try:
+            await work()
+        except DynhullError as error:
+            log.info("%s: %s", name, error)
+        took = time.monotonic() - begun
+        try:
+            await asyncio.wait_for(at_once.wait(), max(pause(), PAUSE_FACTOR * took))
+        except TimeoutError:
+            continue
+        at_once.clear()

@@ -1,0 +1,289 @@
+"""Fences on the dashboard, in a real browser, on a real server."""
+
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+
+import pytest
+from dashboard_process import dashboard_process, opened, wait_for_vertices
+from metrics import measured, scrape
+from patience import wait_until
+from peers import program
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from server_process import Server, run, server_process
+
+from dynhull_client import Circle, HullClient, Polygon
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
+YARD = Polygon([[0, 0], [10, 0], [10, 10], [0, 10]], ([[4, 4], [6, 4], [6, 6], [4, 6]],))
+NUMBERS = count(1)
+PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+# Fences are in the reference geometry so far, and not in the kernel.
+
+WRAP = ("env", "DYNHULL_KERNEL=python")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A real Chromium."""
+    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[tuple[Server, str]]:
+    """A server, and the address of its metrics."""
+    with measured(wrap=WRAP) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def url(server: tuple[Server, str]) -> Iterator[str]:
+    with dashboard_process(server[0].address) as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def client(server: tuple[Server, str]) -> Iterator[HullClient]:
+    with HullClient(server[0].address) as client:
+        yield client
+
+
+@pytest.fixture
+def name() -> str:
+    """A prefix of the test's own, short enough for the picture."""
+    return f"t{next(NUMBERS)}"
+
+
+@pytest.fixture
+def fleet(client: HullClient, name: str) -> str:
+    """A hull with a key in the yard, one in its hole, and one outside."""
+    client.create_hull(f"{name}/fleet", keyed="str")
+    client.put(f"{name}/fleet", ["in", "hole", "out"], [[1, 2], [5, 5], [20, 2]])
+    return f"{name}/fleet"
+
+
+@pytest.fixture
+def yard(client: HullClient, name: str, fleet: str) -> str:
+    """A fence with a hole and a margin around some of the fleet."""
+    client.create_fence(f"{name}/yard", YARD, fleet, margin=1)
+    return f"{name}/yard"
+
+
+def events(page: Page) -> Locator:
+    """The rows of the list of events."""
+    return page.locator(".events tbody tr")
+
+
+def table_row(page: Page, fence: str) -> Locator:
+    return page.locator(".table").get_by_role("row").filter(has_text=fence)
+
+
+def description(page: Page) -> Locator:
+    return page.get_by_role("group", name="Picture of the hulls")
+
+
+def pick(page: Page, fence: str) -> None:
+    page.get_by_label("Pick fences").fill(fence)
+    page.get_by_label("Pick fences").press("Enter")
+
+
+def let_go(page: Page, name: str) -> None:
+    page.get_by_role("button", name=f"Remove {name}", exact=True).click()
+
+
+def wait_for_source(page: Page, name: str, what: str, expected: object) -> None:
+    """Wait until an expression of the columns of a data source in the picture has this value."""
+    page.wait_for_function(
+        f"""([name, expected]) => {{
+            const drawn = Bokeh.documents[0]?.get_model_by_name("plane")?.renderers
+                .find(renderer => renderer.data_source.name == name)?.data_source.data
+            const found = ({{xs, ys, x, y, key, label}}) => {what}
+            return drawn && JSON.stringify(found(drawn)) == JSON.stringify(expected)
+        }}""",
+        arg=[name, expected],
+    )
+
+
+def wait_for_inside(page: Page, fence: str, places: dict[str, list[float]]) -> None:
+    """Wait until these keys are marked as inside, each at its place."""
+    what = "Object.fromEntries(key.map((text, row) => [text, [x[row], y[row]]]))"
+    wait_for_source(page, f"inside of {fence}", what, places)
+
+
+def test_areas_of_every_kind_and_who_is_inside(
+    browser: Browser, url: str, client: HullClient, name: str, fleet: str, yard: str
+) -> None:
+    pack, pond, herd = f"{name}/pack", f"{name}/pond", f"{name}/herd"
+    client.create_hull(pack)
+    client.apply(pack, insert=SQUARE)
+    client.create_fence(pond, Circle(20, 0, 3), fleet)
+    client.create_fence(herd, pack, fleet, margin=2)
+    with opened(browser, url, fences=[yard, pond, herd]) as page:
+        # The hulls of the fences come along.
+        wait_for_vertices(page, pack, SQUARE)
+        wait_for_inside(page, yard, {"in": [1, 2]})
+        wait_for_inside(page, pond, {"out": [20, 2]})
+        wait_for_inside(page, herd, {"in": [1, 2]})
+        wait_for_source(page, f"area of {yard}", "xs", [[[[0, 10, 10, 0], [4, 6, 6, 4]]]])
+        wait_for_source(page, f"margin of {yard}", "[Math.min(...xs.flat(3)), Math.max(...ys.flat(3))]", [-1, 11])
+        wait_for_source(page, f"area of {pond}", "[Math.min(...xs.flat(3)), Math.max(...xs.flat(3))]", [17, 23])
+        wait_for_source(page, f"area of {herd}", "[xs, ys]", [[[[[0, 4, 4, 0]]]], [[[[0, 0, 4, 4]]]]])
+        wait_for_source(page, f"margin of {herd}", "Math.max(...xs.flat(3))", 6)
+        wait_for_source(page, "names of fences", "label.toSorted()", sorted([yard, pond, herd]))
+        # The area moves, and so do those inside.
+        client.apply(pack, delete=[[4, 0], [4, 4]], insert=[[30, 0], [30, 4]])
+        client.put(fleet, ["in", "hole"], [[3, 3], [5, 3]])
+        wait_for_source(page, f"area of {herd}", "xs", [[[[0, 30, 30, 0]]]])
+        wait_for_inside(page, herd, {"hole": [5, 3], "in": [3, 3], "out": [20, 2]})
+        wait_for_inside(page, yard, {"hole": [5, 3], "in": [3, 3]})
+        expect(table_row(page, herd).locator("td")).to_have_text(
+            [f"hull {pack}", fleet, "3 of 3", "3", "none", "margin 2"]
+        )
+        expect(table_row(page, pond).locator("td").first).to_have_text("circle around (20, 0), radius 3")
+        dashes = [path.get_attribute("stroke-dasharray") for path in page.locator(".fences path[stroke]").all()]
+        assert len({*dashes}) == 3, "only their names distinguish them"
+
+
+def test_events_are_listed_as_they_happen(
+    browser: Browser, url: str, client: HullClient, fleet: str, yard: str
+) -> None:
+    with opened(browser, url, fences=[yard]) as page:
+        expect(events(page)).to_have_count(1)
+        expect(events(page).locator(".subject")).to_have_text("1 key inside: in")
+        client.put(fleet, ["out", "new <b>"], [[2, 2], [8, 8]])
+        client.remove(fleet, ["in"])
+        expect(events(page).locator(".type")).to_have_text(["☆ exit", "★ enter", "★ enter", "≡ snapshot"])
+        expect(events(page).locator(".subject")).to_have_text(["in", "out", "new <b>", "1 key inside: in"])
+        expect(events(page).locator(".cause")).to_have_text(
+            ["it was removed", "it moved", "it is new", "the fence is new"]
+        )
+        expect(events(page).locator(".fence").first).to_have_text(yard)
+        # A key of the list is found in the picture, by keyboard, too.
+        kept = events(page).get_by_role("button", name="new <b>")
+        kept.focus()
+        client.replace_fence(yard, [[7, 7], [9, 7], [9, 9], [7, 9]], fleet)
+        expect(events(page).first.locator(".cause")).to_have_text("the fence changed")
+        expect(kept).to_be_focused()  # new rows move nothing
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("list", name="Where the key is").locator("li").first).to_contain_text("new <b> is")
+        wait_for_source(page, f"area of {yard}", "xs", [[[[7, 9, 9, 7]]]])
+
+
+def test_fences_are_picked_and_let_go_and_watched_once_for_all(
+    browser: Browser, server: tuple[Server, str], url: str, fleet: str, yard: str
+) -> None:
+    with opened(browser, url, "nothing") as one, opened(browser, url, "nothing") as two:
+        expect(one.get_by_role("heading", name="Events")).to_be_hidden()
+        before = scrape(server[1])["dynhull_watchers"]
+        for page in (one, two):
+            pick(page, yard)
+            wait_for_inside(page, yard, {"in": [1, 2]})
+            expect(page.get_by_role("heading", name="Events")).to_be_visible()
+        # One of the fence, and one of the hull that came with it.
+        wait_until(lambda: scrape(server[1])["dynhull_watchers"] == before + 2)
+        for page in (one, two):
+            let_go(page, yard)
+            let_go(page, fleet)
+            expect(page.get_by_role("heading", name="Events")).to_be_hidden()
+        wait_until(lambda: scrape(server[1])["dynhull_watchers"] == before)
+
+
+def test_a_hull_brings_its_fences(browser: Browser, url: str, fleet: str, yard: str) -> None:
+    with opened(browser, url, fleet) as page:
+        wait_for_inside(page, yard, {"in": [1, 2]})
+        let_go(page, yard)
+        expect(table_row(page, yard)).to_have_count(0)
+
+
+def test_the_fences_in_words(browser: Browser, url: str, client: HullClient, fleet: str, yard: str) -> None:
+    client.put(fleet, ["out"], [[2, 2]])
+    with opened(browser, url, fleet, fences=[yard]) as page:
+        expect(description(page)).to_have_accessible_description(
+            f"{fleet}: a convex polygon with 3 vertices around 3 points, x from 1 to 5, y from 2 to 5, at revision 2. "
+            f"Fence {yard}: polygon, 8 corners, 1 hole, margin 1. 2 of 3 keys of {fleet} inside: in, out. Last event: "
+            "out entered, since it moved."
+        )
+
+
+def test_a_fence_that_is_unknown_deleted_and_created_again(
+    browser: Browser, url: str, client: HullClient, fleet: str, name: str
+) -> None:
+    fence = f"{name}/<i>late"
+    with opened(browser, url, fences=[fence]) as page:
+        expect(page.get_by_role("status")).to_have_text(
+            f"The server has no fence {fence}. Check the name, or pick another fence above."
+        )
+        expect(table_row(page, fence)).to_contain_text("No such fence. Check the name, or create the fence")
+        let_go(page, fence)
+        fence = f"{name}/late"
+        pick(page, fence)
+        expect(table_row(page, fence)).to_contain_text("No such fence.")
+        client.create_fence(fence, YARD, fleet)
+        wait_for_inside(page, fence, {"in": [1, 2]})
+        client.delete_fence(fence)
+        expect(table_row(page, fence)).to_contain_text("Deleted. Remove it above, or create it again")
+        expect(events(page).locator(".type")).to_have_text(["✕ closed", "≡ snapshot"])
+        wait_for_source(page, f"area of {fence}", "xs", [])
+        wait_for_inside(page, fence, {})
+        client.create_fence(fence, Circle(20, 2, 1), fleet)
+        wait_for_inside(page, fence, {"out": [20, 2]})
+        expect(events(page).locator(".type")).to_have_text(["≡ snapshot", "✕ closed", "≡ snapshot"])
+
+
+def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
+    kept = "--data", str(tmp_path)
+    with server_process(*kept, killed=True, wrap=WRAP) as first, HullClient(first.address) as client:
+        client.create_hull("zone")
+        client.apply("zone", insert=SQUARE)
+        client.create_hull("fleet", keyed="str")
+        client.put("fleet", ["a", "b", "c", "d", "e"], [[1, 1], [9, 9], [9, 0], [0, 9], [5, 5]])
+        with dashboard_process(first.address) as url, opened(browser, url, "fleet") as page:
+            hint = page.locator(".hint")
+            expect(hint).to_contain_text(
+                "The server has no fences yet. Make one: dynhull fences create NAME --area HULL"
+            )
+            advice = (
+                hint.text_content().rpartition("dynhull ")[2].replace("KEYED_HULL", "fleet").replace("HULL", "zone")
+            )
+            assert run(*advice.split()).returncode == 0
+            wait_for_inside(page, "NAME", {"a": [1, 1]})
+            expect(hint).to_be_hidden()
+            expect(table_row(page, "NAME").locator(".state")).to_have_text("Pick zone above to see the area")
+            first.process.kill()
+            expect(page.get_by_role("alert")).to_contain_text(f"No connection to {first.address}")
+            expect(table_row(page, "NAME")).to_contain_text("Connection lost")
+            with server_process(*kept, "--port", first.address.split(":")[1], wrap=WRAP):
+                expect(page.get_by_role("alert")).to_be_hidden(timeout=20_000)
+                client.put("fleet", ["b"], [[2, 2]], timeout=20)
+                expect(events(page).locator(".subject")).to_have_text(["b", "1 key inside: a"])
+                wait_for_inside(page, "NAME", {"a": [1, 1], "b": [2, 2]})
+
+
+def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullClient, fleet: str, yard: str) -> None:
+    with opened(browser, url, fences=[yard], **PHONE) as page:
+        wait_for_inside(page, yard, {"in": [1, 2]})
+        client.put(fleet, ["x" * 60], [[2, 2]])
+        expect(events(page)).to_have_count(2)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        assert page.locator(".events .scroll").evaluate("each => each.scrollWidth <= each.clientWidth")
+        assert events(page).first.bounding_box()["height"] < 150
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_list_has_contrast(browser: Browser, url: str, yard: str, scheme: str) -> None:
+    contrast = """([over, under]) => {
+        const light = colour => colour.match(/[0-9.]+/g).slice(0, 3).map(each => each / 255)
+            .map(each => each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4)
+            .reduce((sum, each, i) => sum + each * [0.2126, 0.7152, 0.0722][i], 0)
+        const [low, high] = [light(over), light(under)].sort((one, two) => one - two)
+        return (high + 0.05) / (low + 0.05)
+    }"""
+    with opened(browser, url, fences=[yard], color_scheme=scheme) as page:
+        for part in (".type", ".when", ".cause", ".subject"):
+            ink = events(page).first.locator(part).evaluate("each => getComputedStyle(each).color")
+            paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
+            assert page.evaluate(contrast, [ink, paper]) >= 4.5, part
