@@ -47,8 +47,10 @@ def explain(
             help="The file to write: .html (a page to step through), .png or .svg (a sheet) or .gif (an animation).",
         ),
     ] = Path("dynhull-explain.html"),
-    x: Annotated[str | None, typer.Option(help="Column of x. Default: x, lon or longitude.")] = None,
-    y: Annotated[str | None, typer.Option(help="Column of y. Default: y, lat or latitude.")] = None,
+    x: Annotated[
+        str | None, typer.Option(help="Column of x. Default: x, lon, lng, long, longitude or easting.")
+    ] = None,
+    y: Annotated[str | None, typer.Option(help="Column of y. Default: y, lat, latitude or northing.")] = None,
     collinear: Annotated[
         Boundary, typer.Option(help="Boundary points that are not vertices; a static algorithm only.")
     ] = Boundary.DROP,
