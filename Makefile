@@ -100,6 +100,7 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/server/torture.py --faults 100
 	$(BIN)/python tests/robustness/server/callers.py --calls 10000 --kills 5
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
+	$(BIN)/python tests/robustness/fences/fence_torture.py --steps 1000000
 
 SEED ?= 1
 MUTANTS ?= 200

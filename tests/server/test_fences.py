@@ -6,7 +6,7 @@ from pathlib import Path
 
 import grpc
 import pytest
-from patience import PATIENCE
+from patience import PATIENCE, wait_until
 from refusal import refusal
 from server_process import server_process
 
@@ -414,3 +414,78 @@ def test_fences_survive_a_kill(tmp_path: Path, name: str) -> None:
         (left,) = events(fences, fence, after=2)
         assert told(left) == "EXIT b SUBJECT_MOVED"
         assert left.time.ToMicroseconds() >= before[-1].time.ToMicroseconds()
+
+
+def test_a_prefix_takes_in_hulls_that_come_and_go(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    put(stub, fleet, a=(1, 1), b=(9, 9))
+    made = create(fences, name, circle_area={"radius": 5}, subject_prefix=f"{name}/", margin=1)
+    assert (made.subject_count, made.inside_count) == (2, 1)
+    other = f"{name}/other"
+    stub.CreateHull(pb.CreateHullRequest(name=other, config={"identity": "IDENTITY_STRING_KEYS"}))
+    stub.CreateHull(pb.CreateHullRequest(name=f"{name}/points"))  # has no keys
+    put(stub, other, a=(2, 2), c=(8, 8))
+    put(stub, fleet, b=(0, 0))
+    stub.DeleteHull(pb.DeleteHullRequest(name=other))
+    found = events(fences, name, after=1)
+    assert [(told(event), event.subject_hull) for event in found] == [
+        ("ENTER a SUBJECT_APPEARED", other),
+        ("ENTER b SUBJECT_MOVED", fleet),
+        ("EXIT a SUBJECT_REMOVED", other),
+    ]
+    assert not found[2].HasField("position")
+    assert found[2].previous_position.x == 2
+    assert fences.GetFence(fs.GetFenceRequest(name=name)).fence.subject_count == 2
+    missing = refused_by(stub.GetHull, pb.GetHullRequest(name=f"{name}/nobody"))
+    assert missing.reason == "HULL_NOT_FOUND"
+
+
+def test_hulls_as_wholes_begin_and_cease_to_be_near(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, zone: str, fleet: str
+) -> None:
+    for fence, near in ((f"{name}/meet", 0), (f"{name}/near", 2)):
+        create(fences, fence, hull_area={"name": zone}, other_hull=fleet, near_distance=near)
+    put(stub, fleet, a=(13, 5))
+    put(stub, fleet, a=(12, 5))
+    insert(stub, zone, 12, 5)
+    delete(stub, zone, 12, 5)
+    remove(stub, fleet, "a")
+    met, near = (events(fences, f"{name}/{each}", after=1) for each in ("meet", "near"))
+    assert [told(event) for event in met] == ["BEGIN AREA_MOVED", "CEASE AREA_MOVED"]
+    assert [told(event) for event in near] == ["BEGIN SUBJECT_MOVED", "CEASE SUBJECT_MOVED"]
+    assert [event.distance for event in (*met, *near)] == [0.0, 2.0, 2.0, float("inf")]
+    assert {event.subject_hull for event in met} == {fleet}
+    keys = (
+        fences.CreateFence,
+        fs.CreateFenceRequest(
+            name=f"{name}/bad", config={"hull_area": {"name": zone}, "other_hull": fleet, "margin": 1}
+        ),
+    )
+    assert refused_by(*keys).metadata["field"] == "config.margin"
+
+
+def test_old_events_are_dropped_and_consumers_hear_of_it(tmp_path: Path, name: str) -> None:
+    """What had to go is counted for each consumer, and a watch says which events it lacks."""
+    fence, fleet = f"{name}/fence", f"{name}/fleet"
+    with server_process("--data", str(tmp_path), wrap=WRAP) as server, grpc.insecure_channel(server.address) as channel:
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name=fleet, config={"identity": "IDENTITY_STRING_KEYS"}))
+        create(fences, fence, circle_area={"radius": 5}, subject_hull=fleet, max_events=3)
+        put(stub, fleet, a=(1, 0))
+        fences.AckFence(fs.AckFenceRequest(name=fence, consumer="mail", sequence=2))
+        for x in (9, 2, 8, 3, 7):
+            put(stub, fleet, a=(x, 0))
+        wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=fence)).fence.first_sequence == 5)
+    with server_process("--data", str(tmp_path), wrap=WRAP) as server, grpc.insecure_channel(server.address) as channel:
+        fences = FenceServiceStub(channel)
+        found = fences.GetFence(fs.GetFenceRequest(name=fence)).fence
+        assert (found.first_sequence, found.last_sequence) == (5, 7)
+        assert [(each.lost, each.backlog) for each in found.consumers] == [(2, 3)]
+        watch = fences.WatchFence(fs.WatchFenceRequest(name=fence, consumer="mail"), timeout=PATIENCE)
+        assert next(watch).sequence == 2
+        response = next(watch)
+        watch.cancel()
+        assert (response.lost.first_sequence, response.lost.last_sequence) == (3, 4)
+        assert [event.sequence for event in response.events] == [5, 6, 7]
+        assert inside(fences, fence) == []

@@ -236,7 +236,7 @@ class Engine:
 
     async def delete(self, name: str) -> None:
         """Delete the hull of that name, or raise HullNotFoundError or NotStoredError."""
-        await self.ask(DeleteHull(Waiter(), name))
+        await self.ask(DeleteHull(Waiter(), name, self.time()))
 
     async def apply(self, name: str, request: WriteBatch, *, create: bool) -> Applied:
         """Apply a batch as the next revision of a hull, or raise the error that refuses it.

@@ -141,6 +141,8 @@ def _refuse_contradictions(config: FenceConfig) -> None:
     if config.near and config.kind != "other":
         raise InvalidFieldError("config.near_distance", config.near, "only with other_hull")
     area = config.area
+    if config.kind == "other":
+        _refuse_for_other_hull(config)
     if isinstance(area, HullArea) and area.without_self:
         field = "config.hull_area.without_self"
         if config.kind != "hull" or area.name != config.subjects:
@@ -150,14 +152,31 @@ def _refuse_contradictions(config: FenceConfig) -> None:
         if not config.closed:
             raise InvalidFieldError("config.boundary", "FENCE_BOUNDARY_OPEN", "closed with without_self")
     for field, value in (
-        ("config.subject_prefix", config.subjects if config.kind == "prefix" else ""),
-        ("config.other_hull", config.subjects if config.kind == "other" else ""),
         ("config.dwell", config.dwell),
         ("config.confirmations", config.confirmations),
         ("config.min_dwell", config.min_dwell),
     ):
         if value:
             raise InvalidFieldError(field, value, NOT_YET)
+
+
+def _refuse_for_other_hull(config: FenceConfig) -> None:
+    """Raise InvalidFieldError if a fence around another hull has settings for keys."""
+    if not isinstance(config.area, HullArea):
+        raise InvalidFieldError("config.other_hull", config.subjects, "the area is then a hull, too: a hull_area")
+    if config.area.name == config.subjects:
+        raise InvalidFieldError("config.other_hull", config.subjects, "must be another hull than the area")
+    if not config.closed:
+        raise InvalidFieldError("config.boundary", "FENCE_BOUNDARY_OPEN", "hulls that touch intersect")
+    for field, value in (
+        ("config.margin", config.margin),
+        ("config.report_crosses", config.crosses),
+        ("config.confirmations", config.confirmations),
+        ("config.min_dwell", config.min_dwell),
+        ("config.dwell", config.dwell),
+    ):
+        if value:
+            raise InvalidFieldError(field, value, "only for fences that compare keys")
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,6 +64,7 @@ from .events import (
 from .fences.fence import Fence
 from .fences.line import Line
 from .fences.line_trip import Ground, LineTrip
+from .fences.pair import Pair
 from .fences.queues import components, merged
 from .fences.requests import (
     PREFIX,
@@ -82,7 +83,7 @@ from .fences.subjects import Subjects
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import Append, HullRow, Kept, Record
+from .records import DEFAULT, Append, HullRow, Kept, Record
 from .trip import Leg, Place, Trip, write
 
 if TYPE_CHECKING:
@@ -110,16 +111,18 @@ class _Queue:
         name: the name, or one of those of the line.
         hull: the committed hull of that name, or None. None for a line.
         line: the fences of several hulls that share the queue, or None.
+        guests: names that begin with the prefix of a fence, and have no hull so far; None for none.
         trip: the trip in progress, or None.
         waiting: the requests for later trips. While there is no trip, the first one waits in other queues, too.
     """
 
-    __slots__ = ("hull", "line", "name", "trip", "waiting")
+    __slots__ = ("guests", "hull", "line", "name", "trip", "waiting")
 
     def __init__(self, name: str, hull: Hull | None = None, line: Line | None = None) -> None:
         self.name = name
         self.hull = hull
         self.line = line
+        self.guests: set[str] | None = None
         self.trip: Trip | None = None
         self.waiting: list[Request] = []
 
@@ -157,6 +160,8 @@ class Core:
         self._queues: dict[str, _Queue] = {}
         self._hulls: SortedDict[str, Hull] = SortedDict()
         self._fences: SortedDict[str, Fence] = SortedDict()
+        # The prefixes of fences, by the names of their queues; also of those that are being created.
+        self._prefixes: dict[str, str] = {}
         self._creating = self._fencing = 0
         self._trips = 0
         self._stopping = False
@@ -261,6 +266,10 @@ class Core:
             fence.restored(each)
             config = each.row.config
             fence.area = None if config.area_hull is None else self.get(config.area_hull)
+            if config.kind == "prefix":
+                self._prefixes[PREFIX + fence.name] = config.subjects
+            if config.kind == "other" and fence.area is not None:
+                fence.pair = Pair(fence.area, self.get(config.subjects), config.near)
             for name in self._compared(fence):
                 if name not in subjects:
                     subjects[name] = Subjects(self.get(name))
@@ -270,6 +279,10 @@ class Core:
         self._adopt(restore(subjects.values(), {}, {each.row.number: each for each in kept}), subjects)
         queues = list(self._queues.values()) + [self._queue(PREFIX + each.row.name) for each in kept]
         self._regroup(queues, self._fences.values())
+        for fence in self._fences.values():
+            if fence.pair is not None:
+                fence.pair.look()
+                fence.count_inside()
 
     # Requests
 
@@ -312,18 +325,37 @@ class Core:
                 names.append(config.area_hull)
             if config.kind != "prefix":
                 names.append(config.subjects)
+            elif isinstance(request, CreateFence):
+                names += self._overlapping(config.subjects)
         return tuple(names)
+
+    def _overlapping(self, prefix: str) -> list[str]:
+        """The names of queues that a fence with this prefix joins: of hulls with it, and of fences that meet it."""
+        meets = [name for name, each in self._prefixes.items() if each.startswith(prefix) or prefix.startswith(each)]
+        return meets + [name for name in self._queues if name.startswith(prefix) and not name.startswith(PREFIX)]
 
     def _compared(self, fence: Fence) -> list[str]:
         """The names of the hulls whose keys a fence compares."""
         config = fence.row.config
-        return [config.subjects] if config.kind == "hull" else []
+        if config.kind != "prefix":
+            return [config.subjects] if config.kind == "hull" else []
+        names = [name for name in self._hulls.irange(config.subjects) if name.startswith(config.subjects)]
+        return [name for name in names if self._hulls[name].row.settings.identity != "multiset"]
 
     def _queue(self, name: str) -> _Queue:
         queue = self._queues.get(name)
         if queue is None:
-            queue = self._queues[name] = _Queue(name)
+            queue = self._queues[name] = self._line_queue(name) or _Queue(name)
         return queue
+
+    def _line_queue(self, name: str) -> _Queue | None:
+        """The queue of a fence whose prefix a new name has; None if there is none."""
+        for key, prefix in self._prefixes.items():
+            if name.startswith(prefix):
+                queue = self._queues[key]
+                queue.guests = (queue.guests or set()) | {name}
+                return queue
+        return None
 
     def _read(self, queue: _Queue, request: ReadHull) -> None:
         """Run a small read. It needs no trip while the queue is idle."""
@@ -382,6 +414,8 @@ class Core:
                 left += self._refuse_waiting(queue, error, effects)
             while queue.trip is None and queue.waiting:
                 first = queue.waiting[0]
+                if isinstance(first, CreateFence) and first.config.kind == "prefix":
+                    left += self._complete(first)
                 together = self._at(_names(first)) if isinstance(first, SPANNING) else [queue]
                 if not all(each.trip is None and each.waiting and each.waiting[0] is first for each in together):
                     break  # the last of these queues that comes so far begins it
@@ -390,6 +424,21 @@ class Core:
                     trip = self._begin(together, requests, rows, effects)
                     left += [each for each in trip.queues if each is not queue]
             self._rest(queue)
+
+    def _complete(self, request: CreateFence) -> list[_Queue]:
+        """Let a request wait in queues that it joins and that are newer. Returns these queues.
+
+        Once it is the first in its older queues, it becomes the first there: so it is everywhere in front of requests
+        that wait behind it anywhere.
+        """
+        if not all(queue.waiting and queue.waiting[0] is request for queue in self._at(request.names)):
+            return []
+        names = [name for name in self._overlapping(request.config.subjects) if name not in request.names]
+        queues = [queue for queue in self._at(names) if request not in queue.waiting]
+        for queue in queues:
+            queue.waiting.insert(0, request)
+        request.names += tuple(names)
+        return queues
 
     def _taken(self, queues: list[_Queue]) -> tuple[list[Request], int]:
         """The requests of the next trip to these queues, and their points."""
@@ -469,7 +518,10 @@ class Core:
         if trip.place is not None:
             self._creating -= 1
         if isinstance(trip, LineTrip):
+            if trip.creates:
+                self._end_creation(trip)
             self._fencing -= trip.creates
+            self._creating -= len(trip.places)
         for queue in trip.queues:
             queue.trip = None
             if queue.hull is not None:
@@ -481,10 +533,24 @@ class Core:
 
     def _rest(self, queue: _Queue) -> None:
         """Remove the queue of a name that has neither a hull nor work."""
-        if queue.hull is not None or queue.line is not None or queue.trip is not None or queue.waiting:
+        if queue.hull is not None or queue.trip is not None or queue.waiting:
+            return
+        if queue.line is not None:
+            if queue.guests is not None:
+                self._dismiss_guests(queue, queue.line, queue.guests)
             return
         if self._queues.get(queue.name) is queue:  # it has not become part of a line
             del self._queues[queue.name]
+
+    def _dismiss_guests(self, queue: _Queue, line: Line, guests: set[str]) -> None:
+        """Forget the names without a hull; the others stay."""
+        queue.guests = None
+        for name in guests:
+            if name in self._hulls:
+                line.names[name] = None
+            else:
+                line.names.pop(name, None)
+                del self._queues[name]
 
     # Commits
 
@@ -505,6 +571,8 @@ class Core:
                 queue = self._queues[leg.name]
                 if queue.line is None:
                     queue.hull = after
+                else:
+                    queue.guests = (queue.guests or set()) | {leg.name}
                 if before is not None:
                     before.ended = True
                     del self._hulls[leg.name]
@@ -574,9 +642,8 @@ class Core:
         hulls: list[tuple[int, Callable[[Kept], HullState]]] = []
         for leg in trip.legs:
             hull = leg.before or leg.after
-            assert hull is not None  # a trip without a hull changes nothing
-            load = partial(HullState, self._limits, hull.row.settings, now=self._now)
-            hulls.append((hull.row.number, load))
+            number, settings = (0, DEFAULT) if hull is None else (hull.row.number, hull.row.settings)
+            hulls.append((number, partial(HullState, self._limits, settings, now=self._now)))
         if isinstance(trip, LineTrip):
             self._examine_fences(trip, hulls, effects)
         else:
@@ -665,13 +732,36 @@ class Core:
             self._fencing += 1
             if len(self._fences) + self._fencing > most:
                 refusal = LimitExceededError("max_fences", most)
-        ground = Ground(lines, fences, number, refusal, self._limits.fences)
+            if requests[0].config.kind == "prefix":
+                self._prefixes.setdefault(PREFIX + requests[0].name, requests[0].config.subjects)
+        births = {
+            name
+            for request in requests
+            if isinstance(request, CreateHull | WriteBatch) and request.birth is not None
+            for name in _names(request)
+            if name not in self._hulls
+        }
+        places: dict[str, Place] = {}
+        for name in sorted(births):
+            places[name] = Place(self._next_number, self._no_more_hulls(), self._limits)
+            self._next_number += 1
+            self._creating += 1
+        ground = Ground(lines, places, fences, number, refusal, self._limits.fences)
         legs = [Leg(name, self._hulls.get(name), keeps=self._keeps) for name in names]
         return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)
+
+    def _end_creation(self, trip: LineTrip) -> None:
+        """Forget the prefix of a fence that was not created after all."""
+        for key in [key for key in self._prefixes if key.removeprefix(PREFIX) not in self._fences]:
+            if any(queue.name == key for queue in trip.queues):
+                del self._prefixes[key]
+                fences = {fence.name: fence for line in trip.lines for fence in line.fences.values()}
+                trip.queues = self._regroup(trip.queues, fences.values(), trip)
 
     def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
         """Publish what a trip has committed of fences, and join or part the queues."""
         stirred = []
+        trip.dismiss()
         for leg in trip.fence_legs.values():
             fence = leg.fence
             if leg.created:
@@ -681,6 +771,7 @@ class Core:
             leg.publish()
             if leg.deleted:
                 del self._fences[fence.name]
+                self._prefixes.pop(PREFIX + fence.name, None)
                 for subjects in fence.subjects.values():
                     subjects.dropped(fence)
             if leg.events:
@@ -697,14 +788,20 @@ class Core:
 
         None of the queues has another trip. Their requests keep their order.
         """
-        names = [name for queue in queues for name in ([queue.name] if queue.line is None else queue.line.names)]
+        names = dict.fromkeys(
+            name
+            for queue in queues
+            for name in (*([queue.name] if queue.line is None else queue.line.names), *(queue.guests or ()))
+        )
         waiting = merged([queue.waiting for queue in queues])
         for queue in queues:
             queue.waiting = []
         made: list[_Queue] = []
-        for group, of_group in components(names, fences):
+        for group, of_group in components(list(names), fences):
             if of_group:
                 queue = _Queue(PREFIX + of_group[0].name, line=Line(of_group, group))
+                guests = {name for name in group if name not in self._hulls and not name.startswith(PREFIX)}
+                queue.guests = guests or None
             else:
                 (name,) = group
                 queue = _Queue(name, self._hulls.get(name))
@@ -713,7 +810,8 @@ class Core:
             self._queues |= dict.fromkeys(group, queue)
         for request in waiting:
             for queue in self._at(_names(request)):
-                queue.waiting.append(request)
+                if queue in made:  # in others it has never ceased to wait
+                    queue.waiting.append(request)
         return made
 
     def _examine_fences(
@@ -721,8 +819,11 @@ class Core:
     ) -> None:
         """Read the fences that the trip concerns together with its hulls."""
         touched = trip.touched()
-        numbers = sorted({number for subjects in touched.values() for number in subjects.fences})
-        numbers += sorted(trip.fence_legs.keys() - set(numbers))
+        numbers = sorted(
+            {number for subjects in touched.values() for number in subjects.fences}
+            | trip.fence_legs.keys()
+            | trip.pairs()
+        )
 
         def restored(states: "list[HullState | None]", kept: "list[KeptFence | None]") -> Restored | None:
             if trip.unknown and trip.landed(states, kept):
@@ -744,6 +845,10 @@ class Core:
             fence = self._fences[kept.row.name]
             fence.restored(kept)
             fence.area = None if kept.row.config.area_hull is None else self.get(kept.row.config.area_hull)
+            if fence.pair is not None and fence.area is not None:
+                fence.pair = Pair(fence.area, fence.pair.other, fence.row.config.near)
+                fence.pair.look()
+                fence.count_inside()
         self._adopt(restored, trip.touched())
         fences = {fence.name: fence for line in trip.lines for fence in line.fences.values()}
         trip.queues = self._regroup(trip.queues, fences.values(), trip)
@@ -752,8 +857,8 @@ class Core:
         """Give subjects their restored indexes."""
         for name, index in restored.indexes.items():
             subjects[name].index = index
-            for fence in subjects[name].fences.values():
-                fence.inside = sum(each.index.count(fence.number) for each in fence.subjects.values())
+        for fence in {fence.number: fence for each in subjects.values() for fence in each.fences.values()}.values():
+            fence.count_inside()
 
     # Time and shutdown
 

@@ -64,9 +64,15 @@ class CreateHull(Request):
 
 @dataclass(slots=True, eq=False)
 class DeleteHull(Request):
-    """Delete a hull."""
+    """Delete a hull.
+
+    Attributes:
+        name: its name.
+        time: the server's clock, in microseconds since 1970.
+    """
 
     name: str
+    time: int = 0
 
 
 @dataclass(slots=True, eq=False)

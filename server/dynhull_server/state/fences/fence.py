@@ -9,6 +9,7 @@ from .records import Consumer, FenceEvent, FenceRow, KeptFence
 
 if TYPE_CHECKING:
     from ..hull import Hull
+    from .pair import Pair
     from .subjects import Subjects
 
 # Bytes that an event takes in memory, about, without the keys of a snapshot.
@@ -25,7 +26,8 @@ class Fence:
     Attributes:
         row: its identity and settings, as stored.
         area: the hull that is its area, or None.
-        subjects: the hulls whose keys it compares, by name.
+        subjects: the hulls whose keys it compares, by name; replaced as a whole where it changes.
+        pair: the two hulls that it compares as wholes, or None.
         last: the sequence of the last committed event, 0 before the first.
         first: the sequence of the oldest event that is kept; last + 1 if none is.
         time: the time of the last event, NO_TIME before the first.
@@ -39,6 +41,7 @@ class Fence:
         self.row = row
         self.area: Hull | None = None
         self.subjects: dict[str, Subjects] = {}
+        self.pair: Pair | None = None
         self.last = 0
         self.first = 1
         self.time = NO_TIME
@@ -64,6 +67,13 @@ class Fence:
     def subject_count(self) -> int:
         """The number of keys that it compares. O(hulls)."""
         return sum(each.hull.counts.points for each in self.subjects.values())
+
+    def count_inside(self) -> None:
+        """Count the subjects that are inside."""
+        if self.pair is not None:
+            self.inside = int(self.pair.near)
+        else:
+            self.inside = sum(each.index.count(self.number) for each in self.subjects.values())
 
     def restored(self, kept: KeptFence) -> None:
         """Take over what the storage has; who is inside belongs to the subjects."""

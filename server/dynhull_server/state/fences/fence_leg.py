@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 
 from dynhull import Crossings
-from dynhull.keys import key_list
+from dynhull.keys import PackedKeys, key_list
 
 from ..changes import FenceChange
 from ..records import NO_TIME
 from .fence import Fence
+from .pair import Pair
 from .records import (
     AddFence,
     AppendEvents,
@@ -27,6 +28,8 @@ from .records import (
 )
 from .subjects import Subjects, keyed
 
+# A cause as the index knows it, and what it is here.
+Swap = tuple[Cause, Cause]
 TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS}
 
 
@@ -39,6 +42,7 @@ class FenceLeg:
     Attributes:
         fence: the fence.
         row: its identity and settings after the trip.
+        area, pair: the hull that is its area, and the two hulls that it compares, after the trip.
         created, deleted: whether the trip creates or deletes it.
         events: the events that it makes.
         consumers: its consumers after the trip.
@@ -49,6 +53,8 @@ class FenceLeg:
     def __init__(self, fence: Fence, *, created: bool = False) -> None:
         self.fence = fence
         self.row: FenceRow = fence.row
+        self.area = fence.area
+        self.pair = fence.pair
         self.created = created
         self.deleted = False
         self.events: list[FenceEvent] = []
@@ -64,14 +70,14 @@ class FenceLeg:
     @property
     def area_revision(self) -> int:
         """The revision of the area's hull, 0 for other areas."""
-        return 0 if self.fence.area is None else self.fence.area.state.counts.revision
+        return 0 if self.area is None else self.area.state.counts.revision
 
     def time(self, now: int) -> int:
         """The time of an event that is made now: never before the one before it."""
         return max(now, self.events[-1].time if self.events else self.fence.time)
 
-    def crossed(self, subjects: Subjects, crossings: Crossings, rows: slice, cause: int, now: int) -> None:
-        """Make an event of each of some crossings, whose causes are `cause` if that is not 0."""
+    def crossed(self, subjects: Subjects, crossings: Crossings, rows: slice, swap: Swap | None, now: int) -> None:
+        """Make an event of each of some crossings; `swap` is a cause, and the one that it stands for."""
         sequence, time = self.last, self.time(now)
         hull, area_revision = subjects.hull, self.area_revision
         revision = hull.state.counts.revision
@@ -95,7 +101,7 @@ class FenceLeg:
                 FenceEvent(
                     sequence,
                     TYPES[change],
-                    _caused(causes, cause),
+                    _caused(causes, swap),
                     hull.name,
                     key,
                     revision,
@@ -131,6 +137,50 @@ class FenceLeg:
                     None,
                     0.0,
                     event_time,
+                    time,
+                )
+            )
+
+    def paired(self, pair: Pair, causes: int, now: int) -> None:
+        """Make the event that two hulls begin or cease to be near."""
+        self.events.append(
+            FenceEvent(
+                self.last + 1,
+                EventType.BEGIN if pair.near else EventType.CEASE,
+                causes,
+                pair.other.name,
+                None,
+                pair.other.state.counts.revision,
+                pair.area.state.counts.revision,
+                None,
+                None,
+                pair.distance,
+                NO_TIME,
+                self.time(now),
+            )
+        )
+
+    def left(self, subjects: Subjects, now: int) -> None:
+        """Make an exit of each subject of a hull that is deleted."""
+        sequence, time = self.last, self.time(now)
+        keys = subjects.index.inside(self.fence.number)
+        points = keyed(subjects.hull.state).positions(keys).tolist()
+        hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
+        for key, (x, y) in zip(key_list(keys), points, strict=True):
+            sequence += 1
+            self.events.append(
+                FenceEvent(
+                    sequence,
+                    EventType.EXIT,
+                    Cause.REMOVED,
+                    hull,
+                    key,
+                    revision,
+                    self.area_revision,
+                    None,
+                    (x, y),
+                    None,
+                    NO_TIME,
                     time,
                 )
             )
@@ -189,21 +239,23 @@ class FenceLeg:
         """Make the changes, which are committed, those of the fence."""
         fence = self.fence
         fence.row, fence.consumers, fence.first = self.row, self.consumers, self.first
+        fence.area, fence.pair = self.area, self.pair
         fence.ended = self.deleted
         if self.events:
             fence.published(self.events)
         if not self.deleted:
-            fence.inside = sum(each.index.count(fence.number) for each in fence.subjects.values())
+            fence.count_inside()
 
 
 def members(fence: Fence) -> Iterator[Members]:
-    """The subjects that are inside, by hull."""
+    """The subjects that are inside, by hull; no keys of a hull that is near as a whole."""
+    if fence.pair is not None and fence.pair.near:
+        yield Members(fence.pair.other.name, PackedKeys(b"", b""), fence.pair.other.state.counts.revision)
     for subjects in fence.subjects.values():
         keys = subjects.index.inside(fence.number)
         if len(keys):
             yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision)
 
 
-def _caused(causes: int, instead: int) -> int:
-    """The causes of a crossing; a replaced area is not one that moved."""
-    return causes & ~Cause.AREA | instead if instead else causes
+def _caused(causes: int, swap: Swap | None) -> int:
+    return causes & ~swap[0] | swap[1] if swap is not None and causes & swap[0] else causes

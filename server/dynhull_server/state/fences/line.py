@@ -7,6 +7,8 @@ from dynhull import Crossings
 
 from ..hull import Hull
 from .fence import Fence
+from .pair import Pair
+from .records import Cause
 from .subjects import Subjects, lay
 
 
@@ -36,21 +38,58 @@ class Line:
         names: the names that share the queue.
         fences: the fences by name.
         subjects: the hulls whose keys are compared, by name.
-        areas: the hulls that are areas, by name.
+        areas: the hulls that are areas of keys, by name.
+        pairs: the fences that compare a hull as a whole with another one, by the names of both.
     """
 
     def __init__(self, fences: Iterable[Fence], names: list[str]) -> None:
-        self.names = names
+        self.names = dict.fromkeys(names)
         self.fences = {fence.name: fence for fence in fences}
         self.subjects: dict[str, Subjects] = {}
         self.areas: dict[str, AreaHull] = {}
+        self.pairs: dict[str, list[Fence]] = {}
         for fence in self.fences.values():
             self.subjects |= fence.subjects
-            if fence.area is not None:
+            if fence.pair is not None:
+                for hull in (fence.pair.area, fence.pair.other):
+                    self.pairs.setdefault(hull.name, []).append(fence)
+            elif fence.area is not None:
                 area = self.areas.setdefault(fence.area.name, AreaHull(fence.area))
                 area.fences[fence.number] = fence
         for area in self.areas.values():
             area.as_of = area.hull.state.hull.changes
+
+    def paired(self, hulls: Iterable[Hull]) -> Iterator[tuple[Fence, Pair, int]]:
+        """The fences around pairs of hulls that begin or cease to be near, now that these have changed, and why."""
+        for fence in {fence.number: fence for hull in hulls for fence in self.pairs.get(hull.name, ())}.values():
+            pair = fence.pair
+            assert pair is not None  # that of a fence in `pairs`
+            area, other = pair.moved()
+            if area or other:
+                before = pair.near
+                pair.look()
+                if pair.near != before:
+                    yield fence, pair, (Cause.AREA if area else 0) | (Cause.MOVED if other else 0)
+
+    def admit(self, hull: Hull) -> None:
+        """Compare the keys of a new hull with the areas of the fences whose prefix its name has."""
+        fences = [fence for fence in self.fences.values() if fence.row.config.kind == "prefix"]
+        fences = [fence for fence in fences if fence.row.config.compares(hull.name)]
+        if not fences or hull.row.settings.identity == "multiset":
+            return
+        subjects = self.subjects[hull.name] = Subjects(hull)
+        for fence in fences:
+            vertices = None if fence.area is None else fence.area.state.vertices()
+            lay(subjects.index, fence.number, fence.row.config, vertices)
+            subjects.fences[fence.number] = fence
+            fence.subjects = fence.subjects | {hull.name: subjects}
+
+    def dismiss(self, name: str) -> None:
+        """Forget the keys of a hull that is deleted, or was not created after all."""
+        subjects = self.subjects.pop(name, None)
+        if subjects is not None:
+            for fence in subjects.fences.values():
+                fence.subjects = {each: value for each, value in fence.subjects.items() if each != name}
 
     def weight(self, name: str) -> int:
         """The number of subjects that a change of a hull may concern beside its own rows."""
@@ -73,7 +112,7 @@ class Line:
                         lay(each.index, fence.number, fence.row.config, vertices)
                     touched |= fence.subjects
                 area.as_of = hull.state.hull.changes
-        for subjects in touched.values():
+        for _, subjects in sorted(touched.items()):
             crossings = subjects.index.take()
             if len(crossings):
                 yield subjects, crossings

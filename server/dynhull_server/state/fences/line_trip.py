@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynhull import Crossings
+from dynhull import Crossings, FenceIndex, KeyedHull
 
 from ..batch import Applied
 from ..changes import Change
@@ -22,15 +22,16 @@ from ..errors import (
     LimitExceededError,
     SequenceAheadError,
 )
-from ..events import DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
+from ..events import CreateHull, DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
 from ..hull import Hull
 from ..hull_state import HullState
 from ..limits import FenceLimits
-from ..trip import Leg, Trip, write
+from ..trip import Leg, Place, Trip, write
 from .config import FenceConfig, PolygonArea
 from .fence import Fence
-from .fence_leg import FenceLeg, members
+from .fence_leg import FenceLeg, Swap, members
 from .line import Line
+from .pair import Pair
 from .records import Cause, Consumer, EventType, FenceRow, Inside, KeptFence
 from .requests import (
     STRUCTURAL,
@@ -46,6 +47,9 @@ from .requests import (
 from .subjects import Subjects, lay
 
 POINT_BYTES = 16
+# The hull removes keys whose time has come; the area of a fence that is replaced does not move.
+EXPIRY: Swap = Cause.REMOVED, Cause.EXPIRED
+REPLACEMENT: Swap = Cause.AREA, Cause.CHANGED
 # How the library names a ring.
 RING = re.compile(r"polygon (\d+)(?: ring (\d+))? (.*)", re.DOTALL)
 
@@ -56,6 +60,7 @@ class Ground:
 
     Attributes:
         lines: the lines of its queues.
+        places: for hulls that the trip may create, by name.
         fences: the fences that its requests name; None for those that do not exist.
         number: the number of a new fence.
         refusal: the reason if no more fences are allowed.
@@ -63,6 +68,7 @@ class Ground:
     """
 
     lines: Sequence[Line]
+    places: dict[str, Place]
     fences: dict[str, Fence | None]
     number: int
     refusal: Exception | None
@@ -100,6 +106,11 @@ class LineTrip(Trip):
         self.weight = sum(line.weight(leg.name) for line in ground.lines for leg in legs)
 
     @property
+    def places(self) -> dict[str, Place]:
+        """The places of the hulls that it may create."""
+        return self._ground.places
+
+    @property
     def lines(self) -> Sequence[Line]:
         """The lines of its queues."""
         return self._ground.lines
@@ -112,9 +123,10 @@ class LineTrip(Trip):
         ]
 
     def touched(self) -> dict[str, Subjects]:
-        """The hulls by name whose subjects may differ from what the storage has, if the trip is not committed."""
-        if not (self.applied or self.torn):
-            return {}
+        """The hulls by name whose subjects may differ from what the storage has, if the trip is not committed.
+
+        An examination reads all hulls of the trip anew, also those that it has not changed.
+        """
         touched: dict[str, Subjects] = {}
         for line in self.lines:
             for name in self._by_name:
@@ -126,6 +138,9 @@ class LineTrip(Trip):
         for leg in self.fence_legs.values():
             if not leg.created:
                 touched |= leg.fence.subjects
+        for leg in self.legs:
+            if leg.before is None:  # a hull that is created has none in the storage
+                touched.pop(leg.name, None)
         return touched
 
     def landed(self, states: list[HullState | None], fences: list[KeptFence | None]) -> bool:
@@ -135,8 +150,23 @@ class LineTrip(Trip):
             leg.landed(found[number]) for number, leg in self.fence_legs.items()
         )
 
+    def pairs(self) -> set[int]:
+        """The numbers of the fences that compare its hulls as wholes."""
+        return {fence.number for line in self.lines for name in self._by_name for fence in line.pairs.get(name, ())}
+
+    def dismiss(self) -> None:
+        """Forget the subjects of hulls that it has deleted."""
+        for leg in self.legs:
+            if leg.before is not None and leg.after is None:
+                for line in self.lines:
+                    line.dismiss(leg.name)
+
     def undo_created(self) -> None:
-        """Remove the areas of fences that were not created after all."""
+        """Forget fences and hulls that were not created after all."""
+        for each in self.legs:
+            if each.before is None:
+                for line in self.lines:
+                    line.dismiss(each.name)
         for leg in self.fence_legs.values():
             if leg.created:
                 for subjects in leg.fence.subjects.values():
@@ -152,12 +182,25 @@ class LineTrip(Trip):
 
     def _apply(self, request: WriteBatch, hull: Hull, leg: Leg) -> Applied | None:
         def expired() -> None:
-            self._watch([hull], request.arrived)
+            self._watch([hull], request.arrived, EXPIRY)
 
         applied = write(request, hull, self._now, leg.records, expired)
+        if applied is None and hull is not leg.after:  # it was not created after all
+            for line in self.lines:
+                line.dismiss(hull.name)
         if applied is not None and not applied.duplicate:
             self._watch([hull], request.arrived)
         return applied
+
+    def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
+        self.place = self._ground.places.get(leg.name)
+        try:
+            hull = super()._new_hull(request, leg)
+        finally:
+            self.place = None
+        for line in self.lines:
+            line.admit(hull)
+        return hull
 
     def _write_together(self, request: WriteTogether) -> None:
         super()._write_together(request)
@@ -167,25 +210,27 @@ class LineTrip(Trip):
     def _expire(self, request: Expire, leg: Leg) -> int:
         expired = super()._expire(request, leg)
         if expired:
-            self._watch([request.hull], request.time)
+            self._watch([request.hull], request.time, EXPIRY)
         return expired
 
-    def _watch(self, hulls: Sequence[Hull], now: int) -> None:
+    def _watch(self, hulls: Sequence[Hull], now: int, swap: Swap | None = None) -> None:
         """Make the events of a change of these hulls."""
         try:
             for line in self.lines:
-                self._cross(line.changed(hulls), 0, now)
+                self._cross(line.changed(hulls), swap, now)
+                for fence, pair, causes in line.paired(hulls):
+                    self._fence_leg(fence).paired(pair, causes, now)
         except BaseException:  # an index may have lost crossings
             self._tear(hulls)
             raise
 
-    def _cross(self, crossed: Iterable[tuple[Subjects, Crossings]], cause: int, now: int) -> None:
+    def _cross(self, crossed: Iterable[tuple[Subjects, Crossings]], swap: Swap | None, now: int) -> None:
         for subjects, crossings in crossed:
             numbers = crossings.fences
             starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1])).tolist()
             for first, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
                 fence = subjects.fences[int(numbers[first])]
-                self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), cause, now)
+                self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), swap, now)
 
     def _tear(self, hulls: Iterable[Hull]) -> None:
         self.torn = True
@@ -203,14 +248,27 @@ class LineTrip(Trip):
             return self._do_fence(request)
         if isinstance(request, DeleteHull):
             self._refuse_deletion(request.name)
+            super()._do(request)
+            for line in self.lines:
+                self._delete_subjects(line, request)
+            return None
         return super()._do(request)
 
     def _refuse_deletion(self, name: str) -> None:
-        """Raise HullFencedError if a fence depends on the hull."""
+        """Raise HullFencedError if a fence depends on the hull, other than by a prefix."""
         for line in self.lines:
             for fence in line.fences.values():
-                if fence.row.config.concerns(name):
+                config = fence.row.config
+                if name == config.area_hull or (config.kind != "prefix" and name == config.subjects):
                     raise HullFencedError(name, fence.name)
+
+    def _delete_subjects(self, line: Line, request: DeleteHull) -> None:
+        """The keys of a deleted hull leave the fences with its prefix."""
+        subjects = line.subjects.get(request.name)
+        if subjects is not None:
+            for fence in subjects.fences.values():
+                if subjects.index.count(fence.number):
+                    self._fence_leg(fence).left(subjects, request.time)
 
     # Fences
 
@@ -254,12 +312,16 @@ class LineTrip(Trip):
             raise ground.refusal
         row = FenceRow(ground.number, request.name, request.birth.uid, request.birth.created, config)
         fence = Fence(row, ground.limits.fence_history_bytes)
-        leg = FenceLeg(fence, created=True)
         fence.area = self._area(config)
-        subjects = self._subjects(config)
-        fence.subjects = {subjects.hull.name: subjects}
+        if config.kind == "other":
+            assert fence.area is not None  # checked by the caller
+            fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
+            fence.pair.look()
+        leg = FenceLeg(fence, created=True)
         try:
-            _lay(subjects, row.number, config, fence.area)
+            fence.subjects = {each.hull.name: each for each in self._subjects(config)}
+            for subjects in fence.subjects.values():
+                _lay(subjects, row.number, config, fence.area)
         except BaseException:
             self.fence_legs[row.number] = leg
             self.undo_created()
@@ -269,7 +331,10 @@ class LineTrip(Trip):
         if config.initial == "snapshot":
             leg.summed_up(EventType.SNAPSHOT, Cause.CREATED, request.time)
         elif config.initial == "events":
-            leg.entered(subjects, request.time)
+            if fence.pair is not None and fence.pair.near:
+                leg.paired(fence.pair, Cause.CREATED, request.time)
+            for subjects in fence.subjects.values():
+                leg.entered(subjects, request.time)
         else:
             leg.inside = Inside(0, tuple(members(fence)))
         return fence
@@ -281,18 +346,29 @@ class LineTrip(Trip):
         if (config.kind, config.subjects) != (leg.row.config.kind, leg.row.config.subjects):
             raise InvalidFenceError("subjects", config.subjects, "the subjects of a fence stay the same")
         area = self._area(config)
+        if not fence.subjects and config.kind == "prefix":  # nobody is there to refuse an invalid area
+            _check(config, area)
         for subjects in fence.subjects.values():
             _lay(subjects, fence.number, config, area)
             self.applied = True
+        if fence.pair is not None and area is not None:
+            self._replace_pair(fence.pair, Pair(area, fence.pair.other, config.near), leg, request.time)
         leg.row = replace(leg.row, config=config)
-        fence.area = area
+        leg.area = area
         try:
             for subjects in fence.subjects.values():
-                self._cross([(subjects, subjects.index.take())], Cause.CHANGED, request.time)
+                self._cross([(subjects, subjects.index.take())], REPLACEMENT, request.time)
         except BaseException:
             self._tear(())
             raise
         return fence
+
+    def _replace_pair(self, before: Pair, pair: Pair, leg: FenceLeg, now: int) -> None:
+        self.applied = True
+        pair.look()
+        leg.pair = pair
+        if pair.near != before.near:
+            leg.paired(pair, Cause.CHANGED, now)
 
     def _area(self, config: FenceConfig) -> Hull | None:
         """The hull that is the area; raises HullNotFoundError."""
@@ -305,15 +381,19 @@ class LineTrip(Trip):
             raise HullNotFoundError(name)
         return hull
 
-    def _subjects(self, config: FenceConfig) -> Subjects:
-        hull = self._hull(config.subjects)
-        if hull.row.settings.identity == "multiset":
-            raise HullUnsuitableError(hull.name, "has points without keys", field="config.subject_hull")
-        for line in self.lines:
-            known = line.subjects.get(hull.name)
-            if known is not None:
-                return known
-        return Subjects(hull)
+    def _subjects(self, config: FenceConfig) -> list[Subjects]:
+        """The hulls whose keys a new fence compares, by name."""
+        known = {name: subjects for line in self.lines for name, subjects in line.subjects.items()}
+        if config.kind == "hull":
+            hull = self._hull(config.subjects)
+            if hull.row.settings.identity == "multiset":
+                raise HullUnsuitableError(hull.name, "has points without keys", field="config.subject_hull")
+            return [known.get(hull.name) or Subjects(hull)]
+        hulls = [leg.after for _, leg in sorted(self._by_name.items()) if config.compares(leg.name)]
+        keyed = [hull for hull in hulls if hull is not None and hull.row.settings.identity != "multiset"]
+        if not keyed and config.kind == "prefix":
+            _check(config, self._area(config))
+        return [known.get(hull.name) or Subjects(hull) for hull in keyed]
 
     def _put_consumer(self, request: PutConsumer, leg: FenceLeg) -> Consumer:
         fence = leg.fence
@@ -341,6 +421,14 @@ class LineTrip(Trip):
             if lost > 0:
                 leg.acknowledge(Consumer(name, consumer.acknowledged, consumer.lost + lost))
         leg.first = request.first
+
+
+def _check(config: FenceConfig, area: Hull | None) -> None:
+    """Raise InvalidFenceError if the area of a fence without subjects is invalid."""
+    try:
+        lay(FenceIndex(KeyedHull("str")), 0, config, None if area is None else area.state.vertices())
+    except ValueError as error:
+        raise _invalid(config, str(error)) from None
 
 
 def _lay(subjects: Subjects, number: int, config: FenceConfig, area: Hull | None) -> None:

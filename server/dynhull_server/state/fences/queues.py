@@ -25,7 +25,15 @@ def components(names: Sequence[str], fences: Iterable[Fence]) -> list[tuple[list
     for fence in fences:
         key = find(PREFIX + fence.name)
         for name in depends_on(fence):
-            first[find(name)] = key
+            first[find(name)] = find(key)
+        if fence.row.config.kind == "prefix":
+            prefix = fence.row.config.subjects
+            for name in names:
+                if name.startswith(prefix):
+                    first[find(name)] = find(key)
+            for other in fences:  # a hull may come that both compare
+                if overlap(fence, other):
+                    first[find(PREFIX + other.name)] = find(key)
     groups: dict[str, tuple[list[str], list[Fence]]] = {}
     for name in names:
         groups.setdefault(find(name), ([], []))[0].append(name)
@@ -36,7 +44,16 @@ def components(names: Sequence[str], fences: Iterable[Fence]) -> list[tuple[list
 
 def depends_on(fence: Fence) -> list[str]:
     """The names of the hulls that a fence depends on."""
-    return [*fence.subjects, *([] if fence.area is None else [fence.area.name])]
+    hulls = [] if fence.pair is None else [fence.pair.other.name]
+    return [*fence.subjects, *hulls, *([] if fence.area is None else [fence.area.name])]
+
+
+def overlap(one: Fence, other: Fence) -> bool:
+    """Whether a name can have the prefixes of both fences."""
+    a, b = one.row.config, other.row.config
+    if a.kind != "prefix" or b.kind != "prefix":
+        return False
+    return a.subjects.startswith(b.subjects) or b.subjects.startswith(a.subjects)
 
 
 def merged(queues: Sequence[list[Request]]) -> list[Request]:

@@ -59,7 +59,10 @@ def restore(subjects: Iterable[Subjects], states: Mapping[str, HullState], kept:
 
 
 def members_after(kept: KeptFence) -> dict[str, set[Key]]:
-    """The subjects that are inside after the last event, by hull. O(those stored + events)."""
+    """The subjects that are inside after the last event, by hull; a hull that is near as a whole has none.
+
+    O(those stored + events).
+    """
     inside: dict[str, set[Key]] = {each.hull: set(key_list(each.keys)) for each in kept.inside.members}
     for event in kept.events:
         if event.type is EventType.SNAPSHOT:
@@ -68,4 +71,8 @@ def members_after(kept: KeptFence) -> dict[str, set[Key]]:
             inside.setdefault(event.hull, set()).add(event.key)
         elif event.key is not None and event.type is EventType.EXIT:
             inside[event.hull].remove(event.key)
+        elif event.type is EventType.BEGIN:
+            inside[event.hull] = set()
+        elif event.type is EventType.CEASE:
+            del inside[event.hull]
     return inside

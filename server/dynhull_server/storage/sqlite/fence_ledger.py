@@ -386,7 +386,7 @@ def inside_steps(number: int, inside: Inside, place: Callable[[], int]) -> list[
     pieces = [
         Members(each.hull, each.keys[start : start + KEYS_A_ROW], each.revision)
         for each in inside.members
-        for start in range(0, len(each.keys), KEYS_A_ROW)
+        for start in range(0, max(len(each.keys), 1), KEYS_A_ROW)
     ]
     rows = [[piece] for piece in pieces] or [[]]
     return [

@@ -1,0 +1,156 @@
+"""The sides of subjects in whole numbers: what a fence must say, written down as plainly as possible.
+
+All coordinates and lengths of the torture are multiples of a half, and are counted in halves here.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+Point = tuple[int, int]
+Ring = Sequence[Point]
+
+
+def halves(length: float) -> int:
+    """A length in halves."""
+    doubled = int(2 * length)
+    assert doubled == 2 * length
+    return doubled
+
+
+def exact(xy: Iterable[float]) -> Point:
+    x, y = xy
+    return halves(x), halves(y)
+
+
+def turn(a: Point, b: Point, c: Point) -> int:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def hull(points: Iterable[Point]) -> list[Point]:
+    """The corners of the convex hull, by monotone chains."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+    corners: list[Point] = []
+    for chain in (ordered, ordered[::-1]):
+        start = len(corners)
+        for point in chain:
+            while len(corners) >= start + 2 and turn(corners[-2], corners[-1], point) <= 0:
+                corners.pop()
+            corners.append(point)
+        corners.pop()
+    return corners if len(corners) > 2 else [ordered[0], ordered[-1]]
+
+
+def edges(ring: Ring) -> list[tuple[Point, Point]]:
+    return [(ring[i - 1], ring[i]) for i in range(len(ring))]
+
+
+def on_segment(p: Point, a: Point, b: Point) -> bool:
+    return (
+        turn(a, b, p) == 0 and min(a[0], b[0]) <= p[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= p[1] <= max(a[1], b[1])
+    )
+
+
+def within(p: Point, ring: Ring) -> bool:
+    """Whether a point is strictly inside of a ring, by the number of edges to its right."""
+    inside = False
+    for a, b in edges(ring):
+        if (a[1] > p[1]) != (b[1] > p[1]):
+            side = turn(a, b, p)
+            inside ^= (side > 0) == (b[1] > a[1])
+    return inside
+
+
+def squared(p: Point, q: Point) -> int:
+    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2
+
+
+def near(p: Point, a: Point, b: Point, limit: int) -> bool:
+    """Whether a point is at most that far from a segment."""
+    if min(squared(p, a), squared(p, b)) <= limit**2:
+        return True
+    along = (p[0] - a[0]) * (b[0] - a[0]) + (p[1] - a[1]) * (b[1] - a[1])
+    return 0 < along < squared(a, b) and turn(a, b, p) ** 2 <= limit**2 * squared(a, b)
+
+
+def meet(p: Point, q: Point, a: Point, b: Point) -> bool:
+    """Whether two segments have a point in common."""
+    if any(on_segment(point, *segment) for point, segment in ((p, (a, b)), (q, (a, b)), (a, (p, q)), (b, (p, q)))):
+        return True
+    return turn(p, q, a) * turn(p, q, b) < 0 and turn(a, b, p) * turn(a, b, q) < 0
+
+
+def apart(one: Sequence[Point], other: Sequence[Point], limit: int) -> bool:
+    """Whether two convex polygons, points or segments, given by their corners, are farther apart than that."""
+    if not one or not other:
+        return True
+    a, b = Rings(((tuple(one),),)), Rings(((tuple(other),),))
+    if a.holds(other[0], closed=True) or b.holds(one[0], closed=True):
+        return False
+    pairs = [(edge, beside) for edge in edges(one) for beside in edges(other)]
+    if any(meet(*edge, *beside) for edge, beside in pairs):
+        return False
+    return not any(near(p, *beside, limit) for edge, beside in pairs for p in edge) and not any(
+        near(p, *edge, limit) for edge, beside in pairs for p in beside
+    )
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Polygons joined by "or", each an exterior and holes; a point or a segment as a ring of one or two corners."""
+
+    polygons: tuple[tuple[tuple[Point, ...], ...], ...]
+
+    def boundary(self) -> list[tuple[Point, Point]]:
+        return [edge for polygon in self.polygons for ring in polygon for edge in edges(ring)]
+
+    def holds(self, p: Point, *, closed: bool) -> bool:
+        for exterior, *holes in self.polygons:
+            if any(on_segment(p, a, b) for ring in (exterior, *holes) for a, b in edges(ring)):
+                if closed:
+                    return True
+            elif within(p, exterior) and not any(within(p, hole) for hole in holes):
+                return True
+        return False
+
+    def farther(self, p: Point, margin: int, *, closed: bool) -> bool:
+        """Whether a point is outside, and farther away than the margin."""
+        if self.holds(p, closed=closed):
+            return False
+        degenerate = all(len(exterior) < 3 for exterior, *_ in self.polygons)
+        if margin == 0 or (degenerate and not closed):  # an open point or segment is empty
+            return True
+        return not any(near(p, a, b, margin) for a, b in self.boundary())
+
+    def passed(self, p: Point, q: Point) -> bool:
+        """Whether the way between two points outside meets the closed area."""
+        return any(meet(p, q, a, b) for a, b in self.boundary())
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A disk."""
+
+    center: Point
+    radius: int
+
+    def holds(self, p: Point, *, closed: bool) -> bool:
+        distance = squared(p, self.center)
+        return distance <= self.radius**2 if closed else distance < self.radius**2
+
+    def farther(self, p: Point, margin: int, *, closed: bool) -> bool:
+        if self.holds(p, closed=closed):
+            return False
+        return margin == 0 or squared(p, self.center) > (self.radius + margin) ** 2
+
+    def passed(self, p: Point, q: Point) -> bool:
+        return near(self.center, p, q, self.radius)
+
+
+Shape = Rings | Disk
+
+
+def shape_of_hull(points: Iterable[Point]) -> Rings:
+    corners = tuple(hull(points))
+    return Rings(((corners,),) if corners else ())

@@ -1,0 +1,392 @@
+"""A model of hulls with keys and of fences, and random requests to them."""
+
+import random
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from judge import Disk, Point, Rings, Shape, apart, exact, halves, hull, shape_of_hull
+
+from dynhull.keys import PackedKeys
+from dynhull_server.state.batch import Batch, KeyedBatch
+from dynhull_server.state.events import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
+from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
+from dynhull_server.state.fences.requests import CreateFence, DeleteFence, PutConsumer, ReplaceFence
+from dynhull_server.state.records import HullSettings
+
+KEYED, ZONE = ("k/a", "k/b", "k/c"), "zone"
+GUEST = "k/c"  # it comes and goes
+HULLS = (*KEYED, ZONE)
+KEYS = [f"é{i}" for i in range(8)]
+FENCES = ["f0", "f1", "f2"]
+TICK = 100_000
+NONE = np.empty((0, 2))
+NO_KEYS = PackedKeys(b"", b"")
+SHAPES = [
+    [[(0, 0), (4, 0), (4, 4), (0, 4)]],
+    [[(0, 0), (8, 0), (8, 8), (0, 8)], [(2, 2), (6, 2), (6, 6), (2, 6)]],
+    [[(1, 1), (5, 1), (1, 5)]],
+    [[(0, 0), (8, 0), (4, 3), (8, 8), (0, 8), (3, 4)]],
+]
+
+Positions = dict[str, dict[str, Point]]
+
+
+@cache
+def fixed_shape(area: CircleArea | PolygonArea) -> Shape:
+    if isinstance(area, CircleArea):
+        return Disk(exact((area.x, area.y)), halves(area.radius))
+    polygons = ([np.frombuffer(ring).reshape(-1, 2).tolist() for ring in polygon] for polygon in area.polygons)
+    return Rings(tuple(tuple(tuple(map(exact, ring)) for ring in polygon) for polygon in polygons))
+
+
+@dataclass
+class FenceModel:
+    """A fence: its settings, who is inside, and its events."""
+
+    config: FenceConfig
+    inside: set[tuple[str, str]] = field(default_factory=set)
+    near: bool = False
+    events: list[FenceEvent] = field(default_factory=list)
+    last: int = 0
+    consumers: dict[str, int] = field(default_factory=dict)
+
+
+class World:
+    """What was committed."""
+
+    def __init__(self) -> None:
+        self.positions: Positions = {name: {} for name in KEYED}
+        self.there = set(HULLS) - {GUEST}
+        self.deadlines: dict[str, dict[str, int]] = {name: {} for name in KEYED}
+        self.clocks: dict[str, int | None] = dict.fromkeys(KEYED)
+        self.zone: list[Point] = []
+        self.revisions = dict.fromkeys(HULLS, 0)
+        self.fences: dict[str, FenceModel] = {}
+
+    # Areas
+
+    def shape(self, config: FenceConfig, key: str | None = None) -> Shape:
+        area = config.area
+        if not isinstance(area, HullArea):
+            return fixed_shape(area)
+        if area.name == ZONE:
+            return shape_of_hull(self.zone)
+        others = self.positions[area.name]
+        return shape_of_hull(p for other, p in others.items() if not (area.without_self and other == key))
+
+    # Changes, each with the events that follow from it
+
+    def committed(self, request: Any) -> None:
+        match request:
+            case WriteBatch():
+                self._write([request])
+            case WriteTogether():
+                self._write(request.parts, together=True)
+            case Expire():
+                if request.result:
+                    before = self._now()
+                    self._expire(request.name, request.time)
+                    self._judge(before, Cause.EXPIRED)
+            case CreateHull():
+                self._come(request.name)
+            case DeleteHull():
+                self._go(request.name)
+            case CreateFence():
+                self._create(request)
+            case ReplaceFence():
+                self._replace(request)
+            case DeleteFence():
+                del self.fences[request.name]
+            case PutConsumer():
+                fence = self.fences[request.name]
+                known = fence.consumers.get(request.consumer, 0)
+                fence.consumers[request.consumer] = max(known, request.sequence or 0)
+
+    def _write(self, parts: list[WriteBatch], *, together: bool = False) -> None:
+        before = self._now()
+        for part in parts:
+            if self._ends(part):
+                self._expire(part.name, part.arrived)
+                if not together:
+                    self._judge(before, Cause.EXPIRED)
+                    before = self._now()
+        for part in parts:
+            self._apply(part)
+        self._judge(before, Cause.REMOVED)  # of several hulls together, those whose time has come too
+
+    def _come(self, name: str) -> None:
+        self.there.add(name)
+        self.revisions[name] = 0
+        self.clocks[name] = None
+
+    def _go(self, name: str) -> None:
+        self.there.remove(name)
+        keys, self.positions[name], self.deadlines[name] = self.positions[name], {}, {}
+        for fence in self.fences.values():
+            left = sorted((key for subject, key in fence.inside if subject == name), key=str.encode)
+            for key in left:
+                fence.inside.remove((name, key))
+                self._tell(fence, EventType.EXIT, (name, key), keys[key], None, int(Cause.REMOVED))
+
+    def subjects(self, config: FenceConfig) -> list[str]:
+        return [name for name in KEYED if name in self.there and config.compares(name)]
+
+    def near(self, config: FenceConfig) -> bool:
+        area, other = (self.corners(name) for name in (config.area_hull, config.subjects))
+        return not apart(area, other, halves(config.near))
+
+    def corners(self, name: str | None) -> list[Point]:
+        return hull(self.zone if name == ZONE else self.positions[str(name)].values())
+
+    def _ends(self, part: WriteBatch) -> bool:
+        clock = self.clocks.get(part.name)
+        return clock is not None and any(end <= part.arrived for end in self.deadlines[part.name].values())
+
+    def _expire(self, name: str, time: int) -> None:
+        ended = [key for key, end in self.deadlines[name].items() if end <= time]
+        for key in ended:
+            del self.positions[name][key], self.deadlines[name][key]
+        self.revisions[name] += 1
+        self.clocks[name] = max(self.clocks[name] or 0, time)
+
+    def _apply(self, part: WriteBatch) -> None:
+        batch, name = part.make(), part.name
+        if name not in self.there:  # the batch has created it
+            self._come(name)
+        self.revisions[name] += 1
+        if isinstance(batch, Batch):
+            for p in batch.deletes.tolist():
+                if exact(p) in self.zone:  # otherwise it is ignored
+                    self.zone.remove(exact(p))
+            self.zone += map(exact, batch.inserts.tolist())
+            return
+        if self.clocks[name] is not None or batch.ttl is not None:
+            self.clocks[name] = max(self.clocks[name] or 0, part.arrived)
+        for key in batch.removes:
+            self.positions[name].pop(key, None)
+            self.deadlines[name].pop(key, None)
+        for key, p in zip(batch.keys, batch.points.tolist(), strict=True):
+            self.positions[name][key] = exact(p)
+            self.deadlines[name].pop(key, None)
+            if batch.ttl is not None:
+                self.deadlines[name][key] = part.arrived + batch.ttl
+
+    def _now(self) -> tuple[Positions, dict[str, Shape]]:
+        positions = {name: dict(keys) for name, keys in self.positions.items()}
+        return positions, {name: self.shape(fence.config) for name, fence in self.fences.items()}
+
+    def _judge(self, before: tuple[Positions, dict[str, Shape]], gone: Cause) -> None:
+        """Make the events of the difference between two states."""
+        places, shapes = before
+        for name, fence in self.fences.items():
+            if fence.config.kind == "other":
+                self._look_at_pair(fence, 0)
+                continue
+            area = self.shape(fence.config) != shapes[name]
+            for subject in self.subjects(fence.config):
+                was, now = places[subject], self.positions[subject]
+                if not area and was == now:
+                    continue
+                for key in sorted(was.keys() | now.keys(), key=str.encode):
+                    cause = Cause(0)
+                    if key not in was:
+                        cause = Cause.APPEARED
+                    elif key not in now:
+                        cause = gone
+                    elif was[key] != now[key]:
+                        cause = Cause.MOVED
+                    self._look(fence, (subject, key), was.get(key), now.get(key), int(cause), area=area)
+
+    def _look_at_pair(self, fence: FenceModel, cause: int) -> None:
+        if self.near(fence.config) != fence.near:
+            fence.near = not fence.near
+            kind = EventType.BEGIN if fence.near else EventType.CEASE
+            self._tell(fence, kind, (fence.config.subjects, None), None, None, cause)
+
+    def _look(
+        self,
+        fence: FenceModel,
+        subject: tuple[str, str],
+        was: Point | None,
+        now: Point | None,
+        cause: int,
+        *,
+        area: bool,
+    ) -> None:
+        config, inside = fence.config, subject in fence.inside
+        shape = self.shape(config, subject[1])
+        if now is None:
+            after = False
+        elif inside:
+            after = not shape.farther(now, halves(config.margin), closed=config.closed)
+        else:
+            after = shape.holds(now, closed=config.closed)
+        kind = None
+        if after != inside:
+            kind = EventType.ENTER if after else EventType.EXIT
+        elif config.crosses and not inside and was is not None and now is not None and was != now:
+            kind = EventType.CROSS if shape.passed(was, now) else None
+        if kind is None:
+            return
+        (fence.inside.add if after else fence.inside.discard)(subject)
+        self._tell(fence, kind, subject, was, now, cause | (Cause.AREA if area else 0))
+
+    def _tell(
+        self,
+        fence: FenceModel,
+        kind: EventType,
+        subject: tuple[str, str | None] | None,
+        was: Point | None,
+        now: Point | None,
+        cause: int,
+    ) -> None:
+        area = fence.config.area_hull
+        name, key = subject or ("", None)
+        fence.last += 1
+        fence.events.append(
+            FenceEvent(
+                fence.last,
+                kind,
+                cause,
+                name,
+                key,
+                self.revisions[name] if name else 0,
+                self.revisions[area] if area else 0,
+                None if now is None else (now[0] / 2, now[1] / 2),
+                None if was is None else (was[0] / 2, was[1] / 2),
+                None,
+                0,
+                0,
+            )
+        )
+
+    def _create(self, request: CreateFence) -> None:
+        config = request.config
+        fence = self.fences[request.name] = FenceModel(config)
+        told = config.initial == "events"
+        if config.kind == "other":
+            fence.near = self.near(config)
+            if told and fence.near:
+                self._tell(fence, EventType.BEGIN, (config.subjects, None), None, None, int(Cause.CREATED))
+        for name in self.subjects(config):
+            for key, place in sorted(self.positions[name].items(), key=lambda each: each[0].encode()):
+                if self.shape(config, key).holds(place, closed=config.closed):
+                    fence.inside.add((name, key))
+                    if told:
+                        self._tell(fence, EventType.ENTER, (name, key), None, place, int(Cause.CREATED))
+        if config.initial == "snapshot":
+            self._tell(fence, EventType.SNAPSHOT, None, None, None, int(Cause.CREATED))
+
+    def _replace(self, request: ReplaceFence) -> None:
+        fence = self.fences[request.name]
+        if fence.config == request.config:
+            return
+        fence.config = request.config
+        if fence.config.kind == "other":
+            self._look_at_pair(fence, int(Cause.CHANGED))
+        for name in self.subjects(fence.config):
+            for key, place in sorted(self.positions[name].items(), key=lambda each: each[0].encode()):
+                self._look(fence, (name, key), place, place, int(Cause.CHANGED), area=False)
+
+
+class Chance:
+    """Draws requests."""
+
+    def __init__(self, rng: random.Random, world: World) -> None:
+        self._rng = rng
+        self._world = world
+        self._births = 0
+
+    def batch(self, name: str, time: int, to: Any) -> WriteBatch:
+        rng = self._rng
+        made: Batch | KeyedBatch
+        if name == ZONE:
+            there = sorted(self._world.zone)
+            gone = rng.sample(there, min(len(there), rng.choice([0, 0, 1, 2, 9])))
+            new = [p for p in self._points(rng.choice([0, 1, 1, 2, 3])).tolist() if exact(p) not in gone]
+            made = Batch(
+                np.array(new, float).reshape(-1, 2),
+                np.array(gone, float).reshape(-1, 2) / 2,
+                0,
+                count_missing=True,
+            )
+        else:
+            keys = rng.sample(KEYS, rng.choice([1, 1, 2, 3]))
+            removed = rng.randrange(len(keys) + 1) if rng.random() < 0.3 else 0
+            puts = keys[removed:]
+            ttl = rng.choice([None, None, None, TICK, 3 * TICK])
+            made = KeyedBatch(
+                "str", PackedKeys.pack(puts), self._points(len(puts)), PackedKeys.pack(keys[:removed]), ttl=ttl
+            )
+        write = WriteBatch(3, lambda: made)
+        write.to, write.name, write.arrived = to, name, time
+        write.birth = self.birth() if name == GUEST and rng.random() < 0.5 else None
+        return write
+
+    def of_guest(self, time: int, to: Any) -> Any:
+        """The creation or the deletion of a hull."""
+        if GUEST in self._world.there and self._rng.random() < 0.8:
+            return DeleteHull(to, GUEST, time)
+        return CreateHull(to, GUEST, self.birth(), HullSettings("str"))
+
+    def _points(self, n: int) -> np.ndarray:
+        return np.array([[self._rng.randrange(-4, 24) / 2 for _ in range(2)] for _ in range(n)]).reshape(-1, 2)
+
+    def together(self, time: int, to: Any) -> WriteTogether:
+        names = self._rng.sample(HULLS, self._rng.choice([2, 2, 3]))
+        request = WriteTogether([self.batch(name, time, to) for name in names])
+        request.to = to
+        return request
+
+    def birth(self) -> Birth:
+        self._births += 1
+        return Birth(f"uid{self._births}", 1.0)
+
+    def config(self, before: FenceConfig | None = None) -> FenceConfig:
+        """Settings of a fence; of the same subjects as `before`."""
+        rng = self._rng
+        kind: Any = rng.choice(["hull", "hull", "prefix", "other"]) if before is None else before.kind
+        subjects = {"prefix": "k/", "hull": rng.choice(KEYED[:2]), "other": rng.choice(KEYED[:2])}[kind]
+        subjects = subjects if before is None else before.subjects
+        initial: Any = rng.choice(["snapshot", "events", "none"])
+        if kind == "other":
+            area = rng.choice([name for name in (*KEYED[:2], ZONE) if name != subjects])
+            return FenceConfig(HullArea(area), kind, subjects, near=rng.choice([0.0, 0.0, 1.0, 2.5]), initial=initial)
+        closed, margin = rng.random() < 0.7, rng.choice([0.0, 0.0, 0.5, 1.0, 1.5])
+        chosen = rng.choice(["zone", "other", "self", "circle", "polygon", "polygon"])
+        area = self._area(chosen, subjects)
+        if isinstance(area, HullArea) and area.without_self:
+            closed, margin = True, margin or 0.5
+        crosses = closed and not isinstance(area, HullArea) and rng.random() < 0.5
+        return FenceConfig(area, kind, subjects, closed, margin, initial=initial, crosses=crosses)
+
+    def _area(self, chosen: str, subjects: str) -> Any:
+        rng = self._rng
+        if chosen == "zone":
+            return HullArea(ZONE)
+        if chosen == "self" and subjects in KEYED:
+            return HullArea(subjects, without_self=True)
+        if chosen in ("other", "self"):
+            return HullArea(rng.choice(KEYED[:2]))
+        if chosen == "circle":
+            return CircleArea(float(rng.randrange(8)), float(rng.randrange(8)), rng.choice([0.0, 1.0, 2.5, 5.0]))
+        rings = tuple(np.array(ring, "<f8").tobytes() for ring in rng.choice(SHAPES))
+        more = ((np.array([[9, 9], [11, 9], [9, 11]], "<f8").tobytes(),),) if rng.random() < 0.3 else ()
+        return PolygonArea((rings, *more))
+
+    def of_fences(self, time: int, to: Any) -> Any:
+        rng = self._rng
+        name = rng.choice(FENCES)
+        fence = self._world.fences.get(name)
+        if fence is None or rng.random() < 0.1:
+            return CreateFence(to, name, time, self.config(), self.birth())
+        kind = rng.choice(["delete", "replace", "same", "ack", "ack", "ack"])
+        if kind == "delete":
+            return DeleteFence(to, name, time)
+        if kind == "ack":
+            return PutConsumer(to, name, time, rng.choice(["x", "y"]), rng.randrange(fence.last + 1))
+        config = fence.config if kind == "same" else replace(self.config(fence.config), initial="none")
+        return ReplaceFence(to, name, time, config)
