@@ -10,6 +10,7 @@ import numpy as np
 
 from ._entities import Entities
 from ._fences import Fences
+from ._implementation import kernel
 from ._predicates import orient2d
 from ._rings import as_polygons
 from ._value import Value
@@ -19,6 +20,7 @@ from .keys import Keys, PackedKeys, as_keys
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from . import _kernel
     from ._keyed import KeyedHull
     from .arrays import Points
     from .keys import KeyType
@@ -106,16 +108,29 @@ class FenceIndex:
 
     The first state of a new fence is decided at once and is no crossing. Where the keys inside are given, what
     contradicts them is reported by the next `take`, as when an area is replaced.
+
+    >>> import dynhull
+    >>> fleet = dynhull.KeyedHull()
+    >>> fences = dynhull.FenceIndex(fleet)
+    >>> fences.set_polygons(7, [[[[0, 0], [4, 0], [0, 4]]]])
+    >>> fleet.put("UA17", 1, 1)
+    True
+    >>> found = fences.take()
+    >>> found.fences.tolist(), found.changes.tolist(), list(found.keys), found.causes.tolist()
+    ([7], [1], ['UA17'], [4])
     """
 
     __slots__ = ("_fences", "_subjects")
 
     def __init__(self, subjects: KeyedHull) -> None:
         tree = subjects._tree
-        if not isinstance(tree, Entities):
-            raise TypeError("subjects is a hull of the kernel: fences need DYNHULL_KERNEL=python")
         self._subjects = subjects
-        self._fences = Fences(tree)
+        self._fences: Fences | _kernel.Fences
+        if isinstance(tree, Entities):
+            self._fences = Fences(tree)
+        else:
+            assert kernel is not None
+            self._fences = kernel.Fences(tree)
 
     def detach(self) -> None:
         """Let the hull forget the index, which sees no more of its changes."""

@@ -19,6 +19,7 @@ class _Kernel(Protocol):
 
     HullTree: "type[_kernel.HullTree]"
     Entities: "type[_kernel.Entities]"
+    Fences: "type[_kernel.Fences]"
     WindowTree: "type[_kernel.WindowTree]"
 
     def plain_points(self, xy: object) -> "Points | None": ...

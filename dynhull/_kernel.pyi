@@ -224,6 +224,51 @@ class Entities:
     def vertex_keys(self) -> list[Any]:
         """The least key at each vertex, in the order of `vertices`."""
 
+class Fences:
+    """Fences of one set of entities: see dynhull's class in Python."""
+
+    def __init__(self, entities: Entities) -> None: ...
+
+    def detach(self) -> None:
+        """End the reports of the entities."""
+
+    def __len__(self) -> int: ...
+
+    def has(self, fence: int) -> bool:
+        """Whether there is a fence of this number."""
+
+    def set_polygons(self, fence: int, polygons: list[list[dynhull.arrays.Points]], closed: bool, margin: float, cross: bool, inside: dynhull.keys.Keys | None) -> None:
+        """Add or replace a fence around polygons."""
+
+    def set_circle(self, fence: int, x: float, y: float, radius: float, closed: bool, margin: float, cross: bool, inside: dynhull.keys.Keys | None) -> None:
+        """Add or replace a fence around a disk."""
+
+    def set_hull(self, fence: int, vertices: dynhull.arrays.Points, closed: bool, margin: float, cross: bool, without_self: bool, inside: dynhull.keys.Keys | None) -> None:
+        """
+        Add or replace a fence around a convex hull; `without_self` around that of the entities.
+        """
+
+    def drop(self, fence: int) -> dynhull.keys.Keys:
+        """Remove a fence. Returns the keys that were inside."""
+
+    def inside(self, fence: int) -> dynhull.keys.Keys:
+        """The keys inside, in order."""
+
+    def count(self, fence: int) -> int:
+        """The number of keys inside."""
+
+    def take(self) -> Any:
+        """
+        What has crossed since the last call: fences, changes, causes, keys, places, previous, distances.
+        """
+
+    def check(self) -> None:
+        """Raise AssertionError if an invariant is broken."""
+
+    @property
+    def memory(self) -> int:
+        """The bytes that the index uses."""
+
 class WindowTree(HullTree):
     """
     A tree of points with times, of which the oldest leave: see dynhull's in Python.

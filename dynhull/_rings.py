@@ -69,6 +69,7 @@ def _as_polygon(polygon: Any, name: str) -> list[Points]:
     if not rings:
         raise ValueError(f"{name} has no ring: the first one is its exterior")
     _refuse_meeting_edges(rings, name)
+    rings = [_turned(ring, left=number == 0) for number, ring in enumerate(rings)]
     for number in range(1, len(rings)):
         if any(sign < 0 for sign in _sides(rings[0], rings[number])):
             raise ValueError(f"{name} ring {number} is a hole that is not inside the exterior")
@@ -90,6 +91,14 @@ def _as_ring(ring: Any, name: str) -> Points:
     if not np.any(orient2d(corners[0], corners[1], corners)):
         raise ValueError(f"{name} has no area: all of its corners are on one line")
     return corners
+
+
+def _turned(ring: Points, left: bool) -> Points:
+    """A simple ring in the direction in which its inside is on the left, or on the right."""
+    least = int(np.lexsort(ring.T[::-1])[0])
+    before, at, after = (ring[(least + step) % len(ring)] for step in (-1, 0, 1))
+    turns_left = orient2d(before, at, after) == 1  # never 0, as the edges do not overlap
+    return ring if turns_left == left else np.ascontiguousarray(ring[::-1])
 
 
 # Edges that meet

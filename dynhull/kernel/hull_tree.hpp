@@ -2,8 +2,8 @@
 // algorithm.
 //
 // Reading order: predicates/ (exact signs), tree/ (leaves, bridges, single updates), batch/ (many updates at once),
-// this file, query/. keyed/ names points by keys, window/ has the order in which points expire. sort/ and memory/ serve
-// them, static/ has the hulls of fixed points, python/ the bindings.
+// this file, query/. keyed/ names points by keys, fence/ compares them with areas, window/ has the order in which
+// points expire. sort/ and memory/ serve them, static/ has the hulls of fixed points, python/ the bindings.
 #pragma once
 
 #include <optional>
@@ -114,6 +114,21 @@ class HullTree {
     for (const Recount& entry : plan.recounts)
       if (entry.before == 0 && entry.after > 1) mark(find(nodes_, entry.p), true);
     return {groups.rows_applied, groups.first_missing};
+  }
+
+  // Calls `work` while a point that is there once is away.
+  template <class Work>
+  void without(Point p, Work work) {
+    nodes_.reserve(1);
+    remove_point(nodes_, find(nodes_, p), p);
+    const auto put_back = [&] { insert_point(nodes_, find(nodes_, p), p); };
+    try {
+      work();
+    } catch (...) {
+      put_back();
+      throw;
+    }
+    put_back();
   }
 
   // Visits every distinct point in order, with its number of copies.
@@ -274,5 +289,13 @@ class HullTree {
   std::size_t size_ = 0, distinct_ = 0;
   std::uint64_t version_ = 0;
 };
+
+// Counter-clockwise from the least.
+inline std::vector<Point> vertices_of(const HullTree& tree) {
+  std::vector<Point> vertices = tree.chain(LOWER);
+  const std::vector<Point> upper = tree.chain(UPPER);
+  if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
+  return vertices;
+}
 
 }  // namespace dynhull

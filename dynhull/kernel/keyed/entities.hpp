@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "../fence/fences.hpp"
 #include "ages.hpp"
 #include "keys.hpp"
 #include "names.hpp"
@@ -56,6 +57,14 @@ class Entities {
     }
   }
 
+  // Tells an index of fences of every change from now on, if there is no other. Not copied.
+  bool attach(Fences& fences) {
+    if (fences_ != nullptr) return false;
+    fences_ = &fences;
+    return true;
+  }
+  void detach() { fences_ = nullptr; }
+
   // Throws DuplicateKey; then, and after every other exception, nothing has changed.
   template <class Keys>
   Counts put(HullTree& tree, const Keys& keys, Puts& puts, Only only) {
@@ -63,6 +72,7 @@ class Entities {
     Counts counts;
     const Changes changes(2 * count);
     Batch<Keys> batch(*this, keys);
+    if (fences_) fences_->make_room(count);
     std::size_t change = 0;
     for (std::size_t i = 0; i < count; ++i) {
       Found& row = batch[i];
@@ -91,6 +101,7 @@ class Entities {
       throw;
     }
     batch.commit();
+    if (fences_) report_moved(batch, puts, count);
     rename([&] { rename_moved(batch, puts, changes, count); });
     if (ages_) age(batch, count);
     return counts;
@@ -110,11 +121,13 @@ class Entities {
       if (!ignore_missing) throw MissingKey{i};
       batch.leave(batch[i]);
     }
+    const auto slot = [&](std::size_t i) { return batch[i].slot; };
+    make_room_to_leave(keys.size(), slot);
     changes.apply(tree, change, false);
     batch.commit();
     for (std::size_t i = 0; ages_ && i < keys.size(); ++i)
       if (batch[i].slot != NONE) ages_->remove(batch[i].time);
-    forget(keys.size(), [&](std::size_t i) { return batch[i].slot; });
+    forget(keys.size(), slot, REMOVED);
     return static_cast<std::int64_t>(change);
   }
 
@@ -135,6 +148,10 @@ class Entities {
 
   void clear(HullTree& tree) {
     Entities empty(slots_.strings(), ordered);
+    if (fences_) {
+      fences_->make_room_to_leave(slots_.size(), slots_.arena().living());
+      slots_.for_each([&](std::uint32_t slot) { fences_->left(slot, REMOVED); });
+    }
     tree.clear();
     std::swap(slots_, empty.slots_);
     table_.swap(empty.table_);
@@ -147,6 +164,14 @@ class Entities {
     return names_ && names_->current(tree, places);
   }
   void name(const HullTree& tree) { names_ = std::make_unique<Names>(tree, slots_); }
+
+  // What has crossed the fences of an index since the last time.
+  Crossings take(HullTree& tree, Fences& fences) {
+    return fences.take(tree, [&](const std::vector<Point>& places) {
+      if (!named(tree, places)) name(tree);
+      return least_at(places);
+    });
+  }
 
   // The slot of the least key at each place, or NONE, once they are named.
   std::vector<std::uint32_t> least_at(std::span<const Point> places) const { return names_->least_at(slots_, places); }
@@ -274,15 +299,38 @@ class Entities {
     table_.erase(table_.find(tag, [slot](std::uint32_t other) { return other == slot; }));
     slots_.give_back(slot);
   }
+  // For `forget` of the same slots.
+  template <class SlotOf>
+  void make_room_to_leave(std::size_t count, SlotOf slot) {
+    if (!fences_) return;
+    std::size_t bytes = 0;
+    for (std::size_t i = 0; slots_.strings() && i < count; ++i)
+      if (slot(i) != NONE) bytes += Arena::length(slots_[slot(i)].key);
+    fences_->make_room_to_leave(count, bytes);
+  }
   // Forgets entities that the tree does not hold any more; `slot` may return NONE.
   template <class SlotOf>
-  void forget(std::size_t count, SlotOf slot) {
+  void forget(std::size_t count, SlotOf slot, Cause cause) {
+    for (std::size_t i = 0; fences_ && i < count; ++i)
+      if (slot(i) != NONE) fences_->left(slot(i), cause);
     rename([&] {
       for (std::size_t i = 0; i < count; ++i)
         if (slot(i) != NONE) names_->remove(slot(i), slots_[slot(i)].place);
     });
     for (std::size_t i = 0; i < count; ++i)
       if (slot(i) != NONE) forget(slot(i), slots_.tag(slot(i)));
+  }
+
+  template <class Rows>
+  void report_moved(Rows& batch, Puts& puts, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i + LOOKAHEAD < count && batch[i + LOOKAHEAD].slot != NONE) fences_->fetch(batch[i + LOOKAHEAD].slot);
+      if (!batch[i].moved) continue;
+      if (batch[i].entered)
+        fences_->appeared(batch[i].slot);
+      else
+        fences_->moved(batch[i].slot, puts.place(i));
+    }
   }
 
   template <class Rows>
@@ -334,6 +382,7 @@ class Entities {
       take(*ages_, taken);
       const Changes changes(taken.size());
       for (std::size_t i = 0; i < taken.size(); ++i) changes.set(i, -1, slots_[taken[i].slot].place);
+      make_room_to_leave(taken.size(), [&](std::size_t i) { return taken[i].slot; });
       changes.apply(tree, taken.size(), false);
     } catch (...) {
       for (const Ages::Taken& each : taken) slots_[each.slot].time = each.time;
@@ -341,7 +390,7 @@ class Entities {
       throw;
     }
     for (const Ages::Taken& each : taken) ages_->remove(each.time);
-    forget(taken.size(), [&](std::size_t i) { return taken[i].slot; });
+    forget(taken.size(), [&](std::size_t i) { return taken[i].slot; }, EXPIRED);
     return taken.size();
   }
 
@@ -349,6 +398,7 @@ class Entities {
   SlotTable table_;
   std::unique_ptr<Names> names_;
   std::unique_ptr<Ages> ages_;  // none until the oldest are asked for
+  Fences* fences_ = nullptr;    // none, or the index that is attached
 };
 
 }  // namespace dynhull

@@ -20,14 +20,6 @@ inline HullTree tree_of(const nb::object& xy) {
   return tree_of(as_points(xy));
 }
 
-// Counter-clockwise from the least.
-inline std::vector<Point> vertices_of(const HullTree& tree) {
-  std::vector<Point> vertices = tree.chain(LOWER);
-  const std::vector<Point> upper = tree.chain(UPPER);
-  if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
-  return vertices;
-}
-
 class Hull {
  public:
   Hull() = default;

@@ -175,6 +175,28 @@ class KeyedHull : public Hull {
     entities_.check(tree_);
   }
 
+  // Calls `work` with the entities and their tree, which nobody else reads or writes meanwhile.
+  template <class Work>
+  auto alone(std::size_t rows, Work work) {
+    const WriteLock lock(lock_, rows);
+    return work(entities_, tree_);
+  }
+
+  // The slots of keys that are there.
+  std::vector<std::uint32_t> slots_of(const nb::object& keys) {
+    const GivenKeys given = given_keys(keys).second;
+    std::vector<std::uint32_t> slots;
+    const ReadLock lock(lock_, given.size());
+    given.with(strings(), [&](const auto& batch) {
+      entities_.find(batch, [&](std::size_t, std::uint32_t, std::uint32_t slot) {
+        if (slot != NONE) slots.push_back(slot);
+      });
+    });
+    return slots;
+  }
+
+  bool strings() const { return entities_.slots().strings(); }
+
   std::pair<std::size_t, std::size_t> memory() {
     const auto [used, reserved] = Hull::memory();
     return {used + entities_.bytes(), reserved + entities_.bytes()};
@@ -182,8 +204,6 @@ class KeyedHull : public Hull {
 
  private:
   KeyedHull(const KeyedHull& other, const HullTree& tree) : Hull(HullTree(tree)), entities_(other.entities_) {}
-
-  bool strings() const { return entities_.slots().strings(); }
 
   static Only only_of(const nb::object& only) {
     if (only.is_none()) return Only::ALL;

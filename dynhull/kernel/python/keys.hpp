@@ -131,8 +131,10 @@ class KeyList {
   explicit KeyList(bool strings) : strings_(strings) {}
 
   void add(const Slots& slots, std::uint32_t slot) {
-    if (!strings_) return integers_.push_back(slots[slot].key);
-    const std::string_view key = slots.arena()[slots[slot].key];
+    strings_ ? add(slots.arena()[slots[slot].key]) : add(slots[slot].key);
+  }
+  void add(std::uint64_t key) { integers_.push_back(key); }
+  void add(std::string_view key) {
     lengths_.push_back(static_cast<char>(key.size()));
     data_.append(key);
   }

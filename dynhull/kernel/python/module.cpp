@@ -8,7 +8,7 @@
 
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
-#include "keyed.hpp"
+#include "fences.hpp"
 #include "window.hpp"
 
 using namespace nanobind::literals;
@@ -149,6 +149,38 @@ void add_entities(nb::module_& module) {
            "The least key at each vertex, in the order of `vertices`.");
 }
 
+void add_fences(nb::module_& module) {
+  nb::class_<FenceIndex>(module, "Fences", "Fences of one set of entities: see dynhull's class in Python.")
+      .def(nb::init<KeyedHull&>(), "entities"_a, nb::keep_alive<1, 2>())
+      .def("detach", &FenceIndex::detach, "End the reports of the entities.")
+      .def("__len__", &FenceIndex::size)
+      .def("has", &FenceIndex::has, "fence"_a, "Whether there is a fence of this number.")
+      .def("set_polygons", &FenceIndex::set_polygons,
+           nb::sig("def set_polygons(self, fence: int, polygons: list[list[dynhull.arrays.Points]], closed: bool, "
+                   "margin: float, cross: bool, inside: dynhull.keys.Keys | None) -> None"),
+           "fence"_a, "polygons"_a, "closed"_a, "margin"_a, "cross"_a, "inside"_a.none(),
+           "Add or replace a fence around polygons.")
+      .def("set_circle", &FenceIndex::set_circle,
+           nb::sig("def set_circle(self, fence: int, x: float, y: float, radius: float, closed: bool, margin: float, "
+                   "cross: bool, inside: dynhull.keys.Keys | None) -> None"),
+           "fence"_a, "x"_a, "y"_a, "radius"_a, "closed"_a, "margin"_a, "cross"_a, "inside"_a.none(),
+           "Add or replace a fence around a disk.")
+      .def("set_hull", &FenceIndex::set_hull,
+           nb::sig("def set_hull(self, fence: int, vertices: dynhull.arrays.Points, closed: bool, margin: float, "
+                   "cross: bool, without_self: bool, inside: dynhull.keys.Keys | None) -> None"),
+           "fence"_a, "vertices"_a, "closed"_a, "margin"_a, "cross"_a, "without_self"_a, "inside"_a.none(),
+           "Add or replace a fence around a convex hull; `without_self` around that of the entities.")
+      .def("drop", &FenceIndex::drop, nb::sig("def drop(self, fence: int) -> dynhull.keys.Keys"), "fence"_a,
+           "Remove a fence. Returns the keys that were inside.")
+      .def("inside", &FenceIndex::inside, nb::sig("def inside(self, fence: int) -> dynhull.keys.Keys"), "fence"_a,
+           "The keys inside, in order.")
+      .def("count", &FenceIndex::count, "fence"_a, "The number of keys inside.")
+      .def("take", &FenceIndex::take, nb::sig("def take(self) -> typing.Any"),
+           "What has crossed since the last call: fences, changes, causes, keys, places, previous, distances.")
+      .def("check", &FenceIndex::check, "Raise AssertionError if an invariant is broken.")
+      .def_prop_ro("memory", &FenceIndex::memory, "The bytes that the index uses.");
+}
+
 void add_window_tree(nb::module_& module) {
   nb::class_<Window, Hull>(module, "WindowTree",
                            "A tree of points with times, of which the oldest leave: see dynhull's in Python.")
@@ -242,6 +274,7 @@ NB_MODULE(_kernel, module) {
   nanobind::register_exception_translator(dynhull::translate_broken_invariant);
   dynhull::add_hull_tree(module);
   dynhull::add_entities(module);
+  dynhull::add_fences(module);
   dynhull::add_window_tree(module);
   dynhull::add_predicates(module);
   dynhull::add_arrays_and_static_hulls(module);

@@ -99,17 +99,26 @@ inline double distance(Point p, Edge edge) {
   return edge.a == edge.b ? distance(p, edge.a) : distance_to_line(p, edge.a, edge.b);
 }
 
-// The distance from p to the hull, rounded once: 0 inside, infinite without points.
-inline double distance(const Nodes& nodes, Point p) {
-  if (nodes.root == NONE) return INFINITE;
+// The part of the hull nearest to p: an edge, a vertex, twice, or p itself, twice, if it is not outside. None without
+// points.
+inline std::optional<Edge> nearest_part(const Nodes& nodes, Point p) {
+  if (nodes.root == NONE) return std::nullopt;
   const Location at = locate(nodes, p);
-  if (at.where >= 0) return 0;
+  if (at.where >= 0) return Edge{p, p};
   const Edge one = nearest(Cursor(nodes, nodes.root, at.side), at.side, p);
-  if (at.edge || !(one.a == one.b)) return distance(p, one);
+  if (at.edge || !(one.a == one.b)) return one;
   // p precedes or follows all points and may see both sides; at least one of the vertices is their common end.
   const Edge other = nearest(Cursor(nodes, nodes.root, LOWER), LOWER, p);
-  if (!(other.a == other.b)) return distance(p, other);
-  return distance(p, p < one.a ? std::max(one.a, other.a) : std::min(one.a, other.a));
+  if (!(other.a == other.b)) return other;
+  const Point vertex = p < one.a ? std::max(one.a, other.a) : std::min(one.a, other.a);
+  return Edge{vertex, vertex};
+}
+
+// The distance from p to the hull, rounded once: 0 inside, infinite without points.
+inline double distance(const Nodes& nodes, Point p) {
+  const std::optional<Edge> part = nearest_part(nodes, p);
+  if (!part) return INFINITE;
+  return part->a == p ? 0 : distance(p, *part);
 }
 
 // The vertex of a side farthest from the line through p and q (p < q) on that side of the line; or an edge.

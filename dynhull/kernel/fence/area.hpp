@@ -1,0 +1,290 @@
+// The area of a fence: polygons with holes, a convex polygon, a segment or a point, or a disk. Where a point is and
+// whether a segment meets the area, exactly. The reference in Python is dynhull/_areas.py.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "nearness.hpp"
+
+namespace dynhull {
+
+struct Box {
+  Point least, greatest;
+
+  static Box none() { return {HIGHEST, LOWEST}; }
+  static Box of(Edge edge) {
+    return {{std::min(edge.a.x, edge.b.x), std::min(edge.a.y, edge.b.y)},
+            {std::max(edge.a.x, edge.b.x), std::max(edge.a.y, edge.b.y)}};
+  }
+  void add(Point p) {
+    least = {std::min(least.x, p.x), std::min(least.y, p.y)};
+    greatest = {std::max(greatest.x, p.x), std::max(greatest.y, p.y)};
+  }
+  bool holds(Point p) const { return (least.x <= p.x) & (p.x <= greatest.x) & (least.y <= p.y) & (p.y <= greatest.y); }
+  bool meets(const Box& other) const {
+    return (least.x <= other.greatest.x) & (other.least.x <= greatest.x) & (least.y <= other.greatest.y) &
+           (other.least.y <= greatest.y);
+  }
+};
+
+// Rings of one polygon, each closed by its first corner, with the inside on the left.
+class Polygon {
+ public:
+  Polygon() = default;
+  explicit Polygon(std::span<const std::vector<Point>> rings) {
+    for (const std::vector<Point>& ring : rings) {
+      starts_.push_back(static_cast<std::uint32_t>(corners_.size()));
+      corners_.insert(corners_.end(), ring.begin(), ring.end());
+      corners_.push_back(ring.front());
+    }
+    starts_.push_back(static_cast<std::uint32_t>(corners_.size()));
+    for (Point p : corners_) box_.add(p);
+    if (corners_.size() > FEW_CORNERS) lay_slabs();
+  }
+
+  const Box& box() const { return box_; }
+  std::size_t bytes() const {
+    return sizeof *this + corners_.capacity() * sizeof(Point) +
+           (starts_.capacity() + slabs_.capacity() + in_slabs_.capacity()) * sizeof(std::uint32_t);
+  }
+  bool operator==(const Polygon& other) const { return corners_ == other.corners_ && starts_ == other.starts_; }
+
+  // Visits the edges.
+  template <class Visit>
+  void for_each_edge(Visit visit) const {
+    for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
+      for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i) visit(Edge{corners_[i], corners_[i + 1]});
+  }
+
+  // +1 inside, 0 on a ring, -1 outside: by the number of edges to the right of p.
+  int where(Point p) const {
+    if (!box_.holds(p)) return -1;
+    bool inside = false;
+    if (slabs_.empty()) {
+      for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
+        for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i)
+          if (!passes(corners_[i], corners_[i + 1], p, inside)) return 0;
+    } else {
+      const std::size_t slab = slab_of(p.y);
+      for (std::uint32_t k = slabs_[slab]; k < slabs_[slab + 1]; ++k)
+        if (!passes(corners_[in_slabs_[k]], corners_[in_slabs_[k] + 1], p, inside)) return 0;
+    }
+    return inside ? 1 : -1;
+  }
+
+  // Whether a part of the segment from p to q is inside, where neither p nor q is.
+  bool lets_in(Point p, Point q) const {
+    const Box way = Box::of({p, q});
+    if (!way.meets(box_)) return false;
+    bool found = false;
+    const auto enters = [&](Point at) {  // whether the segment is inside just before or after a point of a ring
+      return (!(at == q) && points_inside(at, q)) || (!(at == p) && points_inside(at, p));
+    };
+    for_each_edge([&](Edge edge) {
+      if (found || !way.meets(Box::of(edge))) return;
+      const int at_a = orientation(p, q, edge.a), at_b = orientation(p, q, edge.b);
+      const int at_p = orientation(edge.a, edge.b, p), at_q = orientation(edge.a, edge.b, q);
+      if (at_a * at_b > 0 || at_p * at_q > 0) return;
+      if (at_a * at_b < 0 && at_p * at_q < 0)
+        found = !touched_where_crossed(p, q, edge);
+      else
+        found = (at_a == 0 && way.holds(edge.a) && enters(edge.a)) ||
+                (at_p == 0 && Box::of(edge).holds(p) && enters(p)) ||
+                (at_q == 0 && Box::of(edge).holds(q) && enters(q));
+    });
+    return found;
+  }
+
+ private:
+  static constexpr std::size_t FEW_CORNERS = 24, CORNERS_OF_A_SLAB = 4;
+
+  // Flips `inside` if the edge crosses the ray from p to the right. False if p is on the edge.
+  static bool passes(Point a, Point b, Point p, bool& inside) {
+    const bool above_a = a.y > p.y, above_b = b.y > p.y;
+    if (above_a == above_b && !(a.y == p.y || b.y == p.y)) return true;
+    if (a.x < p.x && b.x < p.x) return true;
+    const int turn = orientation(a, b, p);
+    if (turn == 0 && Box::of({a, b}).holds(p)) return false;
+    inside ^= above_a != above_b && (turn > 0) == (b.y > a.y);
+    return true;
+  }
+
+  void lay_slabs() {
+    const std::size_t slabs = corners_.size() / CORNERS_OF_A_SLAB;
+    scale_ = static_cast<double>(slabs) / (box_.greatest.y - box_.least.y);
+    if (!(scale_ > 0 && scale_ < INFINITE)) return;
+    std::vector<std::uint32_t> ends(slabs + 1, 0);
+    slabs_ = ends;
+    const auto each = [&](auto visit) {
+      for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
+        for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i) {
+          const auto [low, high] = std::minmax(corners_[i].y, corners_[i + 1].y);
+          for (std::size_t slab = slab_of(low); slab <= slab_of(high); ++slab) visit(slab, i);
+        }
+    };
+    each([&](std::size_t slab, std::uint32_t) { ++slabs_[slab + 1]; });
+    for (std::size_t slab = 0; slab < slabs; ++slab) slabs_[slab + 1] += slabs_[slab];
+    ends = slabs_;
+    in_slabs_.resize(slabs_.back());
+    each([&](std::size_t slab, std::uint32_t i) { in_slabs_[ends[slab]++] = i; });
+  }
+  // Rounding is monotone: an edge is in the slabs of all heights between its ends.
+  std::size_t slab_of(double y) const {
+    const auto slab = static_cast<std::size_t>((y - box_.least.y) * scale_);
+    return std::min(slab, corners_.size() / CORNERS_OF_A_SLAB - 1);
+  }
+
+  // Whether the way from a point of rings to another one starts inside: on the inner side of every ring there.
+  bool points_inside(Point at, Point to) const {
+    bool inside = true;
+    for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring) {
+      const std::uint32_t from = starts_[ring], last = starts_[ring + 1] - 1;
+      for (std::uint32_t i = from; inside && i < last; ++i) {
+        const Point a = corners_[i], b = corners_[i + 1];
+        if (b == at)
+          inside = opens_to(a, b, corners_[i + 1 == last ? from + 1 : i + 2], to);
+        else if (!(a == at) && Box::of({a, b}).holds(at) && orientation(a, b, at) == 0)
+          inside = orientation(a, b, to) > 0;
+      }
+    }
+    return inside;
+  }
+  // Whether a point is in the open angle on the left of the corner b between a and c.
+  static bool opens_to(Point a, Point b, Point c, Point to) {
+    const bool left_before = orientation(a, b, to) > 0, left_after = orientation(b, c, to) > 0;
+    if (orientation(a, b, c) > 0) return left_before && left_after;
+    return left_before || left_after;
+  }
+
+  // Whether a corner is on both segments, which cross: the inside need not be beside the edge there.
+  bool touched_where_crossed(Point p, Point q, Edge edge) const {
+    const Box box = Box::of(edge);
+    return std::any_of(corners_.begin(), corners_.end(), [&](Point corner) {
+      return box.holds(corner) && orientation(edge.a, edge.b, corner) == 0 && orientation(p, q, corner) == 0;
+    });
+  }
+
+  std::vector<Point> corners_;
+  std::vector<std::uint32_t> starts_;  // of rings, and the end
+  Box box_ = Box::none();
+  double scale_ = 0;
+  std::vector<std::uint32_t> slabs_,
+      in_slabs_;  // horizontal slabs: the first of each in the list of corners, and the list
+};
+
+// Counter-clockwise from the least vertex, three or more.
+inline int where_in_convex(std::span<const Point> vertices, std::size_t greatest, Point p) {
+  const Point first = vertices[0], last = vertices[greatest];
+  if (p < first || p > last) return -1;
+  if (p == first || p == last) return 0;
+  const auto after =
+      std::upper_bound(vertices.begin(), vertices.begin() + static_cast<std::ptrdiff_t>(greatest) + 1, p);
+  const int above_lower = orientation(after[-1], after[0], p);
+  if (above_lower < 0) return -1;
+  const auto beyond = std::upper_bound(vertices.begin() + static_cast<std::ptrdiff_t>(greatest), vertices.end(), p,
+                                       [](Point q, Point vertex) { return !(q < vertex); });
+  const Point next = beyond == vertices.end() ? first : *beyond;
+  return std::min(above_lower, orientation(beyond[-1], next, p));
+}
+
+struct Area {
+  enum class Kind { POLYGONS, SEGMENT, DISK };
+
+  Kind kind = Kind::POLYGONS;
+  bool closed = true;
+  double margin = 0;
+  std::vector<Polygon> polygons = {};  // joined by "or"; none: the empty area
+  std::vector<Point> convex = {};      // the vertices, if there is one polygon and it is a hull
+  std::size_t greatest = 0;            // the number of the greatest of them
+  Edge segment = {};
+  Point center = {};
+  double radius = 0;
+
+  static Area of_polygons(std::vector<Polygon> polygons, bool closed, double margin) {
+    Area area{.closed = closed, .margin = margin};
+    area.polygons = std::move(polygons);
+    return area;
+  }
+  static Area of_disk(Point center, double radius, bool closed, double margin) {
+    Area area{.closed = closed, .margin = margin};
+    if (!closed && radius == 0) return area;
+    area.kind = Kind::DISK;
+    area.center = center;
+    area.radius = radius;
+    return area;
+  }
+  static Area of_hull(std::vector<Point> vertices, bool closed, double margin) {
+    Area area{.closed = closed, .margin = margin};
+    if (vertices.size() > 2) {
+      area.polygons.emplace_back(std::span(&vertices, 1));
+      area.greatest = static_cast<std::size_t>(std::max_element(vertices.begin(), vertices.end()) - vertices.begin());
+      area.convex = std::move(vertices);
+    } else if (!vertices.empty() && closed) {
+      area.kind = Kind::SEGMENT;
+      area.segment = {vertices.front(), vertices.back()};
+    }
+    return area;
+  }
+
+  // Whether both are described in the same way.
+  bool operator==(const Area& other) const {
+    return kind == other.kind && closed == other.closed && margin == other.margin && polygons == other.polygons &&
+           segment.a == other.segment.a && segment.b == other.segment.b && center == other.center &&
+           radius == other.radius;
+  }
+
+  // +1 inside, 0 on the boundary, -1 outside.
+  int where(Point p) const {
+    if (kind == Kind::DISK) return -compare_distance(p, center, radius, 0);
+    if (kind == Kind::SEGMENT) return Box::of(segment).holds(p) && orientation(segment.a, segment.b, p) == 0 ? 0 : -1;
+    if (!convex.empty()) return where_in_convex(convex, greatest, p);
+    int where = -1;
+    for (const Polygon& polygon : polygons)
+      if (where < 1) where = std::max(where, polygon.where(p));
+    return where;
+  }
+  bool holds(Point p) const { return where(p) >= (closed ? 0 : 1); }
+
+  template <class Visit>
+  void for_each_edge(Visit visit) const {
+    if (kind == Kind::SEGMENT) visit(segment);
+    for (const Polygon& polygon : polygons) polygon.for_each_edge(visit);
+  }
+
+  // The distance from p, rounded once: 0 inside and on the boundary, infinite if the area is empty.
+  double distance(Point p) const {
+    if (where(p) >= 0) return 0;
+    if (kind == Kind::DISK) return distance_to_circle(p, center, radius);
+    double least = INFINITE;
+    for_each_edge([&](Edge edge) { least = std::min(least, distance_to_segment(p, edge)); });
+    return least;
+  }
+
+  // Whether the segment from p to q, which differ, has a point of the area.
+  bool meets(Point p, Point q) const {
+    if (kind == Kind::DISK) {
+      const int more = compare_distance(center, nearest_part(center, {p, q}), radius);
+      return closed ? more <= 0 : more < 0;
+    }
+    if (holds(p) || holds(q)) return true;
+    bool met = false;
+    if (closed)
+      for_each_edge([&](Edge edge) { met = met || segments_meet({p, q}, edge); });
+    else
+      met = std::any_of(polygons.begin(), polygons.end(), [&](const Polygon& each) { return each.lets_in(p, q); });
+    return met;
+  }
+
+ private:
+  static bool segments_meet(Edge s, Edge t) {
+    if (!Box::of(s).meets(Box::of(t))) return false;
+    if (t.a == t.b) return orientation(s.a, s.b, t.a) == 0;
+    return orientation(s.a, s.b, t.a) * orientation(s.a, s.b, t.b) <= 0 &&
+           orientation(t.a, t.b, s.a) * orientation(t.a, t.b, s.b) <= 0;
+  }
+};
+
+}  // namespace dynhull

@@ -1,0 +1,1157 @@
+// An index of fences over the entities of a hull. The reference in Python is dynhull/_fences.py.
+//
+// Each subject has a box in which no boundary is, so that most moves cost four comparisons. A subject that has left its
+// box is decided by its zone when crossings are taken: exactly, for the fences that cover or touch the zone and those
+// that it was inside of. A new area visits the zones that its changed edges touch, and those between the old and the
+// new boundary; their subjects are decided when crossings are taken, too. A fence around the subjects' own hull looks
+// at the vertices only, and lists who is outside instead of inside.
+//
+// What the entities report cannot fail: they make room first. If memory does not suffice elsewhere, the index is torn:
+// the zones are made anew at the next call, and everything is decided again.
+#pragma once
+
+#include <map>
+#include <string_view>
+
+#include "../hull_tree.hpp"
+#include "../keyed/slots.hpp"
+#include "../query/queries.hpp"
+#include "fence.hpp"
+#include "subjects.hpp"
+#include "zones.hpp"
+
+namespace dynhull {
+
+enum Cause : std::uint8_t { MOVED = 1, AREA = 2, APPEARED = 4, REMOVED = 8, EXPIRED = 16 };
+
+struct Crossing {
+  std::int64_t fence;
+  std::uint64_t key;  // the integer, or where the string begins
+  Point now, before;
+  double distance;
+  std::uint8_t length;  // of the string
+  std::int8_t change;
+  std::uint8_t cause;
+};
+
+struct Crossings {
+  std::vector<Crossing> rows;
+  std::string strings;
+
+  std::string_view string(const Crossing& row) const { return {strings.data() + row.key, row.length}; }
+};
+
+class Fences {
+ public:
+  explicit Fences(const Slots& slots) : slots_(&slots) {
+    make_room(0);
+    slots.for_each([&](std::uint32_t slot) { subjects_[slot].zone = NONE; });
+  }
+
+  // What the entities report. Only the two functions that make room throw.
+
+  // For `extra` subjects that move or appear.
+  void make_room(std::size_t extra) {
+    subjects_.reserve(slots_->end() + extra, fresh());
+    grow(changes_, extra);
+    grow(strayed_, extra);
+  }
+  // For `count` subjects that leave, with `bytes` in their keys.
+  void make_room_to_leave(std::size_t count, std::size_t bytes) {
+    grow(gone_, count);
+    if (gone_keys_.capacity() < gone_keys_.size() + bytes)
+      gone_keys_.reserve(std::max(gone_keys_.size() + bytes, 2 * gone_keys_.size()));
+  }
+
+  void fetch(std::uint32_t slot) const { prefetch(&subjects_[slot]); }
+
+  void moved(std::uint32_t slot, Point before) {
+    ++reports_;
+    Change& change = changed(slot, before);
+    if (subjects_[slot].box.holds((*slots_)[slot].place) || change.strayed) return;
+    change.strayed = true;
+    strayed_.push_back(slot);
+  }
+
+  void appeared(std::uint32_t slot) {
+    ++reports_;
+    subjects_[slot] = fresh();
+    Change& change = changed(slot, NOWHERE);
+    change.fresh = true;
+    if (!zoned_) return;
+    change.strayed = true;
+    strayed_.push_back(slot);
+  }
+
+  void left(std::uint32_t slot, Cause cause) {
+    ++reports_;
+    Subject& subject = subjects_[slot];
+    Gone gone;
+    gone.before = (*slots_)[slot].place;
+    gone.cause = cause;
+    gone.inside = subject.inside;
+    if (const std::size_t number = number_of(subject); number < changes_.size()) {
+      gone.before = changes_[number].before;
+      gone.fresh = changes_[number].fresh;
+    }
+    if (slots_->strings()) {
+      const std::string_view key = slots_->arena()[(*slots_)[slot].key];
+      gone.key = gone_keys_.size();
+      gone.length = static_cast<std::uint8_t>(key.size());
+      gone_keys_.append(key);
+    } else {
+      gone.key = (*slots_)[slot].key;
+    }
+    gone_.push_back(gone);
+    unlist(subject);
+    subject = fresh();
+  }
+
+  // Fences
+
+  std::size_t size() const { return numbers_.size(); }
+  bool has(std::int64_t number) const { return numbers_.contains(number); }
+  std::int64_t count(std::int64_t number) const { return fence(number).count; }
+
+  // Adds a fence, or replaces the area of one. `inside`: slots to be inside of a fence that is then new in any case.
+  void set(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
+           const std::vector<std::uint32_t>* inside) {
+    ready();
+    const auto entry = numbers_.find(number);
+    if (entry == numbers_.end()) return add_whole(tree, number, std::move(area), cross, own, inside);
+    const std::uint32_t handle = entry->second;
+    Fence& fence = *fences_[handle];
+    if (inside) {
+      torn_ = true;
+      forget(handle);
+      return add_whole(tree, number, std::move(area), cross, own, inside);
+    }
+    if (fence.own != own) return change_kind(tree, handle, std::move(area), cross, own);
+    if (!own) crossable_ += std::size_t{cross} - std::size_t{fence.cross};
+    fence.cross = cross;
+    if (own) {
+      owners_changed_ = true;
+      recent_.push_back(handle);
+      auto empty = std::make_shared<const Area>(Area::of_hull({}, true, area.margin));
+      if (fence.area->margin != area.margin) fence.area = std::move(empty);  // until it is decided
+    } else if (!(*fence.area == area)) {
+      recent_.push_back(handle);
+      torn_ = true;
+      replace(handle, std::make_shared<const Area>(std::move(area)));
+      torn_ = false;
+      divide_crowded();
+    }
+  }
+
+  // Removes a fence, and returns the keys of the subjects that were inside.
+  Crossings drop(std::int64_t number) {
+    ready();
+    Crossings keys = inside(number);
+    torn_ = true;
+    forget(numbers_.at(number));
+    torn_ = false;
+    return keys;
+  }
+
+  // The keys inside, in order.
+  Crossings inside(std::int64_t number) {
+    ready();
+    Crossings keys;
+    const std::uint32_t handle = numbers_.at(number);
+    for_each_inside(handle, [&](std::uint32_t slot) { append_key(keys, slot); });
+    for (const Gone& gone : gone_)
+      if (was_inside(handle, gone)) append_key(keys, gone);
+    sort(keys);
+    return keys;
+  }
+
+  // Whether there is nothing to decide.
+  bool idle() const {
+    return strayed_.empty() && gone_.empty() && waiting_.empty() && !torn_ && taken_.rows.empty() &&
+           (owners_.empty() || (changes_.empty() && !owners_changed_));
+  }
+  // About how many subjects are to be decided.
+  std::size_t work() const { return strayed_.size() + gone_.size() + CROWD * (waiting_.size() + owners_.size()); }
+  // After a look that found nothing to decide.
+  void rest() { begin_again(); }
+
+  // What has crossed since the last call, in order. `slots_at` returns the slot of the least key at each of some
+  // vertices. If memory does not suffice, nothing is lost: the next call returns it.
+  template <class SlotsAt>
+  Crossings take(HullTree& tree, SlotsAt slots_at) {
+    const bool everyone = torn_;
+    ready();
+    for (const std::uint32_t handle : recent_)
+      if (fences_[handle] && *fences_[handle]->area == *fences_[handle]->decided)
+        fences_[handle]->decided = fences_[handle]->area;
+    std::sort(strayed_.begin(), strayed_.end());
+    strayed_.erase(std::unique(strayed_.begin(), strayed_.end()), strayed_.end());
+    if (everyone)
+      slots_->for_each([&](std::uint32_t slot) { decide(slot); });
+    else
+      decide_strayed();
+    decide_waiting();
+    for (const std::uint32_t handle : owners_) look_at_own(*fences_[handle], tree);
+    report_gone();
+    for (const std::uint32_t handle : owners_) decide_own(handle, tree, slots_at);
+    sort(taken_);
+    torn_ = false;
+    begin_again();
+    return std::exchange(taken_, {});
+  }
+
+  std::size_t bytes() const {
+    std::size_t bytes = subjects_.bytes() + zones_.bytes() + members_.bytes() + changes_.capacity() * sizeof(Change) +
+                        strayed_.capacity() * sizeof(std::uint32_t) + gone_.capacity() * sizeof(Gone) +
+                        gone_keys_.capacity();
+    for (const auto& fence : fences_) bytes += fence ? fence->bytes() : 0;
+    return bytes;
+  }
+
+  // Throws std::logic_error unless every subject is listed in the zone of its box, and every fence where it is.
+  void check() const {
+    const auto require = [](bool holds, const char* message) {
+      if (!holds) throw std::logic_error(message);
+    };
+    if (!zoned_ || torn_) return;
+    for (std::uint32_t zone = 0; zone < zones_.size(); ++zone) {
+      for (std::uint32_t at = 0; at < zones_[zone].subjects.size(); ++at) {
+        const std::uint32_t slot = zones_[zone].subjects[at];
+        require(there(slot) && subjects_[slot].zone == zone && subjects_[slot].at == at, "a subject misfiled");
+        const Point p = (*slots_)[slot].place;
+        if (subjects_[slot].box.holds(p)) require(zones_.find(p) == zone, "a subject in another zone");
+      }
+      for (const std::uint32_t handle : zones_[zone].covering) {
+        require(fences_[handle] && !fences_[handle]->own, "a fence that is gone covers a zone");
+        require(fences_[handle]->area->holds(Zones::sample(zones_[zone].box)), "a fence that does not cover its zone");
+      }
+    }
+  }
+
+ private:
+  static constexpr Point NOWHERE = {NO_TIME, NO_TIME};
+  static constexpr std::size_t CROWD = 96, MANY_PIECES = 20;  // beyond which a zone is divided
+  static constexpr std::uint32_t FIRST = 1;                   // the base of numbers of changes
+  static constexpr std::size_t LOOKAHEAD = 8;                 // subjects that are being prefetched
+
+  // A subject that has changed since crossings were last taken.
+  struct Change {
+    Point before;  // NaN if it is new
+    std::uint32_t slot;
+    bool fresh, strayed, returned;  // returned: in the same time it was gone
+  };
+  struct Gone {
+    Point before = NOWHERE;
+    std::uint64_t key = 0;
+    Cause cause = REMOVED;
+    std::uint8_t length = 0;
+    bool fresh = false, done = false;
+    Members inside;
+  };
+
+  static Subject fresh() { return {SafeBox::everywhere(), NONE, 0, 0, {}}; }
+
+  template <class Item>
+  static void grow(std::vector<Item>& items, std::size_t extra) {
+    if (items.capacity() < items.size() + extra) items.reserve(std::max(items.size() + extra, 2 * items.size()));
+  }
+
+  // Whether a slot has a subject now: since it was noted, all may have left.
+  bool there(std::uint32_t slot) const { return slot < slots_->end() && !slots_->free(slot); }
+
+  const Fence& fence(std::int64_t number) const { return *fences_[numbers_.at(number)]; }
+
+  // Changes
+
+  std::size_t number_of(const Subject& subject) const { return subject.changed - base_; }
+
+  Change& changed(std::uint32_t slot, Point before) {
+    Subject& subject = subjects_[slot];
+    if (number_of(subject) >= changes_.size() || subject.changed == 0) {
+      subject.changed = base_ + static_cast<std::uint32_t>(changes_.size());
+      changes_.push_back({before, slot, false, false, false});
+    }
+    return changes_[number_of(subject)];
+  }
+  const Change* change_of(std::uint32_t slot) const {
+    const Subject& subject = subjects_[slot];
+    return subject.changed != 0 && number_of(subject) < changes_.size() ? &changes_[number_of(subject)] : nullptr;
+  }
+
+  // Forgets all changes. Their numbers are not used again until all numbers have been.
+  void begin_again() {
+    if (changes_.size() > (std::size_t{1} << 31) - base_) {
+      for (std::uint32_t slot = 0; slot < subjects_.size(); ++slot) subjects_[slot].changed = 0;
+      base_ = FIRST;
+    } else {
+      base_ += static_cast<std::uint32_t>(changes_.size());
+    }
+    changes_.clear();
+    strayed_.clear();
+    for (Gone& gone : gone_) members_.clear(gone.inside);
+    gone_.clear();
+    gone_keys_.clear();
+    for (const std::uint32_t handle : recent_)
+      if (Fence* const fence = fences_[handle].get()) {
+        fence->decided = fence->area;
+        fence->decided_own = fence->own;
+        fence->given = false;
+        fence->earlier.reset();
+      }
+    recent_.clear();
+    for (const std::uint32_t handle : owners_) fences_[handle]->decided = fences_[handle]->area;
+    places_.reset();
+    owners_changed_ = false;
+  }
+
+  // Zones
+
+  void unlist(Subject& subject) {
+    if (subject.zone == NONE) return;
+    std::vector<std::uint32_t>& subjects = zones_[subject.zone].subjects;
+    subjects_[subjects.back()].at = subject.at;
+    subjects[subject.at] = subjects.back();
+    subjects.pop_back();
+    subject.zone = NONE;
+  }
+  void list(std::uint32_t slot, std::uint32_t zone) {
+    std::vector<std::uint32_t>& subjects = zones_[zone].subjects;
+    subjects.push_back(slot);
+    subjects_[slot].zone = zone;
+    subjects_[slot].at = static_cast<std::uint32_t>(subjects.size() - 1);
+    if (is_crowded(zones_[zone])) crowded_.push_back(zone);
+  }
+
+  // Lists every subject in the zone where it is. Makes the zones if there are none, or if the index is torn.
+  void ready() {
+    if (returned_ != reports_) return_gone();
+    if (torn_ && zoned_) rebuild();
+    if (!zoned_) return;
+    for (const std::uint32_t slot : strayed_)
+      if (there(slot)) relist(slot);
+    divide_crowded();
+  }
+  void relist(std::uint32_t slot) {
+    Subject& subject = subjects_[slot];
+    const Point p = (*slots_)[slot].place;
+    const std::uint32_t zone = zones_.find(p);
+    if (zone != subject.zone) {
+      grow(zones_[zone].subjects, 1);
+      unlist(subject);
+      list(slot, zone);
+    }
+    lay_box(subject, p);
+  }
+  void lay_box(Subject& subject, Point p) {
+    const Zone& zone = zones_[subject.zone];
+    subject.box = SafeBox::everywhere();
+    subject.box.stay_in(zone.box);
+    for (const Zone::Piece& piece : zone.pieces) subject.box.keep_off(fences_[piece.fence]->strip(piece.edge), p);
+  }
+
+  void rebuild() {
+    zones_ = Zones();
+    crowded_.clear();
+    waiting_.clear();
+    Zone& all = zones_[0];
+    for (std::uint32_t handle = 0; handle < fences_.size(); ++handle)
+      for (std::size_t i = 0; fences_[handle] && i < fences_[handle]->sorted.size(); ++i)
+        all.pieces.push_back({handle, fences_[handle]->sorted[i].second});
+    all.subjects.reserve(slots_->size());
+    for (std::uint32_t slot = 0; slot < subjects_.size(); ++slot) subjects_[slot].zone = NONE;
+    slots_->for_each([&](std::uint32_t slot) {
+      Subject& subject = subjects_[slot];
+      former_.assign(members_.of(subject.inside).begin(), members_.of(subject.inside).end());
+      for (const std::uint32_t handle : former_)
+        if (!fences_[handle]) members_.remove(subject.inside, handle);
+      subject.zone = 0;
+      subject.at = static_cast<std::uint32_t>(all.subjects.size());
+      all.subjects.push_back(slot);
+    });
+    crowded_.assign(1, 0);
+    divide_crowded();
+    for (std::uint32_t zone = 0; zone < zones_.size(); ++zone)
+      for (const std::uint32_t slot : zones_[zone].subjects) lay_box(subjects_[slot], (*slots_)[slot].place);
+  }
+
+  static bool is_crowded(const Zone& zone) {
+    return zone.subjects.size() > std::max(CROWD, zone.most) || zone.pieces.size() > std::max(MANY_PIECES, zone.most);
+  }
+
+  void divide_crowded() {
+    while (!crowded_.empty()) {
+      const std::uint32_t zone = crowded_.back();
+      crowded_.pop_back();
+      if (is_crowded(zones_[zone])) divide(zone);
+    }
+  }
+
+  void divide(std::uint32_t number) {
+    Box extent = Box::none();
+    const Box box = zones_[number].box;
+    const bool by_subjects = zones_[number].subjects.size() > std::max(CROWD, zones_[number].most);
+    if (by_subjects)
+      for (const std::uint32_t slot : zones_[number].subjects) extent.add((*slots_)[slot].place);
+    else
+      for (const Zone::Piece& piece : zones_[number].pieces) {
+        const Box strip = around(fences_[piece.fence]->strip(piece.edge));
+        extent.add(strip.least);
+        extent.add(strip.greatest);
+      }
+    const Point split = {middle(extent.least.x, extent.greatest.x, box.least.x, box.greatest.x),
+                         middle(extent.least.y, extent.greatest.y, box.least.y, box.greatest.y)};
+    const std::size_t size = by_subjects ? zones_[number].subjects.size() : zones_[number].pieces.size();
+    zones_[number].most = 2 * size;  // unless dividing helps
+    if (split == HIGHEST) return;
+
+    // Everything that may fail is done on the side.
+    Zone parts[4];
+    for (unsigned q = 0; q < 4; ++q) {
+      parts[q].box = box;
+      (q & 1 ? parts[q].box.least.x : parts[q].box.greatest.x) = split.x;
+      (q & 2 ? parts[q].box.least.y : parts[q].box.greatest.y) = split.y;
+    }
+    const Zone& old = zones_[number];
+    for (const std::uint32_t slot : old.subjects)
+      parts[Zones::quarter(split, (*slots_)[slot].place)].subjects.push_back(slot);
+    for (Zone& part : parts) {
+      part.covering = old.covering;
+      part.pending = old.pending;
+      part.subjects.shrink_to_fit();
+      if (!(part.box.least.x < part.box.greatest.x && part.box.least.y < part.box.greatest.y)) continue;
+      for (std::size_t i = 0; i < old.pieces.size();) {
+        const std::uint32_t handle = old.pieces[i].fence;
+        const Fence& fence = *fences_[handle];
+        bool touched = false;
+        for (; i < old.pieces.size() && old.pieces[i].fence == handle; ++i)
+          if (may_touch(fence.strip(old.pieces[i].edge), part.box)) {
+            part.pieces.push_back(old.pieces[i]);
+            touched = true;
+          }
+        if (!touched && fence.area->holds(Zones::sample(part.box))) part.covering.push_back(handle);
+      }
+      part.pieces.shrink_to_fit();
+    }
+    std::size_t largest = 0, pieces = 0;
+    for (const Zone& part : parts) {
+      largest = std::max(largest, by_subjects ? part.subjects.size() : part.pieces.size());
+      pieces += part.pieces.size();
+    }
+    if (largest == size || (!by_subjects && pieces > 2 * size)) return;
+    grow(crowded_, 4);
+    grow(waiting_, 4);
+    const auto children = zones_.divide(number, split);
+    for (unsigned q = 0; q < 4; ++q) {
+      Zone& zone = zones_[children[q]];
+      zone = std::move(parts[q]);
+      for (std::uint32_t at = 0; at < zone.subjects.size(); ++at) {
+        Subject& subject = subjects_[zone.subjects[at]];
+        subject.zone = children[q];
+        subject.at = at;
+        subject.box.stay_in(zone.box);
+      }
+      if (is_crowded(zone)) crowded_.push_back(children[q]);
+      if (!zone.pending.empty()) waiting_.push_back(children[q]);
+    }
+  }
+  // Between the ends of what is in a box; infinite if it is all at one coordinate.
+  static double middle(double least, double greatest, double from, double to) {
+    least = std::max(least, from);
+    greatest = std::min(greatest, to);
+    if (!(least < greatest)) return INFINITE;
+    const double middle = least / 2 + greatest / 2;
+    return middle > least ? middle : greatest;
+  }
+
+  // Setting fences
+
+  void add_whole(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
+                 const std::vector<std::uint32_t>* inside) {
+    torn_ = true;
+    try {
+      add(tree, number, std::make_shared<const Area>(std::move(area)), cross, own, inside);
+    } catch (...) {
+      if (const auto entry = numbers_.find(number); entry != numbers_.end()) discard(entry->second);
+      throw;
+    }
+    torn_ = false;
+    divide_crowded();
+  }
+
+  std::uint32_t add(const HullTree& tree, std::int64_t number, std::shared_ptr<const Area> area, bool cross, bool own,
+                    const std::vector<std::uint32_t>* inside) {
+    if (!zoned_ && !own) {
+      zoned_ = true;
+      rebuild();
+    }
+    auto fence = std::make_unique<Fence>();
+    fence->number = number;
+    fence->cross = cross;
+    fence->own = fence->decided_own = own;
+    fence->area = std::move(area);
+    fence->decided = fence->area;
+    fence->given = inside != nullptr;
+    fence->earlier = places();
+    grow(recent_, 1);
+    grow(owners_, 1);
+    const std::uint32_t handle = free_handle();
+    numbers_.emplace(number, handle);
+    fences_[handle] = std::move(fence);
+    recent_.push_back(handle);
+    if (own) {
+      owners_.push_back(handle);
+      add_own(tree, handle, inside);
+    } else {
+      crossable_ += cross;
+      add_pieces(handle, inside);
+    }
+    return handle;
+  }
+
+  // Between a fence around the subjects' own hull and another one: who was inside, stays inside until decided.
+  void change_kind(const HullTree& tree, std::uint32_t handle, Area area, bool cross, bool own) {
+    std::vector<std::uint32_t> inside;
+    for_each_inside(handle, [&](std::uint32_t slot) { inside.push_back(slot); });
+    std::vector<std::size_t> gone;
+    for (std::size_t i = 0; i < gone_.size(); ++i)
+      if (was_inside(handle, gone_[i])) gone.push_back(i);
+    const auto decided = fences_[handle]->decided;
+    const auto earlier = fences_[handle]->earlier;
+    const bool decided_own = fences_[handle]->decided_own;
+    const std::int64_t number = fences_[handle]->number;
+    torn_ = true;
+    forget(handle);
+    const std::uint32_t changed = add(tree, number, std::make_shared<const Area>(std::move(area)), cross, own, &inside);
+    Fence& fence = *fences_[changed];
+    fence.decided = decided;
+    fence.decided_own = decided_own;
+    fence.given = false;
+    fence.earlier = earlier;
+    for (std::size_t i = 0, next = 0; i < gone_.size(); ++i) {
+      const bool was = next < gone.size() && gone[next] == i;
+      next += was;
+      fence.count += was;
+      if (was != own && (!own || was_there(fence, key_of(gone_[i]), gone_[i].fresh)))
+        members_.add(gone_[i].inside, changed);
+    }
+    torn_ = false;
+    divide_crowded();
+  }
+
+  std::uint32_t free_handle() {
+    for (; first_free_ < fences_.size(); ++first_free_)
+      if (!fences_[first_free_]) return static_cast<std::uint32_t>(first_free_);
+    fences_.emplace_back();
+    return static_cast<std::uint32_t>(first_free_);
+  }
+
+  // Where the keys that have changed are now. Fences that are set at one time share it.
+  std::shared_ptr<const Places> places() {
+    if (changes_.empty() && gone_.empty()) return nullptr;
+    if (places_ && placed_ == reports_) return places_;
+    auto places = std::make_shared<Places>();
+    for (const Gone& gone : gone_) places->insert_or_assign(key_of(gone), std::nullopt);
+    for (std::size_t i = 0; i < changes_.size(); ++i)
+      if (current(i)) places->insert_or_assign(key_of(changes_[i].slot), (*slots_)[changes_[i].slot].place);
+    placed_ = reports_;
+    return places_ = std::move(places);
+  }
+  // Whether a change is of a subject that is there, under this number.
+  bool current(std::size_t change) const {
+    const std::uint32_t slot = changes_[change].slot;
+    return there(slot) && change_of(slot) == &changes_[change];
+  }
+
+  void add_pieces(std::uint32_t handle, const std::vector<std::uint32_t>* inside) {
+    Fence& fence = *fences_[handle];
+    const Area& area = *fence.area;
+    std::vector<std::uint32_t> ids;
+    for (const Edge& edge : Fence::sorted_edges(area)) {
+      const std::uint32_t id = fence.add(edge);
+      fence.sorted.emplace_back(edge, id);
+      ids.push_back(id);
+    }
+    for (std::size_t i = 0; inside && i < inside->size(); ++i) {
+      members_.add(subjects_[(*inside)[i]].inside, handle);
+      ++fence.count;
+    }
+    zones_.descend(
+        ids, [&](std::uint32_t id) { return fence.strip(id); }, [&](Point p) { return area.holds(p); },
+        [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
+          Zone& zone = zones_[number];
+          if (touching.empty()) zone.covering.push_back(handle);
+          for (const std::uint32_t id : touching) zone.pieces.push_back({handle, id});
+          if (inside) wait_for(handle, number);
+          if (is_crowded(zone)) crowded_.push_back(number);
+          for (const std::uint32_t slot : zone.subjects) {
+            const Point p = (*slots_)[slot].place;
+            for (const std::uint32_t id : touching) subjects_[slot].box.keep_off(fence.strip(id), p);
+            if (inside || !(touching.empty() || area.holds(p))) continue;
+            members_.add(subjects_[slot].inside, handle);
+            ++fence.count;
+          }
+        });
+    if (inside)
+      for (const std::uint32_t slot : *inside) wait_for(handle, subjects_[slot].zone);
+  }
+  void wait_for(std::uint32_t handle, std::uint32_t zone) {
+    std::vector<std::uint32_t>& pending = zones_[zone].pending;
+    if (pending.empty()) waiting_.push_back(zone);
+    if (std::find(pending.begin(), pending.end(), handle) == pending.end()) pending.push_back(handle);
+  }
+
+  // Replaces an area. Edges that stay need no visit, unless several polygons make one of them lie inside of another.
+  void replace(std::uint32_t handle, std::shared_ptr<const Area> area) {
+    Fence& fence = *fences_[handle];
+    const std::shared_ptr<const Area> old = fence.area;
+    const bool keeps = old->kind == area->kind && old->kind != Area::Kind::DISK && old->margin == area->margin &&
+                       old->closed == area->closed && old->polygons.size() < 2 && area->polygons.size() < 2;
+    constexpr std::uint32_t ADDED = std::uint32_t{1} << 31;
+    std::vector<std::uint32_t> ids, removed;
+    std::vector<std::pair<Edge, std::uint32_t>> sorted;
+    auto next = fence.sorted.begin();
+    for (const Edge& edge : Fence::sorted_edges(*area)) {
+      for (; keeps && next != fence.sorted.end() && Fence::less(next->first, edge); ++next)
+        removed.push_back(next->second);
+      if (keeps && next != fence.sorted.end() && !Fence::less(edge, next->first)) {
+        sorted.push_back(*next++);
+        continue;
+      }
+      const std::uint32_t id = fence.add(edge);
+      sorted.emplace_back(edge, id);
+      ids.push_back(id | ADDED);
+    }
+    for (; next != fence.sorted.end(); ++next) removed.push_back(next->second);
+    ids.insert(ids.end(), removed.begin(), removed.end());
+    std::vector<bool> is_removed(fence.edges.size());
+    for (const std::uint32_t id : removed) is_removed[id] = true;
+
+    zones_.descend(
+        ids,
+        [&](std::uint32_t id) { return id & ADDED ? fence.strip_of(*area, id & ~ADDED) : fence.strip_of(*old, id); },
+        [&](Point p) { return old->holds(p) != area->holds(p); },
+        [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
+          Zone& zone = zones_[number];
+          wait_for(handle, number);
+          std::vector<Zone::Piece> kept;
+          std::erase_if(zone.pieces, [&](const Zone::Piece& piece) {
+            if (piece.fence != handle) return false;
+            if (!is_removed[piece.edge]) kept.push_back(piece);
+            return true;
+          });
+          for (const std::uint32_t id : touching)
+            if (id & ADDED) kept.push_back({handle, id & ~ADDED});
+          zone.pieces.insert(zone.pieces.end(), kept.begin(), kept.end());
+          std::erase(zone.covering, handle);
+          if (kept.empty() && area->holds(Zones::sample(zone.box))) zone.covering.push_back(handle);
+          if (is_crowded(zone)) crowded_.push_back(number);
+          for (const std::uint32_t id : touching) {
+            if (!(id & ADDED)) continue;
+            const Strip strip = fence.strip_of(*area, id & ~ADDED);
+            for (const std::uint32_t slot : zone.subjects) subjects_[slot].box.keep_off(strip, (*slots_)[slot].place);
+          }
+          if (fence.cross && !touching.empty())
+            for (const std::uint32_t slot : zone.subjects) stray_if_changed(slot);
+        });
+    fence.free.insert(fence.free.end(), removed.begin(), removed.end());
+    fence.sorted = std::move(sorted);
+    fence.area = std::move(area);
+  }
+  // A way that was in the subject's box may meet a new area.
+  void stray_if_changed(std::uint32_t slot) {
+    if (change_of(slot) == nullptr || change_of(slot)->strayed) return;
+    strayed_.push_back(slot);
+    changes_[number_of(subjects_[slot])].strayed = true;
+  }
+
+  // Removes a fence and its memberships.
+  void forget(std::uint32_t handle) {
+    const Fence& fence = *fences_[handle];
+    for (Gone& gone : gone_) members_.remove(gone.inside, handle);
+    if (fence.own) {
+      for (const std::uint32_t slot : fence.outside) members_.remove(subjects_[slot].inside, handle);
+    } else {
+      for_each_zone(handle, [&](std::uint32_t number) {
+        Zone& zone = zones_[number];
+        std::erase(zone.covering, handle);
+        std::erase(zone.pending, handle);
+        std::erase_if(zone.pieces, [&](const Zone::Piece& piece) { return piece.fence == handle; });
+        for (const std::uint32_t slot : zone.subjects) members_.remove(subjects_[slot].inside, handle);
+      });
+      for (const std::uint32_t slot : strayed_) members_.remove(subjects_[slot].inside, handle);
+    }
+    discard(handle);
+  }
+  void discard(std::uint32_t handle) {
+    const Fence& fence = *fences_[handle];
+    if (!fence.own) crossable_ -= fence.cross;
+    std::erase(owners_, handle);
+    numbers_.erase(fence.number);
+    fences_[handle].reset();
+    first_free_ = std::min(first_free_, std::size_t{handle});
+  }
+
+  // Visits the zones that list a fence, each once.
+  template <class Visit>
+  void for_each_zone(std::uint32_t handle, Visit visit) {
+    const Fence& fence = *fences_[handle];
+    std::vector<std::uint32_t> ids, zones;
+    for (const auto& [edge, id] : fence.sorted) ids.push_back(id);
+    zones_.descend(
+        ids, [&](std::uint32_t id) { return fence.strip(id); }, [&](Point p) { return fence.area->holds(p); },
+        [&](std::uint32_t number, std::span<const std::uint32_t>) { zones.push_back(number); });
+    for (const std::uint32_t number : waiting_) {
+      const std::vector<std::uint32_t>& pending = zones_[number].pending;
+      if (std::find(pending.begin(), pending.end(), handle) != pending.end()) zones.push_back(number);
+    }
+    std::sort(zones.begin(), zones.end());
+    zones.erase(std::unique(zones.begin(), zones.end()), zones.end());
+    for (const std::uint32_t number : zones) visit(number);
+  }
+
+  // Visits the subjects inside that are there.
+  template <class Visit>
+  void for_each_inside(std::uint32_t handle, Visit visit) {
+    if (fences_[handle]->own) {
+      slots_->for_each([&](std::uint32_t slot) {
+        if (was_inside_own(handle, slot)) visit(slot);
+      });
+      return;
+    }
+    std::vector<std::uint32_t> strays;  // who was inside and is elsewhere now
+    for (const std::uint32_t slot : strayed_)
+      if (there(slot) && members_.has(subjects_[slot].inside, handle)) strays.push_back(slot);
+    std::sort(strays.begin(), strays.end());
+    strays.erase(std::unique(strays.begin(), strays.end()), strays.end());
+    for_each_zone(handle, [&](std::uint32_t zone) {
+      for (const std::uint32_t slot : zones_[zone].subjects)
+        if (members_.has(subjects_[slot].inside, handle) && !std::binary_search(strays.begin(), strays.end(), slot))
+          visit(slot);
+    });
+    for (const std::uint32_t slot : strays) visit(slot);
+  }
+
+  // Deciding
+
+  static bool changed(const Fence& fence) {
+    return fence.given || fence.area != fence.decided || fence.own != fence.decided_own;
+  }
+
+  void decide_strayed() {
+    for (std::size_t i = 0; i < strayed_.size(); ++i) {
+      if (i + LOOKAHEAD < strayed_.size()) {
+        prefetch(&(*slots_)[strayed_[i + LOOKAHEAD]]);
+        prefetch(&subjects_[strayed_[i + LOOKAHEAD]]);
+      }
+      if (there(strayed_[i])) decide(strayed_[i]);
+    }
+  }
+
+  void decide(std::uint32_t slot) {
+    const Point p = (*slots_)[slot].place;
+    const std::uint32_t number = subjects_[slot].zone;
+    if (number == NONE) return;  // there are no zones
+    const Zone& zone = zones_[number];
+    found_.clear();
+    for (const std::uint32_t handle : zone.covering) found_.push_back(handle);
+    for (std::size_t i = 0; i < zone.pieces.size();) {
+      const std::uint32_t handle = zone.pieces[i].fence;
+      if (holds(zone, i, p, members_.has(subjects_[slot].inside, handle))) found_.push_back(handle);
+      for (; i < zone.pieces.size() && zone.pieces[i].fence == handle; ++i) continue;
+    }
+    former_.clear();
+    for (const std::uint32_t handle : members_.of(subjects_[slot].inside))
+      if (!fences_[handle]->own && std::find(found_.begin(), found_.end(), handle) == found_.end())
+        former_.push_back(handle);
+    for (const std::uint32_t handle : former_) cross(handle, slot, -1);
+    for (const std::uint32_t handle : found_)
+      if (!members_.has(subjects_[slot].inside, handle)) cross(handle, slot, +1);
+    if (const Change* const change = change_of(slot)) decide_ways(*change, p);
+  }
+
+  // Decides for the fence of a zone's pieces from number `i` on.
+  bool holds(const Zone& zone, std::size_t i, Point p, bool was) const {
+    const std::uint32_t handle = zone.pieces[i].fence;
+    const Fence& fence = *fences_[handle];
+    const Area& area = *fence.area;
+    const int where = area.where(p);
+    if (where >= (area.closed ? 0 : 1)) return true;
+    if (!was || area.margin == 0) return false;
+    if (where == 0) return true;
+    if (area.kind == Area::Kind::DISK) return compare_distance(p, area.center, area.radius, area.margin) <= 0;
+    for (; i < zone.pieces.size() && zone.pieces[i].fence == handle; ++i)
+      if (compare_distance(p, nearest_part(p, fence.edges[zone.pieces[i].edge]), area.margin) <= 0) return true;
+    return false;
+  }
+
+  // Reports the fences that a subject has passed through: it was outside, is outside, and the way meets the area.
+  void decide_ways(const Change& change, Point now) {
+    if (crossable_ == 0) return;
+    ways_.clear();
+    const std::uint32_t slot = change.slot;
+    const auto collect = [&](Point from) {
+      std::vector<std::uint32_t> ids(1, 0);
+      const Strip way = {{from, now}, 0, -1};
+      zones_.descend(
+          ids, [&](std::uint32_t) { return way; }, [](Point) { return false; },
+          [&](std::uint32_t number, std::span<const std::uint32_t>) {
+            for (const std::uint32_t handle : zones_[number].covering) ways_.push_back(handle);
+            for (const Zone::Piece& piece : zones_[number].pieces) ways_.push_back(piece.fence);
+          });
+    };
+    if (!change.fresh && !(change.before == now)) collect(change.before);
+    for (const std::uint32_t handle : recent_) {  // a place at the time when a fence was set
+      const Fence* const fence = fences_[handle].get();
+      if (fence == nullptr || !fence->cross || !fence->earlier) continue;
+      const std::optional<Point> from = start(*fence, slot);
+      if (from && !(*from == now) && !(*from == change.before)) collect(*from);
+    }
+    std::sort(ways_.begin(), ways_.end());
+    ways_.erase(std::unique(ways_.begin(), ways_.end()), ways_.end());
+    for (const std::uint32_t handle : ways_) {
+      const Fence& fence = *fences_[handle];
+      if (!fence.cross || members_.has(subjects_[slot].inside, handle) || just_left(handle)) continue;
+      const std::optional<Point> from = start(fence, slot);
+      if (from && !(*from == now) && fence.area->meets(*from, now)) cross(handle, slot, 0);
+    }
+  }
+  bool just_left(std::uint32_t handle) const {
+    return std::find(former_.begin(), former_.end(), handle) != former_.end();
+  }
+
+  // Where a subject was before, or when the fence was set; nothing if it was not there.
+  std::optional<Point> start(const Fence& fence, std::uint32_t slot) const {
+    if (fence.earlier)
+      if (const auto entry = fence.earlier->find(key_of(slot)); entry != fence.earlier->end()) return entry->second;
+    const Change* const change = change_of(slot);
+    if (change == nullptr) return (*slots_)[slot].place;
+    return change->fresh ? std::nullopt : std::optional(change->before);
+  }
+
+  void decide_waiting() {
+    for (; !waiting_.empty(); waiting_.pop_back()) {
+      const std::uint32_t number = waiting_.back();
+      const Zone& zone = zones_[number];
+      for (const std::uint32_t handle : zone.pending) {
+        const bool covers = zone.covered_by(handle);
+        std::size_t piece = 0;
+        while (piece < zone.pieces.size() && zone.pieces[piece].fence != handle) ++piece;
+        const bool touches = piece < zone.pieces.size();
+        for (std::size_t at = 0; at < zone.subjects.size(); ++at) {
+          if (at + LOOKAHEAD < zone.subjects.size()) {
+            prefetch(&(*slots_)[zone.subjects[at + LOOKAHEAD]]);
+            prefetch(&subjects_[zone.subjects[at + LOOKAHEAD]]);
+          }
+          const std::uint32_t slot = zone.subjects[at];
+          const bool was = members_.has(subjects_[slot].inside, handle);
+          const bool now = covers || (touches && holds(zone, piece, (*slots_)[slot].place, was));
+          if (now != was) cross(handle, slot, now ? +1 : -1);
+        }
+      }
+      zones_[number].pending.clear();
+    }
+  }
+
+  // Reports a crossing and notes the new state.
+  void cross(std::uint32_t handle, std::uint32_t slot, int change, std::optional<double> distance = {}) {
+    Fence& fence = *fences_[handle];
+    const Change* const moved = change_of(slot);
+    Crossing row{};
+    row.fence = fence.number;
+    row.now = (*slots_)[slot].place;
+    row.before = moved ? moved->before : row.now;
+    row.change = static_cast<std::int8_t>(change);
+    if (moved && moved->fresh)
+      row.cause = APPEARED;
+    else if (!(row.before == row.now))
+      row.cause = MOVED;
+    else
+      row.cause = 0;
+    if (changed(fence) || row.cause == 0) row.cause |= AREA;
+    row.distance = distance ? *distance : change > 0 ? 0 : fence.area->distance(row.now);
+    append_key(taken_, slot, row);
+    try {
+      if (change != 0 && (change > 0) != fence.own)
+        members_.add(subjects_[slot].inside, handle);
+      else if (change != 0)
+        members_.remove(subjects_[slot].inside, handle);
+    } catch (...) {
+      taken_.rows.pop_back();
+      throw;
+    }
+    fence.count += change;
+  }
+
+  // Subjects that are gone
+
+  // Gives subjects that have come back under their key what was known of them.
+  void return_gone() {
+    if (gone_.empty()) return;
+    std::unordered_map<std::string, std::uint32_t> slots;
+    for (std::size_t i = 0; i < changes_.size(); ++i)
+      if (changes_[i].fresh && current(i)) slots.emplace(key_of(changes_[i].slot), changes_[i].slot);
+    std::unordered_map<std::string, std::size_t> last;
+    for (std::size_t i = 0; i < gone_.size(); ++i) last[key_of(gone_[i])] = i;
+    // All is kept by the last time that the key was there, the first place included.
+    for (std::size_t i = gone_.size(); i-- > 0;) {
+      const std::size_t to = last.at(key_of(gone_[i]));
+      if (to == i || gone_[i].done) continue;
+      merge(gone_[i], gone_[to]);
+    }
+    for (const auto& [key, i] : last) {
+      const auto entry = slots.find(key);
+      if (entry == slots.end() || gone_[i].done) continue;
+      Subject& subject = subjects_[entry->second];
+      former_.assign(members_.of(gone_[i].inside).begin(), members_.of(gone_[i].inside).end());
+      for (const std::uint32_t handle : owners_)
+        if (!members_.has(gone_[i].inside, handle) && !was_inside(handle, gone_[i])) former_.push_back(handle);
+      for (const std::uint32_t handle : former_) {
+        if (members_.has(subject.inside, handle)) continue;
+        if (fences_[handle]->own) fences_[handle]->outside.push_back(entry->second);
+        members_.add(subject.inside, handle);
+      }
+      Change& change = changes_[number_of(subject)];
+      change.returned = true;
+      if (!gone_[i].fresh) {
+        change.before = gone_[i].before;
+        change.fresh = false;
+      }
+      members_.clear(gone_[i].inside);
+      gone_[i].done = true;
+    }
+    returned_ = reports_;
+  }
+  void merge(Gone& from, Gone& to) {
+    found_.assign(members_.of(from.inside).begin(), members_.of(from.inside).end());
+    for (const std::uint32_t handle : found_)
+      if (!members_.has(to.inside, handle)) members_.add(to.inside, handle);
+    if (!from.fresh) {
+      to.before = from.before;
+      to.fresh = false;
+    }
+    members_.clear(from.inside);
+    from.done = true;
+  }
+
+  // Whether a subject that is gone was inside of a fence when its state was last decided.
+  bool was_inside(std::uint32_t handle, const Gone& gone) const {
+    const Fence& fence = *fences_[handle];
+    const bool listed = members_.has(gone.inside, handle);
+    if (gone.done || !fence.own) return listed && !gone.done;
+    return !listed && was_there(fence, key_of(gone), gone.fresh);
+  }
+  bool was_inside_own(std::uint32_t handle, std::uint32_t slot) const {
+    const Change* const change = change_of(slot);
+    return !members_.has(subjects_[slot].inside, handle) &&
+           was_there(*fences_[handle], key_of(slot), change && change->fresh);
+  }
+  // Whether a key was there when the state of a fence was last decided.
+  static bool was_there(const Fence& fence, const std::string& key, bool fresh) {
+    if (fence.earlier)
+      if (const auto entry = fence.earlier->find(key); entry != fence.earlier->end()) return entry->second.has_value();
+    return !fresh;
+  }
+
+  void report_gone() {
+    for (Gone& gone : gone_) {
+      if (gone.done) continue;
+      for (const std::uint32_t handle : owners_)
+        if (was_inside(handle, gone)) leave(handle, gone);
+      found_.assign(members_.of(gone.inside).begin(), members_.of(gone.inside).end());
+      for (const std::uint32_t handle : found_) {
+        if (!fences_[handle]->own) leave(handle, gone);
+        members_.remove(gone.inside, handle);
+      }
+      gone.done = true;
+    }
+  }
+  void leave(std::uint32_t handle, const Gone& gone) {
+    Fence& fence = *fences_[handle];
+    Crossing row{};
+    row.fence = fence.number;
+    row.now = NOWHERE;
+    row.before = gone.fresh ? NOWHERE : gone.before;
+    row.distance = NO_TIME;
+    row.change = -1;
+    row.cause = static_cast<std::uint8_t>(gone.cause | (changed(fence) ? AREA : 0));
+    append_key(taken_, gone, row);
+    --fence.count;
+  }
+
+  // The subjects' own hull: only a vertex that is there once is outside of the hull of the others.
+
+  void add_own(const HullTree& tree, std::uint32_t handle, const std::vector<std::uint32_t>* inside) {
+    Fence& fence = *fences_[handle];
+    owners_changed_ = true;
+    fence.area = std::make_shared<const Area>(Area::of_hull(vertices_of(tree), true, fence.area->margin));
+    fence.decided = fence.area;
+    std::vector<bool> within(slots_->end(), inside == nullptr);
+    for (std::size_t i = 0; inside && i < inside->size(); ++i) within[(*inside)[i]] = true;
+    const std::vector<Point> vertices = single_vertices(tree);
+    slots_->for_each([&](std::uint32_t slot) {
+      const Point p = (*slots_)[slot].place;
+      if (within[slot] && (inside || !std::binary_search(vertices.begin(), vertices.end(), p))) {
+        ++fence.count;
+      } else {
+        fence.outside.push_back(slot);
+        members_.add(subjects_[slot].inside, handle);
+      }
+    });
+  }
+
+  // In order.
+  static std::vector<Point> single_vertices(const HullTree& tree) {
+    std::vector<Point> vertices = vertices_of(tree);
+    std::erase_if(vertices, [&](Point p) { return tree.count(p) > 1; });
+    std::sort(vertices.begin(), vertices.end());
+    return vertices;
+  }
+
+  static void look_at_own(Fence& fence, const HullTree& tree) {
+    auto area = std::make_shared<const Area>(Area::of_hull(vertices_of(tree), true, fence.area->margin));
+    fence.area = *area == *fence.decided ? fence.decided : std::move(area);
+  }
+
+  template <class SlotsAt>
+  void decide_own(std::uint32_t handle, HullTree& tree, SlotsAt slots_at) {
+    Fence& fence = *fences_[handle];
+    const std::vector<Point> vertices = single_vertices(tree);
+    std::vector<std::uint32_t> at_vertices = slots_at(vertices);
+    std::sort(at_vertices.begin(), at_vertices.end());
+    const auto is_single = [&](std::uint32_t slot) {
+      return std::binary_search(at_vertices.begin(), at_vertices.end(), slot);
+    };
+    std::vector<std::uint32_t> outside;
+    outside.reserve(fence.outside.size() + at_vertices.size());
+    std::sort(fence.outside.begin(), fence.outside.end());
+    fence.outside.erase(std::unique(fence.outside.begin(), fence.outside.end()), fence.outside.end());
+    for (const std::uint32_t slot : fence.outside) {
+      if (!there(slot) || !members_.has(subjects_[slot].inside, handle)) continue;
+      if (is_single(slot))
+        outside.push_back(slot);
+      else
+        cross(handle, slot, +1, 0);
+    }
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+      const std::uint32_t slot = changes_[i].slot;
+      if (!current(i) || !changes_[i].fresh || changes_[i].returned || is_single(slot)) continue;
+      if (!was_there(fence, key_of(slot), true)) cross(handle, slot, +1, 0);
+    }
+    for (const std::uint32_t slot : at_vertices) {
+      const Change* const change = change_of(slot);
+      const Point p = (*slots_)[slot].place;
+      if (!members_.has(subjects_[slot].inside, handle)) {
+        const bool absent = change && change->fresh && !change->returned && !was_there(fence, key_of(slot), true);
+        if (!absent && is_near_neighbours(fence.area->convex, p, fence.area->margin)) continue;
+        bool stays = false;
+        double distance = 0;
+        tree.without(p, [&] {
+          const std::optional<Edge> part = nearest_part(tree.nodes(), p);
+          stays = !absent && part && compare_distance(p, *part, fence.area->margin) <= 0;
+          distance = dynhull::distance(tree.nodes(), p);
+        });
+        if (stays) continue;
+        outside.push_back(slot);
+        fence.outside.push_back(slot);  // in case of an exception
+        if (absent)
+          members_.add(subjects_[slot].inside, handle);
+        else
+          cross(handle, slot, -1, distance);
+        if (!absent) continue;
+      }
+      const std::optional<Point> from = start(fence, slot);
+      if (!fence.cross || !from || *from == p) continue;
+      bool meets = false;
+      double distance = 0;
+      tree.without(p, [&] {
+        meets = Area::of_hull(vertices_of(tree), true, 0).meets(*from, p);
+        distance = dynhull::distance(tree.nodes(), p);
+      });
+      if (meets) cross(handle, slot, 0, distance);
+    }
+    fence.outside = std::move(outside);
+  }
+  // Whether a vertex is so close to the chord of its neighbours that the hull of the others is near without a look.
+  static bool is_near_neighbours(const std::vector<Point>& convex, Point p, double margin) {
+    const auto vertex = std::find(convex.begin(), convex.end(), p);
+    if (vertex == convex.end()) return false;
+    const Point before = vertex == convex.begin() ? convex.back() : vertex[-1];
+    const Point after = vertex + 1 == convex.end() ? convex.front() : vertex[1];
+    return compare_distance(p, nearest_part(p, {before, after}), margin) <= 0;
+  }
+
+  // Keys
+
+  std::string key_of(std::uint32_t slot) const {
+    if (slots_->strings()) return std::string(slots_->arena()[(*slots_)[slot].key]);
+    return bytes_of((*slots_)[slot].key);
+  }
+  std::string key_of(const Gone& gone) const {
+    return slots_->strings() ? gone_keys_.substr(gone.key, gone.length) : bytes_of(gone.key);
+  }
+  static std::string bytes_of(std::uint64_t key) {
+    std::string bytes(sizeof key, '\0');
+    std::memcpy(bytes.data(), &key, sizeof key);
+    return bytes;
+  }
+
+  void append_key(Crossings& to, std::uint32_t slot, Crossing row = {}) const {
+    const std::uint64_t key = (*slots_)[slot].key;
+    slots_->strings() ? append_string(to, slots_->arena()[key], row) : append_integer(to, key, row);
+  }
+  void append_key(Crossings& to, const Gone& gone, Crossing row = {}) const {
+    slots_->strings() ? append_string(to, std::string_view(gone_keys_).substr(gone.key, gone.length), row)
+                      : append_integer(to, gone.key, row);
+  }
+  static void append_string(Crossings& to, std::string_view key, Crossing& row) {
+    row.key = to.strings.size();
+    row.length = static_cast<std::uint8_t>(key.size());
+    to.strings.append(key);
+    to.rows.push_back(row);
+  }
+  static void append_integer(Crossings& to, std::uint64_t key, Crossing& row) {
+    row.key = key;
+    to.rows.push_back(row);
+  }
+
+  // By fence, then by key. After an exception, a way may have been reported already.
+  void sort(Crossings& found) const {
+    std::sort(found.rows.begin(), found.rows.end(), [&](const Crossing& a, const Crossing& b) {
+      if (a.fence != b.fence) return a.fence < b.fence;
+      return slots_->strings() ? found.string(a) < found.string(b) : a.key < b.key;
+    });
+    const auto same_way = [&](const Crossing& a, const Crossing& b) {
+      return a.fence == b.fence && a.change == 0 && b.change == 0 &&
+             (slots_->strings() ? found.string(a) == found.string(b) : a.key == b.key);
+    };
+    found.rows.erase(std::unique(found.rows.begin(), found.rows.end(), same_way), found.rows.end());
+  }
+
+  const Slots* slots_;
+  Subjects subjects_;
+  MemberLists members_;
+  std::vector<Change> changes_;
+  std::vector<std::uint32_t> strayed_;  // slots of subjects that have left their box, or are new
+  std::vector<Gone> gone_;
+  std::string gone_keys_;
+  std::uint32_t base_ = FIRST;
+
+  Zones zones_;
+  std::vector<std::uint32_t> crowded_, waiting_;  // zones to divide, and those with subjects to decide
+  bool zoned_ = false, torn_ = false;
+
+  std::map<std::int64_t, std::uint32_t> numbers_;
+  std::vector<std::unique_ptr<Fence>> fences_;
+  std::size_t first_free_ = 0;
+  std::vector<std::uint32_t> recent_, owners_;  // fences set since crossings were last taken; around the own hull
+  bool owners_changed_ = false;
+  std::size_t crossable_ = 0;  // fences that report who passes through, other than those around the own hull
+  std::shared_ptr<const Places> places_;
+  std::uint64_t reports_ = 0;                // of the entities
+  std::uint64_t placed_ = 0, returned_ = 0;  // their number when the places were noted, and when subjects came back
+
+  Crossings taken_;
+  std::vector<std::uint32_t> found_, former_, ways_;
+};
+
+}  // namespace dynhull

@@ -1,0 +1,137 @@
+// An index of fences as a Python object. Arguments are those that dynhull/_fence_index.py has checked.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "keyed.hpp"
+
+namespace dynhull {
+
+class FenceIndex {
+  template <class Work>
+  auto alone(std::size_t rows, Work work) {
+    return hull_->alone(rows, [&](Entities&, HullTree&) { return work(*fences_); });
+  }
+
+ public:
+  explicit FenceIndex(KeyedHull& hull) : hull_(&hull) {
+    hull_->alone(ALL_ROWS, [&](Entities& entities, HullTree&) {
+      auto fences = std::make_unique<Fences>(entities.slots());
+      if (entities.attach(*fences)) fences_ = std::move(fences);
+    });
+    if (!fences_) throw nb::value_error("subjects has an index of fences already: detach it first");
+  }
+  FenceIndex(const FenceIndex&) = delete;
+  ~FenceIndex() { detach(); }
+
+  void detach() {
+    if (!std::exchange(attached_, false)) return;
+    hull_->alone(0, [](Entities& entities, HullTree&) { entities.detach(); });
+  }
+
+  std::size_t size() {
+    return alone(0, [](Fences& fences) { return fences.size(); });
+  }
+  bool has(std::int64_t fence) {
+    return alone(0, [&](Fences& fences) { return fences.has(fence); });
+  }
+  std::int64_t count(std::int64_t fence) {
+    return alone(0, [&](Fences& fences) { return fences.count(fence); });
+  }
+
+  void set_polygons(std::int64_t fence, const nb::list& polygons, bool closed, double margin, bool cross,
+                    const nb::object& inside) {
+    std::vector<Polygon> all;
+    for (const nb::handle polygon : polygons) {
+      std::vector<std::vector<Point>> rings;
+      for (const nb::handle ring : nb::cast<nb::list>(polygon)) {
+        const Rows rows = nb::cast<Rows>(ring);
+        rings.emplace_back(points_of(rows), points_of(rows) + rows.shape(0));
+      }
+      all.emplace_back(rings);
+    }
+    set(fence, Area::of_polygons(std::move(all), closed, margin), cross, false, inside);
+  }
+  void set_circle(std::int64_t fence, double x, double y, double radius, bool closed, double margin, bool cross,
+                  const nb::object& inside) {
+    set(fence, Area::of_disk({x, y}, radius, closed, margin), cross, false, inside);
+  }
+  void set_hull(std::int64_t fence, const Rows& vertices, bool closed, double margin, bool cross, bool without_self,
+                const nb::object& inside) {
+    std::vector<Point> corners(points_of(vertices), points_of(vertices) + vertices.shape(0));
+    if (without_self) corners.clear();  // those of the hull itself
+    set(fence, Area::of_hull(std::move(corners), closed, margin), cross, without_self, inside);
+  }
+
+  nb::object drop(std::int64_t fence) {
+    return packed(alone(ALL_ROWS, [&](Fences& fences) { return fences.drop(fence); }));
+  }
+  nb::object inside(std::int64_t fence) {
+    return packed(alone(ALL_ROWS, [&](Fences& fences) { return fences.inside(fence); }));
+  }
+
+  // Fences, changes, causes, keys, points, previous and distances; None if there are no rows.
+  nb::object take() {
+    std::size_t work = 0;
+    const bool idle = alone(0, [&](Fences& fences) {
+      work = fences.work();
+      if (fences.idle()) fences.rest();
+      return fences.idle();
+    });
+    if (idle) return nb::none();
+    const Crossings crossings =
+        hull_->alone(work, [&](Entities& entities, HullTree& tree) { return entities.take(tree, *fences_); });
+    if (crossings.rows.empty()) return nb::none();
+    const std::size_t count = crossings.rows.size();
+    const Output<std::int64_t> fences(count);
+    const Output<std::int8_t> changes(count);
+    const Output<std::uint8_t> causes(count);
+    const Output<double, 2> points(count), previous(count);
+    const Output<double> distances(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Crossing& row = crossings.rows[i];
+      fences.data()[i] = row.fence;
+      changes.data()[i] = row.change;
+      causes.data()[i] = row.cause;
+      reinterpret_cast<Point*>(points.data())[i] = row.now;
+      reinterpret_cast<Point*>(previous.data())[i] = row.before;
+      distances.data()[i] = row.distance;
+    }
+    return nb::make_tuple(fences.array(), changes.array(), causes.array(), packed(crossings), points.array(),
+                          previous.array(), distances.array());
+  }
+
+  void check() {
+    alone(ALL_ROWS, [](Fences& fences) { fences.check(); });
+  }
+  std::size_t memory() {
+    return alone(0, [](Fences& fences) { return fences.bytes(); });
+  }
+
+ private:
+  void set(std::int64_t fence, Area area, bool cross, bool own, const nb::object& keys) {
+    std::optional<std::vector<std::uint32_t>> inside;
+    if (!keys.is_none()) {
+      inside = hull_->slots_of(keys);
+      std::sort(inside->begin(), inside->end());
+      inside->erase(std::unique(inside->begin(), inside->end()), inside->end());
+    }
+    hull_->alone(ALL_ROWS, [&](Entities&, HullTree& tree) {
+      fences_->set(tree, fence, std::move(area), cross, own, inside ? &*inside : nullptr);
+    });
+  }
+
+  nb::object packed(const Crossings& crossings) const {
+    KeyList keys(hull_->strings());
+    for (const Crossing& row : crossings.rows) hull_->strings() ? keys.add(crossings.string(row)) : keys.add(row.key);
+    return keys.packed();
+  }
+
+  KeyedHull* hull_;  // kept alive by the Python object
+  bool attached_ = true;
+  std::unique_ptr<Fences> fences_;
+};
+
+}  // namespace dynhull
