@@ -1,12 +1,15 @@
 """`dynhull fences` as users run it."""
 
 import json
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from command_line import dynhull
+from command_line import dynhull, on_a_terminal
 from fence_server import fence_server
+from forked import COMMAND, Process
+from patience import PATIENCE
 
 GEOJSON = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 3], [0, 0]]]}}
 TRIANGLE = "POLYGON ((0 0, 4 0, 4 3, 0 0))"
@@ -120,3 +123,28 @@ def test_the_life_of_a_fence(name: str, tmp_path: Path) -> None:
     missing = dynhull("fences", "show", name)
     assert missing.exit_code == 1
     assert "`dynhull fences list` shows the fences of the server" in missing.stderr
+
+
+@pytest.mark.usefixtures("served")
+def test_a_closed_pipe_ends_a_watch_with_success(name: str) -> None:
+    assert dynhull("create", name, "--keyed", "str").exit_code == 0
+    ran("create", name, "--polygon", TRIANGLE, "--subjects", name)
+    with Process([COMMAND, "fences", "watch", name, "--after", "0"], stdout=subprocess.PIPE, text=True) as watch:
+        assert watch.stdout.readline().split("\t")[2] == "snapshot"
+        watch.stdout.close()
+        assert watch.wait(PATIENCE) == 0
+
+
+@pytest.mark.usefixtures("served")
+def test_a_terminal_shows_a_table_and_asks(name: str) -> None:
+    assert dynhull("create", name, "--keyed", "str").exit_code == 0
+    ran("create", name, "--circle", 0, 0, 1, "--subjects", name)
+    code, shown = on_a_terminal("fences", "list", name)
+    assert code == 0
+    assert "last event" in shown
+    code, shown = on_a_terminal("fences", "delete", name, answer=b"n\n")
+    assert code == 1
+    assert "nothing was deleted" in shown
+    code, shown = on_a_terminal("fences", "delete", name, answer=b"y\n")
+    assert code == 0
+    assert f"{name}: deleted" in shown
