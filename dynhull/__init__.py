@@ -5,6 +5,7 @@ from sys import modules as _modules
 from . import _hull, static
 from ._entities import DuplicateKeyError, MissingKeyError
 from ._fence_index import Crossings, FenceIndex
+from ._geo import GeoHull
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
 from ._keyed import KeyedHull, Put
@@ -18,6 +19,7 @@ __all__ = [
     "DuplicateKeyError",
     "DynamicHull",
     "FenceIndex",
+    "GeoHull",
     "KeyedHull",
     "MissingKeyError",
     "MissingPointError",
@@ -51,6 +53,7 @@ for _public in (
     FenceIndex,
     Crossings,
     WindowHull,
+    GeoHull,
 ):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

@@ -16,7 +16,7 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library.md"
 PACKAGES = {
     "dynhull": {
         *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d"),
-        *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings"),
+        *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings", "GeoHull"),
         *("arrays", "keys", "measure", "static"),  # imported with it
     },
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
