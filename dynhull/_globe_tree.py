@@ -136,7 +136,10 @@ class GlobeTree:
         added = ops > 0
         frame, chosen = self._frame, ""
         if frame is None and added.any():
-            frame, chosen = Gnomonic.about(pairs[added]), ", the mean direction of the first points (`center` gives another)"
+            frame, chosen = (
+                Gnomonic.about(pairs[added]),
+                ", the mean direction of the first points (`center` gives another)",
+            )
         if frame is None:
             places, near = self._project(pairs)
         else:
