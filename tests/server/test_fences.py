@@ -6,6 +6,7 @@ from pathlib import Path
 
 import grpc
 import pytest
+from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from refusal import refusal
 from server_process import server_process
@@ -489,3 +490,23 @@ def test_old_events_are_dropped_and_consumers_hear_of_it(tmp_path: Path, name: s
         assert (response.lost.first_sequence, response.lost.last_sequence) == (3, 4)
         assert [event.sequence for event in response.events] == [5, 6, 7]
         assert inside(fences, fence) == []
+
+
+def test_metrics_of_fences(name: str) -> None:
+    with (
+        measured(wrap=WRAP) as (server, metrics),
+        grpc.insecure_channel(server.address) as channel,
+    ):
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name=name, config={"identity": "IDENTITY_STRING_KEYS"}))
+        create(fences, name, circle_area={"radius": 5}, subject_hull=name)
+        fences.AckFence(fs.AckFenceRequest(name=name, consumer="mail", sequence=1))
+        for x in (1, 9, 2):
+            put(stub, name, a=(x, 0))
+        found = scrape(metrics)
+    assert found['dynhull_fence_events_total{type="enter"}'] == 2
+    assert found['dynhull_fence_events_total{type="exit"}'] == 1
+    assert (found["dynhull_fences"], found["dynhull_fence_inside"]) == (1, 1)
+    assert found[f'dynhull_fence_backlog{{fence="{name}"}}'] == 3
+    assert found[f'dynhull_fence_backlog_oldest_seconds{{fence="{name}"}}'] >= 0
+    assert found[f'dynhull_fence_lost_events{{fence="{name}"}}'] == 0

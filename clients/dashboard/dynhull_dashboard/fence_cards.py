@@ -62,8 +62,7 @@ def _inside(feed: FenceFeed, fence: Fence) -> str:
         near = ("apart", "near") if fence.near else ("apart", "intersecting")
         return near[fence.inside > 0]
     inside = f"{feed.inside_count:,} of {fence.subject_count:,}"
-    marked = min(len(feed.marks), feed.inside_count)
-    return inside if marked >= feed.inside_count else f"{inside} ({marked:,} drawn)"
+    return inside if feed.marked >= feed.inside_count else f"{inside} ({feed.marked:,} drawn)"
 
 
 def _consumer(consumer: FenceConsumer) -> str:

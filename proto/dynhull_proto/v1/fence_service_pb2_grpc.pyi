@@ -34,6 +34,10 @@ class FenceServiceStub:
     committed together with the batch that caused them: a batch that is acknowledged has its events, one that is refused has
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
+    A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
+    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
+    leave, with the cause SUBJECT_REMOVED.
+
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.
     """
@@ -74,6 +78,10 @@ class FenceServiceAsyncStub(FenceServiceStub):
     committed together with the batch that caused them: a batch that is acknowledged has its events, one that is refused has
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
+    A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
+    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
+    leave, with the cause SUBJECT_REMOVED.
+
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.
     """
@@ -109,6 +117,10 @@ class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
     The events of a fence equal the changes of the exact side of each subject between consecutive revisions, and are
     committed together with the batch that caused them: a batch that is acknowledged has its events, one that is refused has
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
+
+    A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
+    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
+    leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.

@@ -356,7 +356,7 @@ class Engine:
             case Examine():
                 self._examine(effect)
             case Stir():
-                self.fences.stir(effect.fences)
+                self.fences.stir(effect.stirred)
             case Retry():
                 self._supervisor.failed("examination", effect.reason)
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))

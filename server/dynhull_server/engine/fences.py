@@ -1,6 +1,7 @@
 """Fences as their callers use them."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
@@ -10,7 +11,7 @@ from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError
 from ..state.fences.config import FenceConfig
 from ..state.fences.fence import Fence
 from ..state.fences.fence_leg import members
-from ..state.fences.records import Consumer, FenceEvent, Inside
+from ..state.fences.records import Consumer, EventType, FenceEvent, Inside
 from ..state.fences.requests import (
     CreateFence,
     DeleteFence,
@@ -117,12 +118,16 @@ class Fences:
     Args:
         engine: the engine.
         storage: keeps their events.
+
+    Attributes:
+        events: the number of committed events by type, since the start.
     """
 
     def __init__(self, engine: "Engine", storage: Storage) -> None:
         self._engine = engine
         self._storage = storage
         self._live: dict[Fence, LiveFence] = {}
+        self.events: Counter[EventType] = Counter()
 
     def __len__(self) -> int:
         return len(self._engine.core.fences)
@@ -170,9 +175,10 @@ class Fences:
             raise FenceNotFoundError(name)
         await self._engine.ask(DeleteFence(Waiter(), name, self._engine.time(), rows=fence.inside))
 
-    def stir(self, fences: Sequence[Fence]) -> None:
-        """Wake those who watch these fences."""
-        for fence in fences:
+    def stir(self, stirred: Sequence[tuple[Fence, list[FenceEvent]]]) -> None:
+        """Count the events of fences, and wake those who watch these."""
+        for fence, events in stirred:
+            self.events.update(event.type for event in events)
             live = self._live.get(fence)
             if live is not None:
                 live.moved()

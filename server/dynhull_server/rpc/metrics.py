@@ -19,6 +19,7 @@ from ..engine.server_time import MICROSECONDS
 from ..engine.supervisor import Supervisor
 from .background import background_families
 from .batch_counts import BatchCounts
+from .fence_families import fence_families
 
 # Seconds, from the delay of a small batch to that of a batch that fills a message.
 BUCKETS = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
@@ -142,6 +143,7 @@ class StateCollector(Collector):
             *self._gauges(),
             *self._metrics.batches.families(self._engine.expired),
             *background_families(self._supervisor),
+            *fence_families(self._engine.fences, self._engine.time()),
         ]
 
     def _gauges(self) -> list[GaugeMetricFamily]:

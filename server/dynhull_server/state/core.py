@@ -65,7 +65,7 @@ from .fences.fence import Fence
 from .fences.line import Line
 from .fences.line_trip import Ground, LineTrip
 from .fences.pair import Pair
-from .fences.queues import components, merged
+from .fences.queues import SPANNING, components, merged
 from .fences.requests import (
     PREFIX,
     STRUCTURAL,
@@ -100,8 +100,6 @@ TRIP_ROWS = 2**18
 # Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 READS = ReadHull | ReadTogether | ReadFence
-# Requests that may wait in several queues.
-SPANNING = Together | FenceRequest
 
 
 class _Queue:
@@ -163,6 +161,7 @@ class Core:
         # The prefixes of fences, by the names of their queues; also of those that are being created.
         self._prefixes: dict[str, str] = {}
         self._creating = self._fencing = 0
+        self._first_order = self._last_order = 0
         self._trips = 0
         self._stopping = False
         # A heap of the times at which points leave, with the number and name of the hull. An entry is outdated if its
@@ -310,8 +309,10 @@ class Core:
         request.names = self._involved(request)
         self._wait([self._queue(name) for name in request.names], request, effects)
 
-    def _wait(self, queues: "list[_Queue]", request: Request, effects: list[Effect]) -> None:
+    def _wait(self, queues: "list[_Queue]", request: SPANNING, effects: list[Effect]) -> None:
         queues = list(dict.fromkeys(queues))
+        self._last_order += 1
+        request.order = self._last_order
         for queue in queues:
             queue.waiting.append(request)
         self._go_on(queues, effects)
@@ -435,6 +436,9 @@ class Core:
             return []
         names = [name for name in self._overlapping(request.config.subjects) if name not in request.names]
         queues = [queue for queue in self._at(names) if request not in queue.waiting]
+        if queues:
+            self._first_order -= 1
+            request.order = self._first_order
         for queue in queues:
             queue.waiting.insert(0, request)
         request.names += tuple(names)
@@ -775,7 +779,7 @@ class Core:
                 for subjects in fence.subjects.values():
                     subjects.dropped(fence)
             if leg.events:
-                stirred.append(fence)
+                stirred.append((fence, leg.events))
         if stirred:
             effects.append(Stir(stirred))
         if trip.structural:

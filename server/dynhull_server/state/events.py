@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from .batch import Batch, KeyedBatch
     from .fences.fence import Fence
-    from .fences.records import KeptFence
+    from .fences.records import FenceEvent, KeptFence
     from .fences.restoring import Restored
     from .hull import Hull
     from .hull_state import HullState
@@ -114,6 +114,7 @@ class WriteTogether(Request):
     to: Any = field(default=None, init=False)
     parts: "list[WriteBatch]"
     refused: int | None = field(default=None, init=False)
+    order: int = field(default=0, init=False)
 
 
 @dataclass(slots=True, eq=False)
@@ -134,9 +135,10 @@ class ReadTogether(Request):
 
     parts: "list[Hull]"
     function: "Callable[[list[HullState]], Any]"
+    order: int = field(default=0, init=False)
 
 
-# Requests that wait in the queues of several hulls.
+# Requests that wait in the queues of several hulls. `order` is greater for those that come later; the core sets it.
 Together = WriteTogether | ReadTogether
 
 
@@ -321,9 +323,9 @@ class Reply:
 
 @dataclass(slots=True)
 class Stir:
-    """Wake the watchers of these fences: each has new events, or was deleted."""
+    """Wake the watchers of these fences, which have new events."""
 
-    fences: "list[Fence]"
+    stirred: "list[tuple[Fence, list[FenceEvent]]]"
 
 
 Effect = Compute | Commit | Examine | Retry | Reply | Stir

@@ -138,9 +138,9 @@ class LineTrip(Trip):
         for leg in self.fence_legs.values():
             if not leg.created:
                 touched |= leg.fence.subjects
-        for leg in self.legs:
-            if leg.before is None:  # a hull that is created has none in the storage
-                touched.pop(leg.name, None)
+        for each in self.legs:
+            if each.before is None:  # a hull that is created has none in the storage
+                touched.pop(each.name, None)
         return touched
 
     def landed(self, states: list[HullState | None], fences: list[KeptFence | None]) -> bool:

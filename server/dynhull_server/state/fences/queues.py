@@ -1,10 +1,14 @@
 """Which names share a queue, and in which order requests wait when queues are joined."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from ..events import Request
+from ..events import Request, Together
 from .fence import Fence
-from .requests import PREFIX
+from .requests import PREFIX, FenceRequest
+
+# Requests that may wait in several queues.
+SPANNING = Together | FenceRequest
 
 
 def components(names: Sequence[str], fences: Iterable[Fence]) -> list[tuple[list[str], list[Fence]]]:
@@ -59,27 +63,25 @@ def overlap(one: Fence, other: Fence) -> bool:
 def merged(queues: Sequence[list[Request]]) -> list[Request]:
     """The requests of some queues in one order that is that of each of them. O(requests * queues).
 
-    A request that waits in several of the queues comes once.
+    A request that waits in several of the queues comes once. Requests that may wait in other queues too keep the order
+    in which they have arrived, because it is their order there.
     """
-    places: dict[int, int] = {}
-    for queue in queues:
-        for request in queue:
-            places[id(request)] = places.get(id(request), 0) + 1
+    places = Counter(id(request) for queue in queues for request in queue)
     at = [0] * len(queues)
     ordered: list[Request] = []
-    while any(place < len(queue) for place, queue in zip(at, queues, strict=True)):
-        # Requests enter all of their queues in one step, so one of those in front is in front of all of its queues.
+    while True:
         fronts: dict[int, list[int]] = {}
         for number, queue in enumerate(queues):
-            while at[number] < len(queue) and places[id(queue[at[number]])] == 1:
+            while at[number] < len(queue) and not isinstance(queue[at[number]], SPANNING):
                 ordered.append(queue[at[number]])
                 at[number] += 1
             if at[number] < len(queue):
                 fronts.setdefault(id(queue[at[number]]), []).append(number)
-        for key, numbers in fronts.items():
-            if places[key] == len(numbers):
-                ordered.append(queues[numbers[0]][at[numbers[0]]])
-                for number in numbers:
-                    at[number] += 1
-                break
-    return ordered
+        if not fronts:
+            return ordered
+        # The oldest one is in front of all queues in which it waits.
+        ready = [numbers for key, numbers in fronts.items() if places[key] == len(numbers)]
+        first = min(ready, key=lambda numbers: queues[numbers[0]][at[numbers[0]]].order)  # type: ignore[attr-defined]
+        ordered.append(queues[first[0]][at[first[0]]])
+        for number in first:
+            at[number] += 1

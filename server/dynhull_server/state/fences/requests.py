@@ -23,11 +23,13 @@ class FenceRequest(Request):
         name: the name of the fence.
         time: the server's clock, in microseconds since 1970.
         names: the names of the queues in which it waits. The core sets this.
+        order: see `Together`.
     """
 
     name: str
     time: int
     names: tuple[str, ...] = field(default=(), init=False)
+    order: int = field(default=0, init=False)
 
 
 @dataclass(slots=True, eq=False)
