@@ -18,11 +18,11 @@ struct Fence {
   bool given = false;               // the keys inside were given, not decided
   std::int64_t count = 0;           // of subjects inside
   std::shared_ptr<const Area> area, decided;
-  std::vector<Edge> edges;                             // by number; some are free
-  std::vector<std::uint32_t> free;                     // the numbers of those
-  std::vector<std::pair<Edge, std::uint32_t>> sorted;  // the others, in order
-  std::vector<std::uint32_t> outside;                  // own: slots that are outside, and some that were
-  std::shared_ptr<const Places> earlier;               // of a new fence: the places of the keys that had changed
+  std::vector<Edge> edges;                // by number; some are free
+  std::vector<std::uint32_t> free;        // the numbers of those
+  std::vector<std::uint32_t> sorted;      // the numbers of the others, in order of the edges
+  std::vector<std::uint32_t> outside;     // own: slots that are outside, and some that were
+  std::shared_ptr<const Places> earlier;  // of a new fence: the places of the keys that had changed
 
   Strip strip(std::uint32_t edge) const { return strip_of(*area, edge); }
   Strip strip_of(const Area& of, std::uint32_t edge) const {
@@ -51,7 +51,7 @@ struct Fence {
   }
 
   std::size_t bytes() const {
-    std::size_t bytes = sizeof *this + edges.capacity() * sizeof(Edge) + free.capacity() * 4 + sorted.capacity() * 40;
+    std::size_t bytes = sizeof *this + edges.capacity() * sizeof(Edge) + free.capacity() * 4 + sorted.capacity() * 4;
     for (const Polygon& polygon : area->polygons) bytes += polygon.bytes();
     return bytes + area->convex.capacity() * sizeof(Point) + outside.capacity() * 4;
   }

@@ -346,7 +346,8 @@ class Fences {
     const Zone& zone = zones_[subject.zone];
     subject.box = SafeBox::everywhere();
     subject.box.stay_in(zone.box);
-    for (const Zone::Piece& piece : zone.pieces) subject.box.keep_off(fences_[piece.fence]->strip(piece.edge), p);
+    for (const Zone::Piece& piece : zone.pieces)
+      if (!subject.box.keep_off(piece.rim, p)) subject.box.keep_off(fences_[piece.fence]->strip(piece.edge), p);
   }
 
   void rebuild() {
@@ -356,7 +357,7 @@ class Fences {
     Zone& all = zones_[0];
     for (std::uint32_t handle = 0; handle < fences_.size(); ++handle)
       for (std::size_t i = 0; fences_[handle] && i < fences_[handle]->sorted.size(); ++i)
-        all.pieces.push_back({handle, fences_[handle]->sorted[i].second});
+        all.pieces.push_back(piece_of(handle, fences_[handle]->sorted[i]));
     all.subjects.reserve(slots_->size());
     for (std::uint32_t slot = 0; slot < subjects_.size(); ++slot) subjects_[slot].zone = NONE;
     slots_->for_each([&](std::uint32_t slot) {
@@ -562,13 +563,17 @@ class Fences {
     return there(slot) && change_of(slot) == &changes_[change];
   }
 
+  Zone::Piece piece_of(std::uint32_t handle, std::uint32_t edge) const {
+    return {handle, edge, rim_of(fences_[handle]->strip(edge))};
+  }
+
   void add_pieces(std::uint32_t handle, const std::vector<std::uint32_t>* inside) {
     Fence& fence = *fences_[handle];
     const Area& area = *fence.area;
     std::vector<std::uint32_t> ids;
     for (const Edge& edge : Fence::sorted_edges(area)) {
       const std::uint32_t id = fence.add(edge);
-      fence.sorted.emplace_back(edge, id);
+      fence.sorted.push_back(id);
       ids.push_back(id);
     }
     for (std::size_t i = 0; inside && i < inside->size(); ++i) {
@@ -580,7 +585,7 @@ class Fences {
         [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
           Zone& zone = zones_[number];
           if (touching.empty()) zone.covering.push_back(handle);
-          for (const std::uint32_t id : touching) zone.pieces.push_back({handle, id});
+          for (const std::uint32_t id : touching) zone.pieces.push_back(piece_of(handle, id));
           if (inside) wait_for(handle, number);
           if (is_crowded(zone)) crowded_.push_back(number);
           for (const std::uint32_t slot : zone.subjects) {
@@ -608,20 +613,20 @@ class Fences {
                        old->closed == area->closed && old->polygons.size() < 2 && area->polygons.size() < 2;
     constexpr std::uint32_t ADDED = std::uint32_t{1} << 31;
     std::vector<std::uint32_t> ids, removed;
-    std::vector<std::pair<Edge, std::uint32_t>> sorted;
+    std::vector<std::uint32_t> sorted;
     auto next = fence.sorted.begin();
     for (const Edge& edge : Fence::sorted_edges(*area)) {
-      for (; keeps && next != fence.sorted.end() && Fence::less(next->first, edge); ++next)
-        removed.push_back(next->second);
-      if (keeps && next != fence.sorted.end() && !Fence::less(edge, next->first)) {
+      for (; keeps && next != fence.sorted.end() && Fence::less(fence.edges[*next], edge); ++next)
+        removed.push_back(*next);
+      if (keeps && next != fence.sorted.end() && !Fence::less(edge, fence.edges[*next])) {
         sorted.push_back(*next++);
         continue;
       }
       const std::uint32_t id = fence.add(edge);
-      sorted.emplace_back(edge, id);
+      sorted.push_back(id);
       ids.push_back(id | ADDED);
     }
-    for (; next != fence.sorted.end(); ++next) removed.push_back(next->second);
+    removed.insert(removed.end(), next, fence.sorted.end());
     ids.insert(ids.end(), removed.begin(), removed.end());
     std::vector<bool> is_removed(fence.edges.size());
     for (const std::uint32_t id : removed) is_removed[id] = true;
@@ -640,7 +645,7 @@ class Fences {
             return true;
           });
           for (const std::uint32_t id : touching)
-            if (id & ADDED) kept.push_back({handle, id & ~ADDED});
+            if (id & ADDED) kept.push_back({handle, id & ~ADDED, rim_of(fence.strip_of(*area, id & ~ADDED))});
           zone.pieces.insert(zone.pieces.end(), kept.begin(), kept.end());
           std::erase(zone.covering, handle);
           if (kept.empty() && area->holds(Zones::sample(zone.box))) zone.covering.push_back(handle);
@@ -695,8 +700,7 @@ class Fences {
   template <class Visit>
   void for_each_zone(std::uint32_t handle, Visit visit) {
     const Fence& fence = *fences_[handle];
-    std::vector<std::uint32_t> ids, zones;
-    for (const auto& [edge, id] : fence.sorted) ids.push_back(id);
+    std::vector<std::uint32_t> ids = fence.sorted, zones;
     zones_.descend(
         ids, [&](std::uint32_t id) { return fence.strip(id); }, [&](Point p) { return fence.area->holds(p); },
         [&](std::uint32_t number, std::span<const std::uint32_t>) { zones.push_back(number); });
@@ -754,10 +758,17 @@ class Fences {
     const Zone& zone = zones_[number];
     found_.clear();
     for (const std::uint32_t handle : zone.covering) found_.push_back(handle);
+    const Change* const change = change_of(slot);
+    // On a way within the zone, off all pieces of an area that is there since then, the state stays what it was.
+    const bool known = recent_.empty() && change && !change->fresh && zone.holds(change->before);
+    const Box way = Box::of({known ? change->before : p, p});
     for (std::size_t i = 0; i < zone.pieces.size();) {
       const std::uint32_t handle = zone.pieces[i].fence;
-      if (holds(zone, i, p, members_.has(subjects_[slot].inside, handle))) found_.push_back(handle);
-      for (; i < zone.pieces.size() && zone.pieces[i].fence == handle; ++i) continue;
+      const std::size_t first = i;
+      bool near = !known;
+      for (; i < zone.pieces.size() && zone.pieces[i].fence == handle; ++i) near |= zone.pieces[i].rim.meets(way);
+      const bool was = members_.has(subjects_[slot].inside, handle);
+      if (near ? holds(zone, first, p, was) : was) found_.push_back(handle);
     }
     former_.clear();
     for (const std::uint32_t handle : members_.of(subjects_[slot].inside))
@@ -766,7 +777,7 @@ class Fences {
     for (const std::uint32_t handle : former_) cross(handle, slot, -1);
     for (const std::uint32_t handle : found_)
       if (!members_.has(subjects_[slot].inside, handle)) cross(handle, slot, +1);
-    if (const Change* const change = change_of(slot)) decide_ways(*change, p);
+    if (change) decide_ways(*change, p);
   }
 
   // Decides for the fence of a zone's pieces from number `i` on.

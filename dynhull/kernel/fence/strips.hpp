@@ -48,6 +48,32 @@ inline bool may_touch(const Strip& strip, const Box& box) {
   return !(std::abs(ux * vy - uy * vx) - reach > error);
 }
 
+// A box with a strip strictly inside, rounded to floats.
+struct Rim {
+  float least_x, greatest_x, least_y, greatest_y;
+
+  bool meets(const Box& box) const {
+    return (least_x < box.greatest.x) & (box.least.x < greatest_x) & (least_y < box.greatest.y) &
+           (box.least.y < greatest_y);
+  }
+};
+
+constexpr float INFINITE_FLOAT = std::numeric_limits<float>::infinity();
+
+inline float float_above(double value) {
+  const float near = static_cast<float>(value);
+  return near <= value ? std::nextafter(near, INFINITE_FLOAT) : near;
+}
+inline float float_below(double value) {
+  const float near = static_cast<float>(value);
+  return near >= value && value < INFINITE ? std::nextafter(near, -INFINITE_FLOAT) : near;
+}
+
+inline Rim rim_of(const Strip& strip) {
+  const Box box = around(strip);
+  return {float_below(box.least.x), float_above(box.greatest.x), float_below(box.least.y), float_above(box.greatest.y)};
+}
+
 // Rounded to floats, inwards. Empty unless it holds the subject's place.
 struct SafeBox {
   float least_x, greatest_x, least_y, greatest_y;
@@ -62,8 +88,23 @@ struct SafeBox {
   void stay_in(const Box& box) {
     least_x = std::max(least_x, at_least(box.least.x));
     least_y = std::max(least_y, at_least(box.least.y));
-    greatest_x = std::min(greatest_x, below(box.greatest.x));
-    greatest_y = std::min(greatest_y, below(box.greatest.y));
+    greatest_x = std::min(greatest_x, float_below(box.greatest.x));
+    greatest_y = std::min(greatest_y, float_below(box.greatest.y));
+  }
+
+  // Cuts off what is in the rim of a strip. False if p is in it.
+  bool keep_off(const Rim& rim, Point p) {
+    if ((rim.least_x >= greatest_x) | (rim.greatest_x <= least_x) | (rim.least_y >= greatest_y) |
+        (rim.greatest_y <= least_y))
+      return true;
+    const double beside_x = std::max(rim.least_x - p.x, p.x - rim.greatest_x);
+    const double beside_y = std::max(rim.least_y - p.y, p.y - rim.greatest_y);
+    if (std::max(beside_x, beside_y) < 0) return false;
+    if (beside_x >= beside_y)
+      p.x <= rim.least_x ? greatest_x = rim.least_x : least_x = rim.greatest_x;
+    else
+      p.y <= rim.least_y ? greatest_y = rim.least_y : least_y = rim.greatest_y;
+    return true;
   }
 
   // Cuts off what is in the strip, so that p stays inside unless it is close to it.
@@ -85,20 +126,18 @@ struct SafeBox {
       greatest_y = std::min(greatest_y, at_most(p.y + clear));
     } else if (beside_x >= beside_y) {
       if (p.x < box.least.x)
-        greatest_x = std::min(greatest_x, below(box.least.x));
+        greatest_x = std::min(greatest_x, float_below(box.least.x));
       else
-        least_x = std::max(least_x, above(box.greatest.x));
+        least_x = std::max(least_x, float_above(box.greatest.x));
     } else {
       if (p.y < box.least.y)
-        greatest_y = std::min(greatest_y, below(box.least.y));
+        greatest_y = std::min(greatest_y, float_below(box.least.y));
       else
-        least_y = std::max(least_y, above(box.greatest.y));
+        least_y = std::max(least_y, float_above(box.greatest.y));
     }
   }
 
  private:
-  static constexpr float INFINITE_FLOAT = std::numeric_limits<float>::infinity();
-
   static float at_least(double value) {
     const float near = static_cast<float>(value);
     return near < value ? std::nextafter(near, INFINITE_FLOAT) : near;
@@ -107,15 +146,6 @@ struct SafeBox {
     const float near = static_cast<float>(value);
     return near > value ? std::nextafter(near, -INFINITE_FLOAT) : near;
   }
-  static float above(double value) {
-    const float near = static_cast<float>(value);
-    return near <= value ? std::nextafter(near, INFINITE_FLOAT) : near;
-  }
-  static float below(double value) {
-    const float near = static_cast<float>(value);
-    return near >= value && value < INFINITE ? std::nextafter(near, -INFINITE_FLOAT) : near;
-  }
-
   // Half the side of a square around p that is off the strip: a quarter of the distance, as a square reaches farther in
   // its corners and as coordinates are rounded. 0 if there is none for sure.
   static double clearance(const Strip& strip, Point p) {

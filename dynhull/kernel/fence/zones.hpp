@@ -15,6 +15,7 @@ namespace dynhull {
 struct Zone {
   struct Piece {
     std::uint32_t fence, edge;
+    Rim rim;
   };
 
   Box box;                                   // without its right and upper side
@@ -24,6 +25,9 @@ struct Zone {
   std::vector<std::uint32_t> pending = {};  // fences for which all subjects are to be decided again
   std::size_t most = 0;  // subjects or pieces beyond which it is worth dividing; 0 for the usual number
 
+  bool holds(Point p) const {
+    return (box.least.x <= p.x) & (p.x < box.greatest.x) & (box.least.y <= p.y) & (p.y < box.greatest.y);
+  }
   bool covered_by(std::uint32_t fence) const {
     return std::find(covering.begin(), covering.end(), fence) != covering.end();
   }
