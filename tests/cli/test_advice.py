@@ -89,6 +89,9 @@ FOLLOWED_ELSEWHERE = {
     "--keys-of": "test_keyed.py: test_integer_keys_and_another_hull",
     "--window": "test_demo.py: test_the_positions_of_the_last_half_hour",
     "--points": "test_demo.py: test_points_of_ones_own",
+    "--area": "test_fences.py: test_the_life_of_a_fence",
+    "--consumer": "test_fences.py: test_the_life_of_a_fence",
+    "--ack": "test_fences.py: test_the_life_of_a_fence",
     "--day": "test_demo.py: test_hours_of_flights",
     "pip install": "by hand: needs an index of packages",
 }

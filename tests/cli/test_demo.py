@@ -1,7 +1,9 @@
 """`dynhull demo` as a user runs it: a real server, real input, every step verified."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -32,6 +34,8 @@ def test_hours_of_flights(tmp_path):
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[-1] == "VERIFIED 240/240"
+    assert re.fullmatch(r"EVENTS ([1-9]\d*)/\1", lines[-2])
+    assert any(line.strip().startswith("near/LAX enter ") for line in lines)
     hours = [line for line in lines if " km²  " in line]
     assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(4)]
     assert " to SJU" in done.stdout
@@ -102,6 +106,9 @@ class Scene:
     hull_name = "wrong"
     keyed = False
     max_age = None
+    length = 2
+    circles: ClassVar = {}
+    rivals = None
 
     def frames(self) -> Iterator[Frame]:
         sent = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

@@ -58,8 +58,9 @@ def demo(
     The command starts a server of its own and sends one batch per minute of the day, which puts each flight, by its
     number, where it is, and removes those that have landed. The server names the corners of the hull. A watcher
     follows. After every batch the command compares the live hull with Chan's static recomputation, its keys and their
-    positions with those sent, and the watcher's copy with the live hull. It ends with VERIFIED and exit code 0, or with
-    the first difference and exit code 1.
+    positions with those sent, and the watcher's copy with the live hull. Fences around three airports and between the
+    hulls of two airlines report who enters and leaves; every event is compared with a recomputation. It ends with
+    VERIFIED and exit code 0, or with the first difference and exit code 1.
 
     Your own points: dynhull demo --points fleet.csv --x lon --y lat --id vehicle --time minute
     """

@@ -24,6 +24,12 @@ MISSING_AIRPORTS = {
     "STT": (18.3373, -64.9734),
 }
 
+# Busy destinations, whose surroundings are fenced.
+FENCED = "ATL", "LAX", "ORD"
+FENCE_RADIUS = 100.0  # km
+# Airlines whose hulls meet and part several times on a day.
+RIVALS = "AA", "WN"
+
 # Lambert's equal-area projection about the middle of the flights: areas in it are areas on the ground.
 PROJECTION = "+proj=laea +lat_0=40 +lon_0=-95 +ellps=WGS84 +units=km"
 
@@ -45,6 +51,7 @@ class Flights:
     step = "minutes"
     length_unit = "km"
     area_unit = "km²"
+    rivals: tuple[str, str] | None = RIVALS
 
     def __init__(self, day: date, hours: int = HOURS) -> None:
         self.length = hours * 60
@@ -72,6 +79,11 @@ class Flights:
         self._geod = Geod(ellps="WGS84")
         self._azimuth, _, self._distance = self._geod.inv(*origin.T[::-1], *destination.T[::-1])
         self._project = Transformer.from_crs("EPSG:4326", PROJECTION, always_xy=True).transform
+        fenced = airports.loc[list(FENCED)]
+        x, y = self._project(fenced["lon"], fenced["lat"])
+        self.circles = {
+            f"near/{code}": (float(cx), float(cy), FENCE_RADIUS) for code, cx, cy in zip(FENCED, x, y, strict=True)
+        }
         served = airports.loc[sorted(set(flights["origin"]) | set(flights["dest"]))]
         self.background = np.stack(self._project(served["lon"], served["lat"]), axis=1)
 

@@ -8,13 +8,16 @@ mpl.use("Agg")
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.patches import Circle
 
 from .replay import Step
 from .scene import Scene
 
 HULL_COLOUR, POINT_COLOUR, GROUND_COLOUR = "#0072B2", "#D55E00", "#B8B8B8"
+FENCE_COLOUR = "#009E73"
 TICK_COLOUR = "#707070"
 LABEL_OFFSET = 9  # typographic points, away from the hull
+FENCE_LABEL = 3  # typographic points, below the fence
 MARGIN = 0.1  # of the picture's width and height
 WIDTH, TITLE_HEIGHT = 12, 0.8  # inches
 FLATTEST = 0.4  # height of the drawing over its width
@@ -36,6 +39,11 @@ def draw(path: Path, scene: Scene, step: Step) -> None:
         label="airports" if len(scene.background) else None,
     )
     outline = np.concatenate([vertices, vertices[:1]])
+    for name, (x, y, radius) in scene.circles.items():
+        axes.add_patch(Circle((x, y), radius, facecolor="none", edgecolor=FENCE_COLOUR, linewidth=1.2))
+        axes.annotate(
+            name, (x, y - radius), (0, -FENCE_LABEL), textcoords="offset points", ha="center", va="top", fontsize=8
+        )
     axes.fill(*outline.T, facecolor=HULL_COLOUR, alpha=0.10)
     axes.plot(*outline.T, color=HULL_COLOUR, linewidth=1.6, label=f"convex hull, {len(vertices)} vertices")
     axes.scatter(

@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 
 from dynhull import convex_hull
-from dynhull_client import Applied, Hull, HullClient, HullCopy
+from dynhull_client import Batch, FenceEvent, Hull, HullClient, HullCopy
 
+from .alarms import Alarms
 from .scene import Frame, Points, Scene
 
 PATIENCE = 30.0  # seconds to wait for the watcher; later, its copy counts as different
@@ -25,6 +26,8 @@ class Step:
         vertices: (h, 2) vertices of the live hull.
         area: the live hull's area.
         keys: the key of each vertex, as the server names it; None in a scene without keys.
+        events: the events of the fences.
+        alarms: the counts of events so far: equal to the recomputed ones, and recomputed.
         difference: the first thing that differed, None where everything agreed.
     """
 
@@ -32,6 +35,8 @@ class Step:
     vertices: Points
     area: float
     keys: tuple[object, ...] | None
+    events: list[FenceEvent]
+    alarms: tuple[int, int]
     difference: str | None
 
     def corners(self) -> list[str]:
@@ -84,31 +89,48 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
 
     The live hull must equal Chan's recomputation from the points in the server. These must be the points sent: the same
     keys at the same positions or, without keys, as many points with the same hull. The watcher's copy must equal the
-    live hull, and the keys of the vertices must be at the vertices.
+    live hull, and the keys of the vertices must be at the vertices. The events of fences must be those that follow from
+    all positions before and after the frame, recomputed without the server.
     """
     name = scene.hull_name
     clock: Literal["server", "data"] = "server" if scene.max_age is None else "data"
     client.create_hull(name, keyed="str" if scene.keyed else None, max_age=scene.max_age, clock=clock)
+    alarms = Alarms(client, scene) if scene.circles or scene.rivals else None
     watcher = Watcher(client, name, keys=scene.keyed)
     try:
-        for frame in scene.frames():
-            revision = _send(client, scene, frame).revision
+        for number, frame in enumerate(scene.frames(), start=1):
+            revision = _send(client, scene, frame, alarms)
             live = client.get_hull(name, min_revision=revision)
             difference = (
                 _verified(client, scene, frame, live)
                 or _named(frame, live)
                 or _watched(watcher.vertices_at(revision), live)
             )
-            yield Step(frame, live.vertices, live.measures.area, live.vertex_keys, difference)
+            events: list[FenceEvent] = []
+            counts = 0, 0
+            if alarms:
+                events, wrong = alarms.check(frame, revision)
+                difference = difference or wrong or (alarms.surplus() if number == scene.length else None)
+                counts = alarms.agreed, alarms.expected
+            yield Step(frame, live.vertices, live.measures.area, live.vertex_keys, events, counts, difference)
     finally:
         watcher.stop()
+        if alarms:
+            alarms.stop()
 
 
-def _send(client: HullClient, scene: Scene, frame: Frame) -> Applied:
+def _send(client: HullClient, scene: Scene, frame: Frame, alarms: Alarms | None) -> int:
+    """Send a frame as one batch, or as one batch to each of several hulls. Returns the revision of the scene's hull."""
+    name = scene.hull_name
+    if alarms:
+        batch = Batch(keys=frame.keys, points=frame.points, remove=frame.removed)
+        batches = alarms.batches(frame)
+        if batches:
+            return client.transfer({name: batch, **batches})[name].revision
     if scene.keyed:
-        return client.put(scene.hull_name, frame.keys, frame.points, remove=frame.removed)
+        return client.put(name, frame.keys, frame.points, remove=frame.removed).revision
     times = None if scene.max_age is None else [frame.time] * len(frame.points)
-    return client.apply(scene.hull_name, insert=frame.points, times=times)
+    return client.apply(name, insert=frame.points, times=times).revision
 
 
 def _verified(client: HullClient, scene: Scene, frame: Frame, live: Hull) -> str | None:

@@ -56,6 +56,9 @@ class Scene(Protocol):
         length: the number of frames.
         notes: lines about the input, such as what was left out; printed first.
         background: (m, 2) points that never move, drawn faintly.
+        circles: the center and radius of fences that the keys enter and leave, by name; none without keys.
+        rivals: two groups of keys, whose hulls are watched for meeting; a key begins with the name of its group and a
+            space. None for no groups.
     """
 
     title: str
@@ -69,6 +72,8 @@ class Scene(Protocol):
     length: int
     notes: list[str]
     background: Points
+    circles: dict[str, tuple[float, float, float]]
+    rivals: tuple[str, str] | None
 
     def frames(self) -> Iterator[Frame]:
         """The frames in order, each once."""

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from dynhull_client import HullClient
+from dynhull_client import FenceEvent, HullClient
 
 from .replay import Step, replay
 from .scene import Scene
@@ -20,6 +20,8 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
     for note in scene.notes:
         console.print(note, markup=False)
     agreed = 0
+    alarms = 0, 0
+    events: list[FenceEvent] = []
     largest: Step | None = None
     difference = None
     columns = [BarColumn(), MofNCompleteColumn(), TextColumn(scene.step), TimeRemainingColumn()]
@@ -29,6 +31,8 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
         Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
     ):
         for step in progress.track(replay(client, scene), total=scene.length):
+            alarms = step.alarms
+            events += step.events
             if step.difference:
                 difference = f"{step.frame.clock}: {step.difference}"
                 break
@@ -37,6 +41,9 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
                 largest = step
             if step.frame.milestone:
                 console.print(_line(scene, step), markup=False)
+                for line in _event_lines(events):
+                    console.print(line, markup=False)
+                events.clear()
     if largest and len(largest.vertices):
         from .picture import draw  # matplotlib takes a while to load, and only the end needs it
 
@@ -47,6 +54,12 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
         "Compared after each batch: the live hull with Chan's recomputation, its "
         f"{sent} with those sent, the watcher's copy with the live hull: {agreed} {scene.step}"
     )
+    if scene.circles or scene.rivals:
+        console.print(
+            "Compared with a recomputation from all positions: every enter and exit, in order, with its cause"
+        )
+        colour = "green" if alarms[0] == alarms[1] else "red"
+        console.print(f"[{colour}]EVENTS {alarms[0]}/{alarms[1]}[/{colour}]")
     if difference:
         console.print(f"[red]DIFFERENT[/red] at {difference}")
         return False
@@ -54,12 +67,27 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
     return True
 
 
+def _event_lines(events: list[FenceEvent]) -> list[str]:
+    """The events since the line before, one line for each fence and kind."""
+    by_fence: dict[tuple[str, str], list[FenceEvent]] = {}
+    for event in events:
+        by_fence.setdefault((event.fence, event.type), []).append(event)
+    lines = []
+    for (fence, kind), found in sorted(by_fence.items()):
+        keys = [str(event.key) for event in found if event.key is not None]
+        names = ": " + _listed(keys) if keys else ""
+        lines.append(f"       {fence} {kind} {len(found)}{names}")
+    return lines
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - MOST_CORNERS} more" if len(names) > MOST_CORNERS else ""
+    return ", ".join(names[:MOST_CORNERS]) + more
+
+
 def _line(scene: Scene, step: Step) -> str:
     names = step.corners()
-    corners = ", ".join(names[:MOST_CORNERS]) + (
-        f" and {len(names) - MOST_CORNERS} more" if len(names) > MOST_CORNERS else ""
-    )
     return (
         f"{step.frame.clock:>5}  {len(step.frame.positions):>5,} {scene.counted}  {len(names):>3} vertices  "
-        f"{step.area:>14,.0f} {scene.area_unit}  {corners}"
+        f"{step.area:>14,.0f} {scene.area_unit}  {_listed(names)}"
     )

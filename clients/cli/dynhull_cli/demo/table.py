@@ -30,6 +30,8 @@ class Table:
     step = "batches"
     length_unit = "units"
     area_unit = "square units"
+    circles: dict[str, tuple[float, float, float]] = {}  # noqa: RUF012  (nobody changes it)
+    rivals: tuple[str, str] | None = None
 
     def __init__(
         self, path: Path, x: str | None, y: str | None, identity: str | None, time: str | None, batches: int

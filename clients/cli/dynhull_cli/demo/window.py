@@ -18,6 +18,8 @@ class RecentPositions:
     """
 
     keyed = False
+    circles: dict[str, tuple[float, float, float]] = {}  # noqa: RUF012  (nobody changes it)
+    rivals: tuple[str, str] | None = None
 
     def __init__(self, scene: Scene, max_age: timedelta) -> None:
         self.title = f"{scene.title}: positions of the last {shown(max_age)}"
