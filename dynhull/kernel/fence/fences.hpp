@@ -232,7 +232,8 @@ class Fences {
   static constexpr Point NOWHERE = {NO_TIME, NO_TIME};
   static constexpr std::size_t CROWD = 96, MANY_PIECES = 20;  // beyond which a zone is divided
   static constexpr std::uint32_t FIRST = 1;                   // the base of numbers of changes
-  static constexpr std::size_t LOOKAHEAD = 8;                 // subjects that are being prefetched
+  static constexpr std::size_t LOOKAHEAD = 16;                // subjects that are being prefetched
+  static constexpr std::size_t PIECES_FETCHED = 5;            // lines of a zone's pieces
 
   // A subject that has changed since crossings were last taken.
   struct Change {
@@ -327,14 +328,35 @@ class Fences {
     if (returned_ != reports_) return_gone();
     if (torn_ && zoned_) rebuild();
     if (!zoned_) return;
-    for (const std::uint32_t slot : strayed_)
-      if (there(slot)) relist(slot);
+    for (std::size_t from = 0; from < strayed_.size(); from += LOOKAHEAD) relist_some(from);
     divide_crowded();
   }
-  void relist(std::uint32_t slot) {
+  // Some of those that have strayed, so that their cache misses overlap.
+  void relist_some(std::size_t from) {
+    const std::size_t end = std::min(from + LOOKAHEAD, strayed_.size());
+    std::uint32_t zones[LOOKAHEAD];
+    for (std::size_t i = from; i < end; ++i) {
+      prefetch(&subjects_[strayed_[i]]);
+      if (strayed_[i] < slots_->end()) prefetch(&(*slots_)[strayed_[i]]);
+    }
+    for (std::size_t i = from; i < end; ++i) {
+      zones[i - from] = there(strayed_[i]) ? zones_.find((*slots_)[strayed_[i]].place) : NONE;
+      if (zones[i - from] == NONE) continue;
+      const auto* const zone = reinterpret_cast<const char*>(&zones_[zones[i - from]]);
+      prefetch(zone);
+      prefetch(zone + 64);
+    }
+    for (std::size_t i = from; i < end; ++i) {
+      if (zones[i - from] == NONE) continue;
+      const auto* const pieces = reinterpret_cast<const char*>(zones_[zones[i - from]].pieces.data());
+      for (std::size_t at = 0; at < PIECES_FETCHED; ++at) prefetch(pieces + 64 * at);
+    }
+    for (std::size_t i = from; i < end; ++i)
+      if (zones[i - from] != NONE) relist(strayed_[i], zones[i - from]);
+  }
+  void relist(std::uint32_t slot, std::uint32_t zone) {
     Subject& subject = subjects_[slot];
     const Point p = (*slots_)[slot].place;
-    const std::uint32_t zone = zones_.find(p);
     if (zone != subject.zone) {
       grow(zones_[zone].subjects, 1);
       unlist(subject);
