@@ -2,10 +2,10 @@
 
     python tests/robustness/storage/flips.py [--flips 20000] [--seed 0] [--processes 2] [--folder /dev/shm]
 
-Folders of killed and of stopped servers, with hulls of points, of keys and with windows. Every bit of the headers: of
-the database, of the log, of its frames, of all pages; then bits at random, anywhere. After each flip the folder is
-opened and compared with what was acknowledged; where it opens, one more batch is committed, and the folder opened
-again: damage may strike later.
+Folders of killed and of stopped servers, with hulls of points, of keys and with windows, and a fence. Every bit of the
+headers: of the database, of the log, of its frames, of all pages; then bits at random, anywhere. After each flip the
+folder is opened and compared with what was acknowledged; where it opens, one more batch is committed, and the folder
+opened again: damage may strike later.
 
 harmless: everything is there. repaired: a note says what was lost or mended. refused: a StorageError says why. Any
 other outcome is a fault, and makes the exit code 1.
@@ -27,7 +27,20 @@ from typing import Any
 import numpy as np
 
 from dynhull.keys import PackedKeys
+from dynhull_server.state.fences.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.records import (
+    AddFence,
+    AppendEvents,
+    Consumer,
+    EventType,
+    FenceEvent,
+    FenceRow,
+    Inside,
+    Members,
+    PutConsumer,
+)
 from dynhull_server.state.records import (
+    NO_TIME,
     Append,
     Contents,
     Create,
@@ -59,6 +72,9 @@ TREE_PAGES = (2, 5, 10, 13)
 LOG_HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
 
 Acknowledged = dict[int, list[Record]]
+
+FENCE = 90
+FENCE_ROW = FenceRow(FENCE, "gate", "uid", 1.5, FenceConfig(CircleArea(1.0, 2.0, 3.0), "hull", "hull 2", margin=0.5))
 
 
 @dataclass(frozen=True)
@@ -139,12 +155,35 @@ class Builder:
         ):
             self.storage.commit([step])
 
+    def fence(self, turn: int) -> None:
+        """Events of a fence, and what else is stored of it; the fence itself at first."""
+        events: list[Any] = self.acknowledged.setdefault(FENCE, [])
+        if not turn:
+            inside = Inside(0, (Members("hull 2", PackedKeys.pack(["a", "é"]), 1),))
+            self.storage.commit([AddFence(FENCE_ROW, inside)])
+        made = [fence_event(len(events) + i + 1) for i in range(1 + turn % 3)]
+        consumer = PutConsumer(FENCE, Consumer("mail", turn, 0))
+        self.storage.commit([AppendEvents(FENCE, made), consumer])
+        events += made
+        if turn == 2:
+            members = Members("hull 2", PackedKeys.pack(["a"]), 5)
+            for step in self.storage.inside(FENCE, Inside(len(events), (members,))):
+                self.storage.commit([step])
+
     def delete(self, number: int, *, sweep: bool = True) -> None:
         """Delete a hull; with `sweep`, also remove the rows that it leaves."""
         self.storage.commit([Delete(number)])
         del self.acknowledged[number]
         for step in self.storage.sweep() if sweep else ():
             self.storage.commit([step])
+
+
+def fence_event(sequence: int) -> FenceEvent:
+    """An event of the fence: always the same."""
+    kind = EventType.ENTER if sequence % 2 else EventType.EXIT
+    distance = 0.0 if sequence % 2 else 0.75
+    place = (float(sequence), -0.5)
+    return FenceEvent(sequence, kind, 1, "hull 2", f"é{sequence}", 1, 0, place, place, distance, NO_TIME, sequence)
 
 
 def snapshot_contents(number: int, revision: int, count: int = 0) -> Contents:
@@ -165,6 +204,7 @@ def fill(builder: Builder) -> None:
         builder.create(number)
     for turn in range(5):
         builder.append({number: 1 + (turn + number) % 3 for number in (1, 2, 3, 4)})
+        builder.fence(turn)
         if turn in (1, 2, 3):
             builder.snapshot(1, 700)
         if turn == 2:
@@ -280,6 +320,13 @@ def outcome(root: Path, acknowledged: Acknowledged, flip: Flip, scratch: Path) -
 def difference(storage: SQLiteStorage, acknowledged: Acknowledged) -> str:
     """How the storage differs from what was acknowledged; empty where it does not."""
     for number, records in acknowledged.items():
+        if number == FENCE:
+            fence = storage.read_fence(FENCE)
+            if fence is None or fence.row != FENCE_ROW or fence.consumers != {"mail": Consumer("mail", 4, 0)}:
+                return f"the fence is {fence}"
+            if storage.read_events(FENCE, 0, 10**6) != records or fence.last != len(records):
+                return "the events of the fence differ"
+            continue
         row = storage.row(number)
         if row != hull_row(number):
             return f"hull {number} is {row}"
