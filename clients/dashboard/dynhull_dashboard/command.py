@@ -14,7 +14,7 @@ def dashboard(
         str | None,
         typer.Option(help="URL of the server's metrics page, for updates per second and acknowledgement delay."),
     ] = None,
-    prefix: Annotated[str, typer.Option(help="Offer only hulls whose names begin with this.")] = "",
+    prefix: Annotated[str, typer.Option(help="Offer only hulls and fences whose names begin with this.")] = "",
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = 5006,
     origin: Annotated[
@@ -29,9 +29,10 @@ def dashboard(
     ] = "",
     y_unit: Annotated[str, typer.Option(help="Unit of y.")] = "",
 ) -> None:
-    """Show live hulls in the browser.
+    """Show live hulls and fences in the browser.
 
-    The first line printed is "dynhull dashboard on http://HOST:PORT". Add ?hull=NAME to open the page with that hull.
+    The first line printed is "dynhull dashboard on http://HOST:PORT". Add ?hull=NAME or ?fence=NAME to open the page
+    with that hull or fence.
     Anyone who can reach the page can see what the token may read.
 
     dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # with dynhull serve --metrics-port 9464
