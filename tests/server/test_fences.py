@@ -22,15 +22,13 @@ INVALID, FAILED, RANGE = (
     grpc.StatusCode.FAILED_PRECONDITION,
     grpc.StatusCode.OUT_OF_RANGE,
 )
-# Fences are in the reference geometry so far, and not in the kernel.
-WRAP = ("env", "DYNHULL_KERNEL=python")
 SQUARE = [0.0, 0.0, 10.0, 0.0, 10.0, 10.0, 0.0, 10.0]
 
 
 @pytest.fixture(scope="module", params=["memory", "durable"])
 def server(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     options = [] if request.param == "memory" else ["--data", str(tmp_path_factory.mktemp("fences"))]
-    with server_process(*options, wrap=WRAP) as process:
+    with server_process(*options) as process:
         yield process.address
 
 
@@ -393,7 +391,7 @@ def test_hulls_that_are_missing_or_have_no_keys_are_refused(
 def test_fences_survive_a_kill(tmp_path: Path, name: str) -> None:
     """Sides that depend on the way, events, consumers and their acknowledgements."""
     fence, fleet = f"{name}/fence", f"{name}/fleet"
-    with server_process("--data", str(tmp_path), killed=True, wrap=WRAP) as server:
+    with server_process("--data", str(tmp_path), killed=True) as server:
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             stub.CreateHull(pb.CreateHullRequest(name=fleet, config={"identity": "IDENTITY_STRING_KEYS"}))
@@ -404,7 +402,7 @@ def test_fences_survive_a_kill(tmp_path: Path, name: str) -> None:
             fences.AckFence(fs.AckFenceRequest(name=fence, consumer="mail", sequence=1))
             before = events(fences, fence)
         server.process.kill()
-    with server_process("--data", str(tmp_path), wrap=WRAP) as server, grpc.insecure_channel(server.address) as channel:
+    with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
         again = fences.GetFence(fs.GetFenceRequest(name=fence)).fence
         assert (again.uid, again.config, again.create_time) == (made.uid, made.config, made.create_time)
@@ -469,7 +467,7 @@ def test_hulls_as_wholes_begin_and_cease_to_be_near(
 def test_old_events_are_dropped_and_consumers_hear_of_it(tmp_path: Path, name: str) -> None:
     """What had to go is counted for each consumer, and a watch says which events it lacks."""
     fence, fleet = f"{name}/fence", f"{name}/fleet"
-    with server_process("--data", str(tmp_path), wrap=WRAP) as server, grpc.insecure_channel(server.address) as channel:
+    with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
         stub.CreateHull(pb.CreateHullRequest(name=fleet, config={"identity": "IDENTITY_STRING_KEYS"}))
         create(fences, fence, circle_area={"radius": 5}, subject_hull=fleet, max_events=3)
@@ -478,7 +476,7 @@ def test_old_events_are_dropped_and_consumers_hear_of_it(tmp_path: Path, name: s
         for x in (9, 2, 8, 3, 7):
             put(stub, fleet, a=(x, 0))
         wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=fence)).fence.first_sequence == 5)
-    with server_process("--data", str(tmp_path), wrap=WRAP) as server, grpc.insecure_channel(server.address) as channel:
+    with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         fences = FenceServiceStub(channel)
         found = fences.GetFence(fs.GetFenceRequest(name=fence)).fence
         assert (found.first_sequence, found.last_sequence) == (5, 7)
@@ -494,7 +492,7 @@ def test_old_events_are_dropped_and_consumers_hear_of_it(tmp_path: Path, name: s
 
 def test_metrics_of_fences(name: str) -> None:
     with (
-        measured(wrap=WRAP) as (server, metrics),
+        measured() as (server, metrics),
         grpc.insecure_channel(server.address) as channel,
     ):
         stub, fences = HullServiceStub(channel), FenceServiceStub(channel)

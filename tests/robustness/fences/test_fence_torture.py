@@ -1,6 +1,5 @@
 """A short run of the torture of fences; `make robustness` is the long one."""
 
-import os
 import re
 import subprocess
 import sys
@@ -10,9 +9,7 @@ from pathlib import Path
 def test_every_event_follows_from_the_positions_and_none_is_missing() -> None:
     torture = Path(__file__).with_name("fence_torture.py")
     command = [sys.executable, torture, "--steps", "4000"]
-    # Fences are in the reference geometry so far, and not in the kernel.
-    environment = os.environ | {"DYNHULL_KERNEL": "python"}
-    run = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
     counts = {name: int(count) for name, count in re.findall(r"'([\w, ]+)': (\d+)", run.stdout.splitlines()[-1])}
     least = {"ENTER": 100, "EXIT": 100, "BEGIN": 1, "kills": 3, "not committed": 9, "unknown, committed": 9}
