@@ -1,4 +1,4 @@
-"""Make the screenshots of the dashboard with two days of the demo's flights: `python docs/screenshots.py`.
+"""Make the screenshots of the dashboard with days of the demo's flights: `python docs/screenshots.py`.
 
 Chromium must be on the PATH.
 """
@@ -11,11 +11,12 @@ import time
 from contextlib import contextmanager
 from datetime import date
 from pathlib import Path
+from urllib.parse import urlencode
 
 from playwright.sync_api import sync_playwright
 
 from dynhull_cli.demo.flights import Flights
-from dynhull_client import HullClient
+from dynhull_client import Circle, HullClient
 
 SERVE = ["serve", "--in-memory", "--port", "0", "--metrics-port", "0", "--log-level", "warning"]
 UNITS = ["--x-unit", "km", "--y-unit", "km"]
@@ -24,10 +25,14 @@ MORNING, EVENING, PACE = 8 * 60, 17 * 60, 0.1
 IMAGES = Path(__file__).with_name("images")
 DESK = {"viewport": {"width": 1440, "height": 900}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+# Fences are around a hull of their own, so that the other pictures are without them.
+FENCED = "airborne"
+LIGHT, DARK = {"color_scheme": "light"}, {"color_scheme": "dark"}
 PICTURES = {
-    "dashboard.png": DESK | {"color_scheme": "light"},
-    "dashboard-dark.png": DESK | {"color_scheme": "dark"},
-    "dashboard-phone.png": PHONE | {"color_scheme": "light"},
+    "dashboard.png": (DESK | LIGHT, False),
+    "dashboard-dark.png": (DESK | DARK, False),
+    "dashboard-phone.png": (PHONE | LIGHT, False),
+    "dashboard-fences.png": (DESK | LIGHT, True),
 }
 
 
@@ -42,13 +47,10 @@ def running(*arguments, lines=1):
             process.terminate()
 
 
-def fly(client, scene):
-    with client.ingest(scene.hull_name) as stream:
-        before = None
-        for frame in list(scene.frames())[MORNING:EVENING]:
-            stream.apply(insert=frame.insert, delete=before)
-            before = frame.insert
-            time.sleep(PACE)
+def fly(client, scene, name):
+    for frame in list(scene.frames())[MORNING:EVENING]:
+        client.put(name, frame.keys, frame.points, remove=frame.removed)
+        time.sleep(PACE)
 
 
 def main():
@@ -59,14 +61,18 @@ def main():
         HullClient(address) as client,
         sync_playwright() as playwright,
     ):
-        for scene in scenes:
-            client.create_hull(scene.hull_name)
-        flights = [threading.Thread(target=fly, args=(client, scene)) for scene in scenes]
+        flown = [*((scene, scene.hull_name) for scene in scenes), (scenes[-1], FENCED)]
+        for _, name in flown:
+            client.create_hull(name, keyed="str")
+        for name, circle in scenes[-1].circles.items():
+            client.create_fence(name, Circle(*circle), FENCED)
+        flights = [threading.Thread(target=fly, args=(client, scene, name)) for scene, name in flown]
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        query = "&".join(f"hull={scene.hull_name}" for scene in scenes)
-        pages = {name: browser.new_context(**look).new_page() for name, look in PICTURES.items()}
-        for page in pages.values():
-            page.goto(f"{url}/?{query}")
+        plain = [("hull", scene.hull_name) for scene in scenes]
+        fenced = [("fence", name) for name in scenes[-1].circles]
+        pages = {name: browser.new_context(**look).new_page() for name, (look, _) in PICTURES.items()}
+        for name, page in pages.items():
+            page.goto(f"{url}/?{urlencode(fenced if PICTURES[name][1] else plain)}")
         for flight in flights:
             flight.start()
         time.sleep((EVENING - MORNING) * PACE - 4)
