@@ -2,7 +2,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from fence_server import fence_server
+from server_process import server_process
 
 collect_ignore = ["alt_texts.py", "docstrings.py", "reference_pages.py"]  # run by mkdocs
 
@@ -11,7 +11,7 @@ PAGES_WITH_A_SERVER = {"client.md"}
 
 @pytest.fixture(scope="session")
 def address() -> Iterator[str]:
-    with fence_server() as server:
+    with server_process() as server:
         yield server.address
 
 

@@ -3,10 +3,10 @@
 from itertools import pairwise
 from pathlib import Path
 
-from fence_server import fence_server
 from patience import wait_until
 from receiver import receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
+from server_process import server_process
 
 from dynhull_client import HullClient
 
@@ -18,7 +18,7 @@ def test_every_event_arrives_in_order(tmp_path: Path) -> None:
     data = ("--data", str(tmp_path / "data"))
     with receiver() as endpoint:
         to = ("--to", endpoint.url, *PLAIN)
-        with fence_server(*data, killed=True) as server, HullClient(server.address) as client:
+        with server_process(*data, killed=True) as server, HullClient(server.address) as client:
             for name in FENCES:
                 fence(client, name)
             with relay_process(server.address, tmp_path, *FENCES, *to, killed=True) as relay:
@@ -40,7 +40,7 @@ def test_every_event_arrives_in_order(tmp_path: Path) -> None:
         with relay_process(server.address, tmp_path, *FENCES, *to) as relay:
             relay.wait_for("no events from the server, trying again")
             endpoint.start()
-            with fence_server(*data, "--port", port) as again, HullClient(again.address) as client:
+            with server_process(*data, "--port", port) as again, HullClient(again.address) as client:
                 for name in FENCES:
                     pass_through(client, name, map(str, range(10, 15)))
                 for name in FENCES:

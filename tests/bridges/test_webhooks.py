@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fence_server import fence_server
 from metrics import scrape
 from patience import wait_until
 from receiver import Received, Receiver, receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
-from server_process import run
+from server_process import run, server_process
 from standardwebhooks import Webhook
 
 from dynhull_client import HullClient
@@ -230,7 +229,7 @@ def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path
 
     endpoint.answer = answer
     options = ("--max-watch-lag", "0.5", "--metrics-port", "0")
-    with fence_server(*options) as server, HullClient(server.address) as client:
+    with server_process(*options) as server, HullClient(server.address) as client:
         metrics = server.process.stdout.readline().split("/")[2]
         fence(client, "a")
         keys = [f"{i:0200}" for i in range(total)]

@@ -2,12 +2,10 @@
 
 import json
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from command_line import dynhull, on_a_terminal
-from fence_server import fence_server
 from forked import COMMAND, Process
 from patience import PATIENCE
 
@@ -61,12 +59,6 @@ def test_bad_files_are_named(text: str, complaint: str, tmp_path: Path, monkeypa
 def test_ack_needs_a_name() -> None:
     done = dynhull("fences", "watch", "zone", "--ack", "--address", "127.0.0.1:1")
     assert (done.exit_code, done.stderr) == (2, "error: --ack needs --consumer: who acknowledges?\n")
-
-
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    with fence_server() as server:
-        yield server.address
 
 
 def ran(*arguments: object) -> list[str]:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fence_server import fence_server
 from geopandas import GeoSeries
 from patience import wait_until
 from proxy import proxy
+from server_process import server_process
 from shapely.geometry import MultiPolygon, box
 from shapely.geometry import Polygon as Shape
 
@@ -36,12 +36,6 @@ SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 HOLE = [[1, 1], [2, 1], [2, 2]]
 FAR = [[5, 5], [6, 5], [6, 6]]
 HOLED = Shape(SQUARE, [HOLE])
-
-
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    with fence_server() as server:
-        yield server.address
 
 
 @pytest.fixture
@@ -97,6 +91,13 @@ def test_areas_come_in_many_forms(client: HullClient, name: str, form: str) -> N
     again = client.create_fence(name, area=made.area, subjects=name, exist_ok=True)
     assert again == made
     assert hash(again) == hash(made)
+
+
+def test_rules_that_change_nothing_are_no_rules(client: HullClient, name: str) -> None:
+    made = client.create_fence(name, area=SQUARE, subjects=name)
+    nothing = {"confirmations": 1, "dwell": 0, "min_dwell": 0.0, "max_event_age": timedelta(0), "margin": -0.0}
+    assert client.create_fence(name, area=SQUARE, subjects=name, exist_ok=True, **nothing) == made
+    assert (made.confirmations, made.dwell, made.min_dwell, made.max_event_age) == (0, None, None, None)
 
 
 def test_a_hull_as_area(client: HullClient, name: str) -> None:
@@ -252,7 +253,7 @@ def test_a_watch_survives_lost_connections(address: str, connect: type[HullClien
 
 def test_a_watch_survives_its_server(tmp_path: Path, connect: type[HullClient]) -> None:
     data = ("--data", str(tmp_path))
-    with fence_server(*data, killed=True) as first, proxy(first.address) as way, connect(way.address) as client:
+    with server_process(*data, killed=True) as first, proxy(first.address) as way, connect(way.address) as client:
         client.create_hull("a", keyed="str")
         client.create_fence("a", area=SQUARE, subjects="a", initial="none")
         watch = client.watch_fence("a")
@@ -260,7 +261,7 @@ def test_a_watch_survives_its_server(tmp_path: Path, connect: type[HullClient]) 
         seen = [next(watch).sequence, next(watch).sequence]
         first.process.kill()
         first.process.wait()
-        with fence_server(*data) as second, HullClient(second.address) as writing:
+        with server_process(*data) as second, HullClient(second.address) as writing:
             pass_through(writing, "a", ["y"])
             way.server = second.address
             seen += [next(watch).sequence, next(watch).sequence]

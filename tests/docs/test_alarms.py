@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 from command_line import dynhull
-from fence_server import fence_server
 from forked import COMMAND
 from patience import PATIENCE, wait_until
+from server_process import server_process
 
 BEFORE = """\
 dynhull create vehicles --keyed str
@@ -44,7 +44,7 @@ def test_an_alarm_from_an_empty_folder(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DYNHULL_WEBHOOK_SECRET", f"whsec_{base64.b64encode(os.urandom(32)).decode()}")
     monkeypatch.setenv("PORT", port)
-    with fence_server() as server:
+    with server_process() as server:
         monkeypatch.setenv("DYNHULL_ADDRESS", server.address)
         printed = [run(line) for line in BEFORE.splitlines()][-1]
         assert [line.split("\t")[2] for line in printed] == ["snapshot", "exit"]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import grpc
+from google.protobuf.duration_pb2 import Duration
 
 from dynhull.arrays import as_coordinate
 from dynhull_proto.v1 import fence_pb2
@@ -302,11 +303,11 @@ def _config(
         margin=as_coordinate(margin, "margin"),
         near_distance=as_coordinate(near, "near"),
         report_crosses=crosses,
-        confirmations=confirmations,
+        confirmations=0 if confirmations == 1 else confirmations,
         max_events=max_events,
-        dwell=None if dwell is None else encode_duration(dwell, "dwell"),
-        min_dwell=None if min_dwell is None else encode_duration(min_dwell, "min_dwell"),
-        max_event_age=None if max_event_age is None else encode_duration(max_event_age, "max_event_age"),
+        dwell=_span(dwell, "dwell"),
+        min_dwell=_span(min_dwell, "min_dwell"),
+        max_event_age=_span(max_event_age, "max_event_age"),
     )
     encode_area(as_area(area), without_self, config)
     if isinstance(subjects, Prefix):
@@ -316,6 +317,12 @@ def _config(
     elif other_hull is not None:
         config.other_hull = other_hull
     return config
+
+
+def _span(seconds: float | timedelta | None, name: str) -> Duration | None:
+    """A time span; none for 0, which means the same."""
+    span = None if seconds is None else encode_duration(seconds, name)
+    return span if span is not None and span != Duration() else None
 
 
 def _as_wanted(existing: Fence, wanted: Fence) -> Fence:
