@@ -225,6 +225,7 @@ def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path
 
     def answer(_: Received) -> tuple[int, dict[str, str]]:
         hold.wait()
+        time.sleep(0.2)  # slow: when the watch begins again, events wait in the relay
         return 200, {}
 
     endpoint.answer = answer
@@ -233,7 +234,7 @@ def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path
         metrics = server.process.stdout.readline().split("/")[2]
         fence(client, "a")
         keys = [f"{i:0200}" for i in range(total)]
-        with relay_process(server.address, tmp_path, "a", "--to", endpoint.url, "--batch", 100, *PLAIN) as relay:
+        with relay_process(server.address, tmp_path, "a", "--to", endpoint.url, "--batch", 1000, *PLAIN) as relay:
             wait_until(lambda: client.get_fence("a").consumers)
             for _ in range(5):
                 client.put("a", keys, np.ones((total, 2)))
