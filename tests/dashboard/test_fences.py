@@ -10,6 +10,7 @@ from metrics import measured, scrape
 from patience import wait_until
 from peers import program
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from proxy import proxy
 from server_process import Server, run, server_process
 
 from dynhull_client import Circle, HullClient, Polygon
@@ -163,8 +164,11 @@ def test_events_are_listed_as_they_happen(
         )
         expect(events(page).locator(".fence").first).to_have_text(yard)
         # A key of the list is found in the picture, by keyboard, too.
+        page.get_by_role("region", name="List of events").focus()
+        for _ in range(3):
+            page.keyboard.press("ArrowDown")
         kept = events(page).get_by_role("button", name="new <b>")
-        kept.focus()
+        expect(kept).to_be_focused()
         client.replace_fence(yard, [[7, 7], [9, 7], [9, 9], [7, 9]], fleet)
         expect(events(page).first.locator(".cause")).to_have_text("the fence changed")
         expect(kept).to_be_focused()  # new rows move nothing
@@ -232,6 +236,31 @@ def test_a_fence_that_is_unknown_deleted_and_created_again(
         client.create_fence(fence, Circle(20, 2, 1), fleet)
         wait_for_inside(page, fence, {"out": [20, 2]})
         expect(events(page).locator(".type")).to_have_text(["≡ snapshot", "✕ closed", "≡ snapshot"])
+
+
+def test_events_that_were_dropped_while_the_server_was_away(
+    browser: Browser, server: tuple[Server, str], client: HullClient, fleet: str, name: str
+) -> None:
+    fence = f"{name}/few"
+    client.create_fence(fence, YARD, fleet, max_events=3)
+    with (
+        proxy(server[0].address) as between,
+        dashboard_process(between.address) as url,
+        opened(browser, url, fences=[fence]) as page,
+    ):
+        wait_for_inside(page, fence, {"in": [1, 2]})
+        between.server = "127.0.0.1:1"
+        between.cut()
+        expect(page.get_by_role("alert")).to_contain_text(f"No connection to {between.address}")
+        for row in range(10):
+            client.put(fleet, [f"new-{row}"], [[2, 2]])
+        wait_until(lambda: client.get_fence(fence).first_sequence == 9)
+        between.server = server[0].address
+        expect(events(page).locator(".type")).to_have_text([*["★ enter"] * 3, "⚠ lost", "≡ snapshot"], timeout=20_000)
+        expect(events(page).nth(3)).to_contain_text("events 2 to 8")
+        expect(events(page).nth(3)).to_contain_text("the server no longer had them")
+        expect(page.get_by_role("alert")).to_be_hidden(timeout=20_000)
+        expect(table_row(page, fence).locator("td").nth(2)).to_have_text("11 of 13")
 
 
 def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:

@@ -1,9 +1,21 @@
 """The figures and the frame of a page, without a browser."""
 
+import asyncio
+import json
 import math
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 
+import grpc
+import numpy as np
 import pytest
+from patience import PATIENCE
 
+from dynhull_client import AsyncHullClient, Circle, Fence, FenceEvent, Polygon
+from dynhull_dashboard.advice import about_fences
+from dynhull_dashboard.event_rows import MOST_EVENTS, EventRows
+from dynhull_dashboard.fence_drawing import area_of
+from dynhull_dashboard.fence_list import FenceList
 from dynhull_dashboard.history import ROWS, History
 from dynhull_dashboard.outline import MOST_DRAWN, drawn, frame_around
 from dynhull_dashboard.server_metrics import Scrape
@@ -71,3 +83,94 @@ def test_what_the_server_counts_as_rates() -> None:
     # Of 100 batches 90 took at most 1 ms, so the 99th lies nine tenths on the way to 2 ms.
     assert after.rates_since(before) == pytest.approx((150, 2, 1.9))
     assert all(map(math.isnan, before.rates_since(after))), "the server has begun anew"
+
+
+def fence(*area: Polygon | Circle, margin: float = 0.0) -> Fence:
+    """A fence around keys of a hull."""
+    return Fence(
+        name="yard",
+        area=area[0] if isinstance(area[0], Circle) else area,
+        subjects="fleet",
+        other_hull=None,
+        boundary="closed",
+        margin=margin,
+        near=0.0,
+        initial="snapshot",
+        crosses=False,
+        dwell=None,
+        confirmations=0,
+        min_dwell=None,
+        without_self=False,
+        max_events=0,
+        max_event_age=None,
+        created=datetime(2026, 1, 1, tzinfo=UTC),
+        uid="u",
+        last_sequence=0,
+        first_sequence=1,
+        inside=0,
+        subject_count=0,
+        consumers=(),
+    )
+
+
+def ring(radius: float, corners: int) -> np.ndarray:
+    angles = np.linspace(0, 2 * np.pi, corners, endpoint=False)
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def test_of_many_corners_some_are_drawn() -> None:
+    shape = area_of("yard", fence(Polygon(ring(9, 90_000), (ring(2, 10_000), ring(1, 3)[::-1]))))
+    assert shape.corners == 100_003
+    assert MOST_DRAWN / 2 < shape.drawn <= MOST_DRAWN
+    many = area_of("yard", fence(*(Polygon(ring(1, 3) + 3 * i) for i in range(10_000))))
+    assert many.drawn <= MOST_DRAWN
+    assert many.corners == 30_000
+
+
+def test_the_margin_of_a_polygon_is_narrower_in_its_hole() -> None:
+    hole = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    drawn = area_of("yard", fence(Polygon([[-9, -9], [9, -9], [9, 9], [-9, 9]], (hole,)), margin=0.5))
+    assert drawn.bounds == pytest.approx((-9.5, -9.5, 9.5, 9.5))
+    [[outer, inner]] = json.loads(drawn.message)["margin_xs"][0]
+    assert max(outer) == pytest.approx(9.5)
+    assert max(inner) == pytest.approx(0.5)
+
+
+def test_a_circle_has_its_radius_and_its_margin() -> None:
+    drawn = area_of("yard", fence(Circle(1, 2, 3), margin=1))
+    assert drawn.bounds == pytest.approx((-3, -2, 5, 6), abs=0.001)
+
+
+def test_the_list_has_the_newest_events() -> None:
+    rows = EventRows("yard")
+    for sequence in range(1, 3 * MOST_EVENTS):
+        rows.add(
+            FenceEvent("enter", sequence, "yard", "u", key=sequence, cause=frozenset(["area_moved", "subject_moved"]))
+        )
+    shown = json.loads(rows.message)["rows"]
+    assert [row[3] for row in shown] == [str(each) for each in range(3 * MOST_EVENTS - 1, 2 * MOST_EVENTS - 1, -1)]
+    assert shown[0][5] == "it moved and the area moved"
+    before = rows.message
+    assert rows.message is before
+    rows.add(FenceEvent("lost", 900, "yard", "u", first=300, last=900))
+    assert json.loads(rows.message)["rows"][0][2:5] == ["lost", "", "events 300 to 900"]
+
+
+def test_a_server_older_than_fences_is_named_as_such() -> None:
+    async def advice(address: str) -> str:
+        async with AsyncHullClient(address) as client, asyncio.timeout(PATIENCE):
+            fences = FenceList(client, "")
+            while fences.error is None:
+                await asyncio.sleep(0.01)
+            await fences.close()
+            return about_fences(address, fences, shown=False)
+
+    older = grpc.server(ThreadPoolExecutor(1))  # without any service
+    port = older.add_insecure_port("127.0.0.1:0")
+    older.start()
+    try:
+        assert asyncio.run(advice(f"127.0.0.1:{port}")).startswith(
+            "This server has no fences: it is older than they are."
+        )
+    finally:
+        older.stop(None).wait()

@@ -1,7 +1,6 @@
 """The latest events of a fence, as rows of the list on the page."""
 
 import json
-import time
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -29,7 +28,7 @@ class Row(NamedTuple):
 
     Attributes:
         id: distinguishes it from all other events.
-        time: milliseconds since 1970.
+        time: milliseconds since 1970; None for events that were lost.
         type: what happened, as in the event.
         key: the key of the subject; empty if there is no single one.
         text: the subject in words where there is no key.
@@ -37,7 +36,7 @@ class Row(NamedTuple):
     """
 
     id: str
-    time: float
+    time: float | None
     type: str
     key: str
     text: str
@@ -74,16 +73,16 @@ class EventRows:
         if event.type == "lost":
             self.skip(event.uid, event.first, event.last, "the server no longer had them")
             return
-        at = time.time() if event.time is None else event.time.timestamp()
+        at = None if event.time is None else 1000 * event.time.timestamp()
         key = "" if event.key is None else str(event.key)
         text = "" if key else _text(event)
         cause = " and ".join(words for name, words in CAUSES.items() if name in event.cause)
-        self._append(Row(f"{event.uid} {event.sequence}", at * 1000, event.type, key, text, cause))
+        self._append(Row(f"{event.uid} {event.sequence}", at, event.type, key, text, cause))
 
     def skip(self, uid: str, first: int, last: int, cause: str) -> None:
         """Add a row for events that are not shown."""
         text = f"events {first:,} to {last:,}" if first < last else f"event {first:,}"
-        self._append(Row(f"{uid} {first}-{last}", time.time() * 1000, "lost", "", text, cause))
+        self._append(Row(f"{uid} {first}-{last}", None, "lost", "", text, cause))
 
     def _append(self, row: Row) -> None:
         self._rows.append(row)

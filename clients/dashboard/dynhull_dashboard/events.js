@@ -7,6 +7,16 @@ class Events {
     this.look_for = look_for
     this.rows = new Map()
     this.shown = new Map()
+    find(".events .scroll").addEventListener("keydown", event => this.choose(event))
+  }
+  // The keys in the list are one stop of the Tab key, not a hundred: arrows move between them.
+  choose(event) {
+    const step = {ArrowDown: 1, ArrowUp: -1}[event.key]
+    const buttons = [...document.querySelectorAll(".events tbody button")]
+    const next = buttons[buttons.indexOf(document.activeElement) + step]
+    if (!step || !next) return
+    event.preventDefault()
+    next.focus()
   }
   take({fence, rows}) {
     this.rows.set(fence, rows)
@@ -23,9 +33,12 @@ class Events {
     })
   }
   show() {
-    const rows = [...this.rows].flatMap(([fence, rows]) => rows.map(row => ({row, fence})))
+    const rows = [...this.rows].flatMap(([fence, rows]) => {
+      let at = Number.MAX_VALUE  // lost events have no time: they stay before what came after them
+      return rows.map(row => ({row, fence, at: at = Math.min(at, row[1] ?? at)}))
+    })
     // Of one fence they are in order already, and stay so: sorting is stable.
-    const newest = rows.sort((one, two) => two.row[1] - one.row[1]).slice(0, find(".page").dataset.mostEvents)
+    const newest = rows.sort((one, two) => two.at - one.at).slice(0, find(".page").dataset.mostEvents)
     const items = newest.map(({row, fence}) => [`${fence} ${row[0]}`, row, fence])
     const wanted = new Set(items.map(([id]) => id))
     for (const [id, element] of this.shown) {
@@ -49,9 +62,11 @@ class Events {
   }
   element([, at, type, key, text, cause], fence) {
     const row = document.createElement("tr"), time = document.createElement("time")
-    const moment = new Date(at)
-    time.dateTime = time.title = moment.toISOString()
-    time.textContent = moment.toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})
+    if (at != null) {
+      const moment = new Date(at)
+      time.dateTime = time.title = moment.toISOString()
+      time.textContent = moment.toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})
+    }
     row.className = type
     row.append(cell("when", time), cell("type", EVENT_WORDS[type] ?? type), cell("subject", key ? this.button(key) : text),
       cell("fence", fence), cell("cause", cause))
@@ -61,6 +76,7 @@ class Events {
     const button = document.createElement("button")
     button.type = "button"
     button.textContent = key
+    button.tabIndex = -1
     button.title = "Find this key in the picture"
     button.onclick = () => this.look_for(key)
     return button

@@ -62,7 +62,8 @@ def _inside(feed: FenceFeed, fence: Fence) -> str:
         near = ("apart", "near") if fence.near else ("apart", "intersecting")
         return near[fence.inside > 0]
     inside = f"{feed.inside_count:,} of {fence.subject_count:,}"
-    return inside if feed.marked >= feed.inside_count else f"{inside} ({feed.marked:,} drawn)"
+    marked = min(len(feed.marks), feed.inside_count)
+    return inside if marked >= feed.inside_count else f"{inside} ({marked:,} drawn)"
 
 
 def _consumer(consumer: FenceConsumer) -> str:

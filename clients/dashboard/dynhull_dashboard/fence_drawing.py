@@ -1,9 +1,9 @@
-"""The area of a fence, and who is inside, as sent to the pages: serialized once for all of them."""
+"""The area of a fence, as sent to the pages: serialized once for all of them."""
 
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -64,21 +64,6 @@ def _area_message(
     (x, y), (margin_x, margin_y) = _columns(polygons), _columns(around)
     rings = {"xs": x, "ys": y, "margin_xs": margin_x, "margin_ys": margin_y}
     return json.dumps({"kind": "area", "fence": name, "hulls": hulls, "margin": margin, **rings})
-
-
-class Mark(NamedTuple):
-    """A subject inside: its hull, its key and its position."""
-
-    hull: str
-    key: str
-    x: float
-    y: float
-
-
-def marks_message(fence: str, marks: Sequence[Mark] = ()) -> str:
-    """The subjects inside as JSON."""
-    columns = {name: [getattr(mark, name) for mark in marks] for name in Mark._fields}
-    return json.dumps({"kind": "inside", "fence": fence, **columns})
 
 
 def area_hulls(fence: Fence) -> list[str]:

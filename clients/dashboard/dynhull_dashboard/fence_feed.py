@@ -5,7 +5,8 @@ import asyncio
 from dynhull_client import AsyncHullClient, DynhullError, Fence, FenceNotFoundError, Inside
 
 from .event_rows import MOST_EVENTS, EventRows
-from .fence_drawing import Mark, area_of, marks_message
+from .fence_drawing import area_of
+from .marks import MOST_MARKED, Mark, Marks
 from .repeating import log, repeat
 
 MAX_RATE = 10.0
@@ -13,7 +14,6 @@ READ_SECONDS, MARK_SECONDS, RETRY_SECONDS = 1.0, 0.2, 1.0
 TIMEOUT_SECONDS = 2.0
 # Of more subjects inside, none is marked: their keys alone would be megabytes.
 MOST_INSIDE = 10_000
-MOST_MARKED = 500
 # A watch that is further behind begins again with the newest events.
 MOST_BEHIND = 5_000
 
@@ -28,7 +28,7 @@ class FenceFeed:
         deleted: whether there is no fence of this name any more.
         area: its area on the page.
         inside: the subjects inside, all at one moment; None while unknown, or more than `MOST_INSIDE`.
-        marked: the number of those with a mark on the page.
+        marks: those with a mark in the picture.
         events: its latest events.
     """
 
@@ -39,11 +39,10 @@ class FenceFeed:
         self.deleted = False
         self.area = area_of(name, None)
         self.inside: Inside | None = None
-        self.marked = 0
+        self.marks = Marks(name)
         self.events = EventRows(name)
-        self._marks = marks_message(name)
         self._client = client
-        self._seen = 0
+        self._watched, self._seen = "", 0  # the uid of the fence, and its last sequence
         self._known = asyncio.Event()
         self._moved = asyncio.Event()
         self._task = asyncio.create_task(self._run())
@@ -57,7 +56,7 @@ class FenceFeed:
 
     def messages(self) -> dict[str, str]:
         """What the pages draw and list, by kind."""
-        return {"area": self.area.message, "inside": self._marks, "events": self.events.message}
+        return {"area": self.area.message, "inside": self.marks.message, "events": self.events.message}
 
     async def close(self) -> None:
         """Stop following the fence."""
@@ -80,8 +79,6 @@ class FenceFeed:
             raise
         self.trouble, self.deleted = None, False
         before, self.fence = self.fence, fence
-        if before is None or fence.uid != before.uid:
-            self._seen = 0
         if before is None or _drawn(fence) != _drawn(before):
             self.area = area_of(self.name, fence)
         self._known.set()
@@ -90,7 +87,8 @@ class FenceFeed:
         """There is no fence of this name. Its events stay on the page."""
         self.deleted = self.deleted or self.fence is not None
         self.fence = self.inside = None
-        self.area, self._marks, self.marked = area_of(self.name, None), marks_message(self.name), 0
+        self.area = area_of(self.name, None)
+        self.marks.replace([])
         self._known.clear()
 
     async def _follow(self) -> None:
@@ -106,13 +104,16 @@ class FenceFeed:
     async def _watch(self) -> None:
         if self.fence is None:
             return
-        uid, before = self.fence.uid, self._seen
+        uid = self.fence.uid
+        before = self._seen if uid == self._watched else 0
+        self._watched = uid
         self._seen = max(before, self.fence.first_sequence - 1, self.fence.last_sequence - MOST_EVENTS)
         if 0 < before < self._seen:
             self.events.skip(uid, before + 1, self._seen, "there were too many to show")
         async with self._client.watch_fence(self.name, after=self._seen, uid=uid, max_rate=MAX_RATE) as watch:
             async for event in watch:
                 self.events.add(event)
+                self.marks.take(event)
                 self._seen = event.sequence
                 self._moved.set()
                 if self.fence is not None and self.fence.last_sequence - self._seen > MOST_BEHIND:
@@ -122,13 +123,14 @@ class FenceFeed:
         """Read who is inside, and where."""
         fence = self.fence
         if fence is None or fence.other_hull is not None or fence.inside > MOST_INSIDE:
-            self.inside, marks = None, []
-        else:
-            self.inside = await self._client.fence_inside(self.name, timeout=TIMEOUT_SECONDS)
-            marks = await self._positions(self.inside)
-        message = marks_message(self.name, marks)
-        if message != self._marks:
-            self._marks, self.marked = message, len(marks)
+            self.inside = None
+            self.marks.replace([])
+            return
+        inside = await self._client.fence_inside(self.name, timeout=TIMEOUT_SECONDS)
+        marks = await self._positions(inside)
+        if inside.sequence >= self._seen:  # otherwise the events say more
+            self.inside = inside
+            self.marks.replace(marks)
 
     async def _positions(self, inside: Inside) -> list[Mark]:
         marks: list[Mark] = []

@@ -19,7 +19,8 @@ class Fences {
   }
   draw() {
     for (const [name, area] of this.areas) this.draw_area(name, area)
-    for (const [name, inside] of this.inside) this.draw_inside(name, inside)
+    const places = this.places()
+    for (const [name, inside] of this.inside) this.draw_inside(name, inside, places)
   }
   draw_area(name, {hulls, margin, xs, ys, margin_xs, margin_ys}) {
     const outlines = hulls.map(hull => this.source(`vertices of ${hull}`)?.data).filter(each => each?.x.length)
@@ -28,16 +29,21 @@ class Fences {
     replace(this.source(`area of ${name}`), {xs: rings(xs, outlines, "x"), ys: rings(ys, outlines, "y")})
     replace(this.source(`margin of ${name}`), {xs: rings(margin_xs, around, "x"), ys: rings(margin_ys, around, "y")})
   }
-  // A subject that a hull draws, too, is drawn at the same place: the hull is newer.
-  draw_inside(name, {hull, key, x, y}) {
+  // By hull and key, where the hulls draw the subjects inside: the hulls are newer than what the fences know.
+  places() {
     const places = new Map()
-    for (const each of new Set(hull)) {
+    for (const {hull, key} of this.inside.values())
+      hull.forEach((name, row) => places.set(name, (places.get(name) ?? new Map()).set(key[row])))
+    for (const [hull, keys] of places) {
       for (const kind of ["points", "vertices"]) {
-        const drawn = this.source(`${kind} of ${each}`)?.data
-        drawn?.key.forEach((text, row) => places.set(`${each} ${text}`, [drawn.x[row], drawn.y[row]]))
+        const drawn = this.source(`${kind} of ${hull}`)?.data
+        drawn?.key.forEach((key, row) => keys.has(key) && keys.set(key, [drawn.x[row], drawn.y[row]]))
       }
     }
-    const placed = key.map((text, row) => places.get(`${hull[row]} ${text}`) ?? [x[row], y[row]])
+    return places
+  }
+  draw_inside(name, {hull, key, x, y}, places) {
+    const placed = key.map((text, row) => places.get(hull[row]).get(text) ?? [x[row], y[row]])
     const source = this.source(`inside of ${name}`)
     const each = value => key.map(() => value)
     replace(source, {x: placed.map(([x]) => x), y: placed.map(([, y]) => y), hull, key,

@@ -182,10 +182,10 @@ class Page:
         """Show what belongs to the viewer's choice, and something where there is none."""
         if self._untouched and not self._shown:
             self._show(self._hub.server.largest())
-        if self._fences.untouched and not self._fences.names:
-            self._show_fences(self._fences.some(self._shown))
+        if self._fences.untouched and not self._fences.names and (fences := self._fences.some(self._shown)):
+            self._show_fences(fences)
         hulls = self._fences.new_hulls()
-        if self._untouched or not self._fences.untouched:
+        if hulls and (self._untouched or not self._fences.untouched):
             self._show([*self._shown, *hulls])
 
     def _update_text(self) -> None:
