@@ -28,6 +28,7 @@ from dynhull_client import (
     Inside,
     InvalidRequestError,
     Polygon,
+    Prefix,
     SequenceAheadError,
     SubjectsInside,
 )
@@ -113,6 +114,38 @@ def test_a_hull_as_area(client: HullClient, name: str) -> None:
     with pytest.raises(HullFencedError) as refused:
         client.delete_hull(zone)
     assert refused.value.fence == name
+
+
+def test_all_hulls_of_a_prefix(client: HullClient, name: str) -> None:
+    made = client.create_fence(name, area=SQUARE, subjects=Prefix(f"{name}/"), margin=1, initial="none")
+    assert made.subjects == Prefix(f"{name}/")
+    assert (
+        client.create_fence(name, area=SQUARE, subjects=made.subjects, margin=1, initial="none", exist_ok=True) == made
+    )
+    client.create_hull(f"{name}/later", keyed="int")
+    for x in (1, 5, 6):
+        client.put(f"{name}/later", [7], [[x, 1]])
+    with client.watch_fence(name, after=made.last_sequence) as watch:
+        events = [next(watch), next(watch)]
+    assert [(each.type, each.hull, each.key) for each in events] == [
+        ("enter", f"{name}/later", 7),
+        ("exit", f"{name}/later", 7),
+    ]
+    assert (events[1].position, events[1].distance) == ((6.0, 1.0), 2.0)
+
+
+def test_two_hulls(client: HullClient, name: str) -> None:
+    zone, other = f"{name}-zone", f"{name}-other"
+    for each in (zone, other):
+        client.create_hull(each)
+    made = client.create_fence(name, area=zone, other_hull=other, near=1.0)
+    assert (made.subjects, made.other_hull, made.near) == (None, other, 1.0)
+    client.apply(zone, insert=SQUARE)
+    client.apply(other, insert=[[5, 0]])
+    client.apply(other, move=([[5, 0]], [[7, 0]]))
+    with client.watch_fence(name, after=made.last_sequence) as watch:
+        events = [next(watch), next(watch)]
+    assert [(each.type, each.key, each.distance) for each in events] == [("begin", None, 1.0), ("cease", None, 3.0)]
 
 
 def test_what_exists_and_what_does_not(client: HullClient, name: str) -> None:
