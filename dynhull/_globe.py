@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from ._implementation import kernel
 from ._predicates import Floats, Point
 from .arrays import Points, as_coordinate, as_points, repr_of
 
@@ -71,6 +72,11 @@ class Gnomonic:
 
     def project(self, lonlat: Points) -> tuple[Points, npt.NDArray[np.bool_]]:
         """The projections of (k, 2) places, and which of them are within REACH; the others have no projection (NaN)."""
+        if kernel is not None:
+            return kernel.gnomonic(lonlat, *self.center, self._sin, self._cos)
+        return self._project(lonlat)
+
+    def _project(self, lonlat: Points) -> tuple[Points, npt.NDArray[np.bool_]]:
         x, y, z = self._vectors(lonlat)
         near: npt.NDArray[np.bool_] = z >= LEAST_COSINE
         z = np.where(near, z, np.nan)

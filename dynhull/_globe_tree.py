@@ -1,34 +1,26 @@
-"""GlobeTree: a multiset of places on the globe and its convex hull, the readable reference.
+"""GlobeTree: a multiset of places on the globe and its convex hull.
 
 A tree holds the places in the gnomonic projection about a centre, where great circles are straight lines and the hull
-of the projected places is the hull on the globe. A dictionary has, for each projected place, the pairs of numbers that
-were given for it: usually one, but 180 and -180 degrees, and all longitudes at a pole, share a place.
+of the projected places is the hull on the globe. `Given` has, for each projected place, the pairs of numbers that were
+given for it.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from ._given import Given
 from ._globe import REACH, Gnomonic, as_lonlat, as_place
 from ._implementation import kernel
 from ._tree import HullTree
-from .arrays import Points, as_tuples
 
 if TYPE_CHECKING:
     from . import _kernel
     from ._predicates import Point
-
-
-class _Change(NamedTuple):
-    """A change of the number of copies of a given pair, and the projection of its place."""
-
-    pair: Point
-    place: Point
-    copies: int
+    from .arrays import Points
 
 
 class GlobeTree:
@@ -41,13 +33,12 @@ class GlobeTree:
     """
 
     _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
+    _given_type: ClassVar[type[Given | _kernel.Given]] = Given if kernel is None else kernel.Given
 
     def __init__(self, center: Point | None) -> None:
         self._frame = None if center is None else Gnomonic(center)
         self._tree: HullTree | _kernel.HullTree = self._tree_type()
-        self._pairs: dict[Point, tuple[Point, ...]] = {}  # the different pairs at each projected place, in order
-        self._copies: dict[Point, int] = {}  # numbers of copies, of the pairs with more than one
-        self._distinct = 0
+        self._given: Given | _kernel.Given = self._given_type()
 
     @property
     def center(self) -> Point | None:
@@ -69,7 +60,7 @@ class GlobeTree:
     @property
     def distinct(self) -> int:
         """The number of different pairs."""
-        return self._distinct
+        return self._given.distinct
 
     def count(self, lon: float, lat: float) -> int:
         """The number of copies of the pair. O(1)."""
@@ -78,11 +69,7 @@ class GlobeTree:
     def count_many(self, lonlat: Points) -> npt.NDArray[np.int64]:
         """The number of copies of each row. O(1) a row."""
         places, _ = self._project(lonlat)
-        counts = [self._count(*row) for row in zip(as_tuples(lonlat), as_tuples(places), strict=True)]
-        return np.array(counts, dtype=np.int64)
-
-    def _count(self, pair: Point, place: Point) -> int:
-        return self._copies.get(pair, 1) if pair in self._pairs.get(place, ()) else 0
+        return self._given.counts(lonlat, places)
 
     def _project(self, lonlat: Points) -> tuple[Points, npt.NDArray[np.bool_]]:
         """The projections, NaN beyond REACH, and which rows have one: without a centre, none."""
@@ -95,13 +82,13 @@ class GlobeTree:
     def insert(self, lon: float, lat: float) -> bool:
         """Add a pair. True if the hull changed. O(log² n)."""
         changes = self.changes
-        self._apply(np.array([1]), as_place(lon, lat), "the point", ignore_missing=False)
+        self._apply(np.array([1], np.int8), as_place(lon, lat), "the point", ignore_missing=False)
         return self.changes > changes
 
     def delete(self, lon: float, lat: float) -> bool:
         """Remove one copy of a pair. True if the hull changed; KeyError if the pair is missing. O(log² n)."""
         changes = self.changes
-        self._apply(np.array([-1]), as_place(lon, lat), "the point", ignore_missing=False)
+        self._apply(np.array([-1], np.int8), as_place(lon, lat), "the point", ignore_missing=False)
         return self.changes > changes
 
     def apply(self, ops: int | npt.NDArray[np.int8], lonlat: npt.ArrayLike, ignore_missing: bool) -> int:
@@ -115,12 +102,12 @@ class GlobeTree:
             ValueError: a row to insert is beyond REACH.
         """
         pairs = as_lonlat(lonlat)
-        return self._apply(np.broadcast_to(ops, len(pairs)), pairs, "points row {}", ignore_missing=ignore_missing)
+        return self._apply(np.full(len(pairs), ops, np.int8), pairs, "points row {}", ignore_missing=ignore_missing)
 
     def clear(self) -> None:
         """Remove every pair. The centre stays."""
         self._tree.clear()
-        self._pairs, self._copies, self._distinct = {}, {}, 0
+        self._given.clear()
 
     def recenter(self, center: Point | None) -> None:
         """Build the tree anew about another centre, by default the mean direction of the pairs. O(n log n)."""
@@ -132,7 +119,7 @@ class GlobeTree:
         new.changes = self.changes + (not np.array_equal(new.vertices(), self.vertices()))
         vars(self).update(vars(new))
 
-    def _apply(self, ops: npt.NDArray[np.integer], pairs: Points, name: str, *, ignore_missing: bool) -> int:
+    def _apply(self, ops: npt.NDArray[np.int8], pairs: Points, name: str, *, ignore_missing: bool) -> int:
         added = ops > 0
         frame, chosen = self._frame, ""
         if frame is None and added.any():
@@ -147,71 +134,31 @@ class GlobeTree:
             far = np.flatnonzero(added & ~near)
             if far.size:
                 _refuse_far(frame, pairs, int(far[0]), name, chosen)
-        rows = list(zip(as_tuples(pairs), as_tuples(places), strict=True))
-        kept, changes = self._net(ops, rows, ignore_missing=ignore_missing)
-        if kept:
-            self._tree.apply(np.ascontiguousarray(ops[kept], dtype=np.int8), places[kept], False)
-        self._frame = frame
-        self._record(changes)
-        return len(kept)
-
-    def _net(
-        self, ops: npt.NDArray[np.integer], rows: list[tuple[Point, Point]], *, ignore_missing: bool
-    ) -> tuple[list[int], list[_Change]]:
-        """The rows that apply, and what they do together."""
-        signs = ops.tolist()
-        net = Counter(pair for (pair, _), sign in zip(rows, signs, strict=True) if sign > 0)
-        kept = []
-        for row, ((pair, place), sign) in enumerate(zip(rows, signs, strict=True)):
-            if sign < 0:
-                if net[pair] + self._count(pair, place) == 0:
-                    if not ignore_missing:
-                        raise KeyError(*pair, row)
-                    continue
-                net[pair] -= 1
-            kept.append(row)
-        places = dict(rows)
-        return kept, [_Change(pair, places[pair], copies) for pair, copies in net.items() if copies]
-
-    def _record(self, changes: list[_Change]) -> None:
-        """Keep the pairs of a batch that the tree has applied."""
-        renamed = []
+        kept, renamed = self._given.apply(ops, pairs, places, ignore_missing)
+        if not kept.all():
+            ops, pairs, places = ops[kept], pairs[kept], places[kept]
         before = self._tree.changes
-        for pair, place, added in changes:
-            pairs = self._pairs.get(place, ())
-            copies = self._count(pair, place)
-            self._distinct += (copies == 0) - (copies + added == 0)
-            if copies == 0:
-                self._pairs[place] = tuple(sorted((*pairs, pair)))
-            elif copies + added == 0:
-                self._pairs[place] = tuple(other for other in pairs if other != pair)
-            if copies + added > 1:
-                self._copies[pair] = copies + added
-            else:
-                self._copies.pop(pair, None)
-            if not self._pairs[place]:
-                del self._pairs[place]
-            elif pairs and pairs[0] != self._pairs[place][0]:
-                renamed.append(place)
-        if renamed and before == self._tree.changes:
-            self._tree.changes += not set(renamed).isdisjoint(as_tuples(self._tree.vertices()))
+        try:
+            self._tree.apply(ops, places, False)
+        except BaseException:  # no memory, say
+            self._given.apply(-ops, pairs, places, False)
+            raise
+        self._frame = frame
+        if len(renamed) and before == self._tree.changes:
+            self._tree.changes += bool((self._tree.vertices()[:, None] == renamed).all(axis=-1).any())
+        return len(ops)
 
     # The hull
 
     def points(self) -> Points:
         """All pairs in lexicographic order, with multiplicity. O(n log n)."""
-        pairs = sorted(pair for pairs in self._pairs.values() for pair in pairs)
-        return _array([each for pair in pairs for each in [pair] * self._copies.get(pair, 1)])
+        return self._given.points()
 
     def vertices(self) -> Points:
         """The hull's vertices, counter-clockwise from the lexicographically smallest pair. O(h log n)."""
-        pairs = self._given(self._tree.vertices())
-        start = pairs.index(min(pairs)) if pairs else 0
-        return _array(pairs[start:] + pairs[:start])
-
-    def _given(self, places: Points) -> list[Point]:
-        """The least of the pairs given for each projected place."""
-        return [self._pairs[place][0] for place in as_tuples(places)]
+        pairs = self._given.at(self._tree.vertices())
+        start = int(np.lexsort(pairs.T[::-1])[0]) if len(pairs) else 0
+        return np.concatenate([pairs[start:], pairs[:start]])
 
     def locate(self, lonlat: Points) -> npt.NDArray[np.int8]:
         """+1 inside, 0 on the boundary, -1 outside, for each row. O(log n) a row."""
@@ -228,7 +175,7 @@ class GlobeTree:
         result = np.full((len(places), 2, 2), np.nan)
         result[near] = self._tree.tangents(places[near])
         outside = np.flatnonzero(~np.isnan(result[:, 0, 0]))
-        result[outside] = _array(self._given(result[outside].reshape(-1, 2))).reshape(-1, 2, 2)
+        result[outside] = self._given.at(result[outside].reshape(-1, 2)).reshape(-1, 2, 2)
         return result
 
     # As a value
@@ -236,26 +183,19 @@ class GlobeTree:
     def copy(self) -> Self:
         """An independent tree of the same pairs. O(n)."""
         new = type(self)(None)
-        new._frame, new._tree = self._frame, self._tree.copy()
-        new._pairs, new._copies, new._distinct = self._pairs.copy(), self._copies.copy(), self._distinct
+        new._frame, new._tree, new._given = self._frame, self._tree.copy(), self._given.copy()
         return new
 
     def check(self) -> None:
         """Raise AssertionError if an invariant is broken. O(n log n)."""
         self._tree.check()
-        names = [(pair, place) for place, pairs in self._pairs.items() for pair in pairs]
-        assert len(names) == self._distinct
-        assert all(pairs and pairs == tuple(sorted(set(pairs))) for pairs in self._pairs.values())
-        assert self._copies.keys() <= {pair for pair, _ in names}
-        assert all(copies > 1 for copies in self._copies.values())
-        copies: Counter[Point] = Counter()
-        for pair, place in names:
-            copies[place] += self._copies.get(pair, 1)
-        assert copies == Counter(as_tuples(self._tree.points()))
-        if names:
-            places, near = self._project(_array([pair for pair, _ in names]))
-            assert near.all()
-            assert as_tuples(places) == [place for _, place in names]
+        pairs = self._given.points()
+        places, near = self._project(pairs)
+        assert near.all()
+        assert np.array_equal(places[np.lexsort(places.T[::-1])], self._tree.points())
+        distinct, copies = np.unique(pairs, axis=0, return_counts=True)
+        assert len(distinct) == self.distinct
+        assert np.array_equal(self.count_many(distinct), copies)
 
 
 def _refuse_far(frame: Gnomonic, pairs: Points, row: int, name: str, chosen: str) -> None:
@@ -264,7 +204,3 @@ def _refuse_far(frame: Gnomonic, pairs: Points, row: int, name: str, chosen: str
         f"{name.format(row)} is {pair}: {frame.angle(pair):.6f} degrees from the centre {frame.center}{chosen}; "
         f"a hull reaches {REACH:g} degrees"
     )
-
-
-def _array(pairs: list[Point]) -> Points:
-    return np.array(pairs, dtype=np.float64).reshape(-1, 2)

@@ -355,6 +355,44 @@ class WindowTree(HullTree):
         Raise AssertionError if an invariant of the tree or of the window is broken. O(n log n).
         """
 
+def gnomonic(lonlat: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], lon: float, lat: float, sine: float, cosine: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))], Annotated[NDArray[numpy.bool_], dict(shape=(None,))]]:
+    """
+    The projections of places about a centre, given with the sine and the cosine of its latitude, NaN where there is none; and where there is one.
+    """
+
+class Given:
+    """The pairs of numbers given for places: see dynhull's class in Python."""
+
+    def __init__(self) -> None: ...
+
+    @property
+    def distinct(self) -> int:
+        """The number of different pairs."""
+
+    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], pairs: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], places: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], ignore_missing: bool) -> tuple[Annotated[NDArray[numpy.bool_], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]]:
+        """
+        Add the rows with +1 and take those with -1, as a set. Returns which rows have an effect, and the places whose least pair is another now.
+        """
+
+    def counts(self, pairs: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], places: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
+        """The number of copies of each row. O(1) a row."""
+
+    def at(self, places: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The least pair at each place. O(1) a row."""
+
+    def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """All pairs in order, with multiplicity. O(n log n)."""
+
+    def clear(self) -> None:
+        """Forget every pair."""
+
+    def copy(self) -> Given:
+        """An independent copy. O(n)."""
+
+    @property
+    def memory(self) -> int:
+        """The bytes that are reserved."""
+
 def orientation(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> int:
     """
     +1 if the three points turn left, -1 if they turn right, 0 if they are collinear.

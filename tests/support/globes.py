@@ -7,6 +7,7 @@ import numpy as np
 import spherely
 
 from dynhull import GeoHull
+from dynhull._given import Given
 from dynhull._globe_tree import GlobeTree
 from dynhull._tree import HullTree
 
@@ -17,6 +18,7 @@ DIGITS.dps = 50
 
 class PythonGlobeTree(GlobeTree):
     _tree_type = HullTree
+    _given_type = Given
 
 
 class PythonGeoHull(GeoHull):

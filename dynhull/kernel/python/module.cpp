@@ -9,6 +9,7 @@
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
 #include "fences.hpp"
+#include "globe.hpp"
 #include "window.hpp"
 
 using namespace nanobind::literals;
@@ -218,6 +219,24 @@ void add_window_tree(nb::module_& module) {
            "Raise AssertionError if an invariant of the tree or of the window is broken. O(n log n).");
 }
 
+void add_globe(nb::module_& module) {
+  module.def("gnomonic", &gnomonic, "lonlat"_a, "lon"_a, "lat"_a, "sine"_a, "cosine"_a,
+             "The projections of places about a centre, given with the sine and the cosine of its latitude, NaN where "
+             "there is none; and where there is one.");
+  nb::class_<GivenPairs>(module, "Given", "The pairs of numbers given for places: see dynhull's class in Python.")
+      .def(nb::init<>())
+      .def_prop_ro("distinct", &GivenPairs::distinct, "The number of different pairs.")
+      .def("apply", &GivenPairs::apply, "ops"_a, "pairs"_a, "places"_a, "ignore_missing"_a,
+           "Add the rows with +1 and take those with -1, as a set. Returns which rows have an effect, and the places "
+           "whose least pair is another now.")
+      .def("counts", &GivenPairs::counts, "pairs"_a, "places"_a, "The number of copies of each row. O(1) a row.")
+      .def("at", &GivenPairs::at, "places"_a, "The least pair at each place. O(1) a row.")
+      .def("points", &GivenPairs::points, "All pairs in order, with multiplicity. O(n log n).")
+      .def("clear", &GivenPairs::clear, "Forget every pair.")
+      .def("copy", &GivenPairs::copy, "An independent copy. O(n).")
+      .def_prop_ro("memory", &GivenPairs::memory, "The bytes that are reserved.");
+}
+
 void add_predicates(nb::module_& module) {
   module.def(
       "orientation",
@@ -276,6 +295,7 @@ NB_MODULE(_kernel, module) {
   dynhull::add_entities(module);
   dynhull::add_fences(module);
   dynhull::add_window_tree(module);
+  dynhull::add_globe(module);
   dynhull::add_predicates(module);
   dynhull::add_arrays_and_static_hulls(module);
   dynhull::add_fork_hooks(module);
