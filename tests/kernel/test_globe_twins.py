@@ -39,7 +39,7 @@ def outcome(function, *arguments):
         kept, renamed = function(*arguments)
     except KeyError as error:
         return error.args
-    return kept.tolist(), sorted(renamed.tolist())
+    return kept.tolist(), {tuple(place) for place in renamed.tolist()}
 
 
 # Pairs 0 to 2 share a place, and so do 3 and 4.

@@ -24,7 +24,7 @@ class Given {
 
   struct Outcome {
     std::int64_t first_missing = -1;  // the row
-    std::vector<Point> renamed;       // places that had and have pairs, but another least one
+    std::vector<Point> renamed;       // places that had and have pairs, but another least one; perhaps repeatedly
   };
 
   std::size_t distinct() const { return table_.size(); }
