@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -87,7 +87,8 @@ class Windowed:
         if admission.young is not None:
             admitted.late = rows - int(np.count_nonzero(admission.young))
             admitted.times = admission.times[admission.young]
-            admitted.batch = replace(batch, inserts=batch.inserts[admission.young])
+            young = batch.inserts[admission.young]
+            admitted.batch = Batch(young, batch.deletes, batch.moves, batch.count_missing, batch.times)
         if len(self.hull) + admitted.batch.growth > self._most_points:
             self._refuse_growth(admitted)
         return admitted
