@@ -1,16 +1,17 @@
 """Write a data folder with the installed version: a fixture for the versions after it, which must open it.
 
-    python tests/data/make_folder.py tests/data/format2
+    python tests/data/make_folder.py tests/data/format3
 
 By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
 the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
-of each hull, as that version exports them.
+of each hull, as that version exports them, with keys and times.
 """
 
 import shutil
 import subprocess
 import sys
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import grpc
@@ -23,6 +24,9 @@ COMMAND = str(Path(sys.executable).with_name("dynhull"))
 FILES = "dynhull.db", "dynhull.db-wal"
 ZONES_CONFIG = hull_pb2.HullConfig(max_points=500)
 SNAPSHOT_POINTS = 40
+HULLS = {"fleet": "fleet", "zones": "zones/a", "vans": "vans", "track": "tracks"}
+MOMENT = datetime(2026, 11, 1, tzinfo=UTC)
+SECOND, YEARS = timedelta(seconds=1), timedelta(days=36_500)
 
 
 @contextmanager
@@ -74,6 +78,18 @@ def fill(data, address, client):
             continue
     insert_and_delete(client, "train", 1, 12)
     insert_and_delete(client, "bus", 1, 4)
+    fill_keyed(client)
+
+
+def fill_keyed(client):
+    """Keys with event times and deadlines, and a window whose clock is that of the data."""
+    client.create_hull("vans", keyed="str", ordering="event_time")
+    client.create_hull("tracks", keyed="int", max_age=60, clock="data")
+    keys, points = [f"van é{i}" for i in range(9)], np.arange(18.0).reshape(9, 2)
+    client.put("vans", keys, points, times=[MOMENT] * 9, expire_times=[MOMENT + YEARS] * 9, producer="gate", sequence=1)
+    client.put("vans", keys[:2], -points[:2], times=[MOMENT - SECOND, MOMENT + SECOND], remove=keys[8:])
+    for second in range(0, 90, 10):
+        client.put("tracks", [second, 2**64 - 1], [[second, 0], [0, second]], times=[MOMENT + second * SECOND] * 2)
 
 
 def take(data, target):
@@ -84,8 +100,8 @@ def take(data, target):
 
 
 def export(data, target):
-    for name in ("fleet", "zones/a"):
-        ran("export", name, target.with_name(f"{target.name}-{name[:5]}.csv"), "--data", data)
+    for short, name in HULLS.items():
+        ran("export", name, target.with_name(f"{target.name}-{short}.csv"), "--data", data)
 
 
 def main():
@@ -98,6 +114,7 @@ def main():
     with served(data) as (process, _, client):
         insert_and_delete(client, "bus", 5, 7)
         client.apply("zones/a", insert=[(7, 7)], producer="truck", sequence=2)
+        client.put("vans", ["van é0"], [[5, 5]], times=[MOMENT + 2 * SECOND], producer="gate", sequence=2)
         export(data, target / "killed")
         process.kill()
         process.wait()

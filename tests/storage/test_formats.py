@@ -5,6 +5,7 @@ import sqlite3
 
 import numpy as np
 import pytest
+from command_line import dynhull
 from folders import DATABASE, OLD_FOLDERS, append, opened, same, snapshot
 from test_faults import FaultyDisk, failure
 
@@ -170,3 +171,31 @@ def test_a_folder_of_format_2_goes_on_with_keys_and_times(folder):
         storage, contents = opened(folder)
         assert contents.notes == []
     storage.close()
+
+
+# Format 3, written by tests/data/make_folder.py
+
+FORMAT_3 = OLD_FOLDERS / "format3"
+EXPORTED = {"fleet": "fleet", "zones": "zones/a", "vans": "vans", "track": "tracks"}
+
+
+@pytest.mark.parametrize("name", ["stopped", "killed"])
+def test_a_folder_of_format_3_has_every_key_time_and_deadline(folder, name, tmp_path):
+    """As the version exported it that wrote it. A fence is the first thing that format 3 could not hold."""
+    shutil.copytree(FORMAT_3 / name, folder)
+    for _ in range(2):
+        for short, hull in EXPORTED.items():
+            file = tmp_path / "points.csv"
+            done = dynhull("export", hull, file, "--data", folder)
+            assert done.exit_code == 0, done.stderr
+            assert file.read_text() == (FORMAT_3 / f"{name}-{short}.csv").read_text()
+            file.unlink()
+        storage, contents = opened(folder)
+        assert ([row.name for row in contents.hulls], contents.notes) == (
+            ["empty", "fleet", "tracks", "vans", "zones/a"],
+            [],
+        )
+        vans = next(row for row in contents.hulls if row.name == "vans")
+        assert last_sequences(storage.read(vans.number)) == {"gate": 1 if name == "stopped" else 2}
+        storage.close()
+        assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
