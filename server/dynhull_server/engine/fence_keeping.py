@@ -89,7 +89,7 @@ class FenceKeeping:
         return first
 
     async def _store(self, live: LiveFence) -> None:
-        inside = await live.inside()
+        inside = await live.waiting()
         steps = self._storage.inside(live.fence.number, inside)
         while (step := await self._engine.run(self._engine.disk, partial(next, steps, None))) is not None:
             await self._engine.commit([step])

@@ -60,7 +60,13 @@ class LiveFence:
 
     async def inside(self) -> Inside:
         """The subjects that are inside, all at one moment. O(number of them)."""
-        return await self._read(lambda fence, last: Inside(last, tuple(members(fence))), rows=self.fence.inside)
+        return await self._read(
+            lambda fence, events: Inside(_last(fence, events), tuple(members(fence))), rows=self.fence.inside
+        )
+
+    async def waiting(self) -> Inside:
+        """As `inside`, with the times since when they wait for their dwell events."""
+        return await self._read(_waiting, rows=self.fence.inside)
 
     async def acknowledge(self, consumer: str, sequence: int | None, uid: str = "") -> Consumer:
         """Acknowledge events for a consumer, which is created if it is new."""
@@ -107,7 +113,7 @@ class LiveFence:
             self._moved.set()
             self._moved = None
 
-    async def _read(self, function: Callable[[Fence, int], T], rows: int) -> T:
+    async def _read(self, function: Callable[[Fence, Sequence[FenceEvent]], T], rows: int) -> T:
         found: T = await self._engine.ask(ReadFence(Waiter(), self.name, self._engine.time(), function, rows=rows))
         return found
 
@@ -199,3 +205,16 @@ class Fences:
             if not fence.ended:
                 self._live[fence] = live
         return live
+
+
+def _last(fence: Fence, events: Sequence[FenceEvent]) -> int:
+    """The sequence of the last event; `events` are those that are not yet committed."""
+    return events[-1].sequence if events else fence.last
+
+
+def _waiting(fence: Fence, events: Sequence[FenceEvent]) -> Inside:
+    dwelling = fence.dwelling
+    if dwelling is not None and events:
+        dwelling = dwelling.copy()
+        dwelling.follow(events)
+    return Inside(_last(fence, events), tuple(members(fence, dwelling)))

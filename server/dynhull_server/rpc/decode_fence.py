@@ -151,11 +151,9 @@ def _refuse_contradictions(config: FenceConfig) -> None:
             raise InvalidFieldError("config.margin", config.margin, "must be positive with without_self")
         if not config.closed:
             raise InvalidFieldError("config.boundary", "FENCE_BOUNDARY_OPEN", "closed with without_self")
-    for field, value in (
-        ("config.dwell", config.dwell),
-        ("config.confirmations", config.confirmations),
-        ("config.min_dwell", config.min_dwell),
-    ):
+        if config.dwell:
+            raise InvalidFieldError("config.dwell", config.dwell, f"with without_self {NOT_YET}")
+    for field, value in (("config.confirmations", config.confirmations), ("config.min_dwell", config.min_dwell)):
         if value:
             raise InvalidFieldError(field, value, NOT_YET)
 

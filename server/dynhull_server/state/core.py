@@ -63,7 +63,7 @@ from .events import (
 )
 from .fences.fence import Fence
 from .fences.line import Line
-from .fences.line_trip import Ground, LineTrip
+from .fences.line_trip import MOST_DUE, Ground, LineTrip
 from .fences.pair import Pair
 from .fences.queues import SPANNING, components, merged
 from .fences.requests import (
@@ -74,6 +74,7 @@ from .fences.requests import (
     DropConsumer,
     DropEvents,
     FenceRequest,
+    PassTime,
     PutConsumer,
     ReadFence,
     ReplaceFence,
@@ -99,6 +100,8 @@ SMALL_TRIP = 1024
 TRIP_ROWS = 2**18
 # Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+# Microseconds before those who have been inside of a fence for long are looked at again.
+LOOK_AGAIN = 1_000_000
 READS = ReadHull | ReadTogether | ReadFence
 
 
@@ -164,8 +167,9 @@ class Core:
         self._first_order = self._last_order = 0
         self._trips = 0
         self._stopping = False
-        # A heap of the times at which points leave, with the number and name of the hull. An entry is outdated if its
-        # time is not that of the hull's plan.
+        # A heap of the times at which points leave, with the number and name of the hull, and of those at which
+        # subjects have been inside of a fence for long, with its number and the name of its queue. An entry is
+        # outdated if its time is not that of the plan of the hull or fence.
         self._due: list[tuple[int, int, str]] = []
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
             WriteBatch: self._asked,
@@ -181,6 +185,7 @@ class Core:
             PutConsumer: self._asked_of_fence,
             DropConsumer: self._asked_of_fence,
             DropEvents: self._asked_of_fence,
+            PassTime: self._asked_of_fence,
             Gone: self._gone,
             Computed: self._computed,
             Committed: self._committed,
@@ -209,7 +214,7 @@ class Core:
     def latest_time(self) -> int | None:
         """The latest time of the server's clock that a hull has recorded, None if there is none. O(hulls)."""
         clocks = [hull.counts.clock for hull in self._hulls.values() if hull.state.contents.follows_server]
-        clocks += [fence.time for fence in self._fences.values() if fence.last]
+        clocks += [fence.time for fence in self._fences.values() if fence.last or fence.row.waits.time]
         return max((clock for clock in clocks if clock is not None), default=None)
 
     def get(self, name: str) -> Hull:
@@ -247,7 +252,7 @@ class Core:
             return True
         for queue in self._queues.values():
             requests = queue.waiting if queue.trip is None else [*queue.waiting, *queue.trip.requests]
-            if any(type(request) is Expire for request in requests):
+            if any(isinstance(request, Expire | PassTime) for request in requests):
                 return True
         return False
 
@@ -282,6 +287,7 @@ class Core:
             if fence.pair is not None:
                 fence.pair.look()
                 fence.count_inside()
+            self._plan_fence(fence)
 
     # Requests
 
@@ -534,6 +540,10 @@ class Core:
                 for leg in trip.legs:
                     if leg.name in self._hulls:
                         self._plan(self._hulls[leg.name])
+        if isinstance(trip, LineTrip):
+            for each in trip.fence_legs.values():
+                if self._fences.get(each.fence.name) is each.fence:
+                    self._plan_fence(each.fence)
 
     def _rest(self, queue: _Queue) -> None:
         """Remove the queue of a name that has neither a hull nor work."""
@@ -867,14 +877,39 @@ class Core:
     # Time and shutdown
 
     def _tick(self, event: Tick, effects: list[Effect]) -> None:
-        """Update the time, and begin to expire the points of hulls whose planned time has come."""
+        """Update the time, and begin what hulls and fences have planned for it."""
         self._now = event.now
         while self._due and self._due[0][0] <= event.time and not self._stopping:
             due, number, name = heappop(self._due)
+            if name.startswith(PREFIX):
+                fence = self._fences.get(name.removeprefix(PREFIX))
+                if fence is not None and fence.number == number and fence.due == due:
+                    fence.due = None
+                    self._pass_time(fence, event, effects)
+                continue
             hull = self._hulls.get(name)
             if hull is not None and hull.row.number == number and hull.due == due:
                 hull.due = None
                 self._asked(Expire(event.to, hull, event.time, rows=hull.counts.points), effects)
+
+    def _pass_time(self, fence: Fence, event: Tick, effects: list[Effect]) -> None:
+        """Begin the events of those who have been inside of a fence for long enough."""
+        due = fence.next_due
+        if due is None or due > event.time or fence.dwelling is None:
+            self._plan_fence(fence)
+            return
+        # It is looked at again even if the request is refused, because the storage cannot be read.
+        fence.due = event.time + LOOK_AGAIN
+        heappush(self._due, (fence.due, fence.number, PREFIX + fence.name))
+        rows = min(len(fence.dwelling), MOST_DUE)
+        self._asked_of_fence(PassTime(event.to, fence.name, event.time, fence, rows=rows), effects)
+
+    def _plan_fence(self, fence: Fence) -> None:
+        """Plan when the next subject has been inside of a fence for long enough."""
+        due = fence.next_due
+        if due is not None and (fence.due is None or due < fence.due):
+            fence.due = due
+            heappush(self._due, (due, fence.number, PREFIX + fence.name))
 
     def _plan(self, hull: Hull) -> None:
         """Plan when points of a hull leave next. No trip of the hull is in progress."""

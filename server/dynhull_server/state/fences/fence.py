@@ -5,6 +5,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from ..records import NO_TIME
+from .dwelling import Dwelling, dwelling_after
 from .records import Consumer, FenceEvent, FenceRow, KeptFence
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ class Fence:
         time: the time of the last event, NO_TIME before the first.
         inside: the number of subjects inside, as of the last commit.
         consumers: its consumers, as of the last commit.
+        dwelling: who waits for a dwell event, as of the last commit; None where the fence makes none.
+        due: when it is planned to look at those who wait, None if it is not.
         unsaved: the number of events since who is inside was last stored.
         ended: whether it has been deleted.
     """
@@ -47,6 +50,8 @@ class Fence:
         self.time = NO_TIME
         self.inside = 0
         self.consumers: dict[str, Consumer] = {}
+        self.dwelling: Dwelling | None = None
+        self.due: int | None = None
         self.unsaved = 0
         self.ended = False
         self._recent_bytes = recent_bytes
@@ -68,6 +73,12 @@ class Fence:
         """The number of keys that it compares. O(hulls)."""
         return sum(each.hull.counts.points for each in self.subjects.values())
 
+    @property
+    def next_due(self) -> int | None:
+        """When the next subject has been inside for as long as the fence asks; None if nobody waits."""
+        first = None if self.dwelling is None else self.dwelling.first
+        return None if first is None else first + self.row.config.dwell
+
     def count_inside(self) -> None:
         """Count the subjects that are inside."""
         if self.pair is not None:
@@ -80,7 +91,9 @@ class Fence:
         self.row = kept.row
         self.last, self.first = kept.last, kept.first
         self.consumers = dict(kept.consumers)
+        self.dwelling = dwelling_after(kept)
         self.unsaved = len(kept.events)
+        self.time = max(self.time, kept.row.waits.time)
         if kept.events:
             self.time = max(self.time, kept.events[-1].time)
         self._recent.clear()
@@ -90,6 +103,8 @@ class Fence:
         """Record committed events."""
         self.last = events[-1].sequence
         self.time = events[-1].time
+        if self.dwelling is not None:
+            self.dwelling.follow(events)
         self.unsaved += len(events)
         self._recent += events
         self._bytes += sum(map(_size, events))

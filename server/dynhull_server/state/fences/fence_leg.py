@@ -1,12 +1,13 @@
 """The part of a trip at one fence."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from dynhull import Crossings
 from dynhull.keys import PackedKeys, key_list
 
 from ..changes import FenceChange
 from ..records import NO_TIME
+from .dwelling import Dwelling
 from .fence import Fence
 from .pair import Pair
 from .records import (
@@ -23,6 +24,7 @@ from .records import (
     FenceRow,
     Inside,
     KeptFence,
+    Key,
     Members,
     PutConsumer,
 )
@@ -141,6 +143,37 @@ class FenceLeg:
                 )
             )
 
+    def dwelt(self, subjects: Subjects, waited: Sequence[tuple[Key, int]], now: int) -> None:
+        """Make an event of each of some keys that have been inside long enough, given since when."""
+        keys = subjects.keys([key for key, _ in waited])
+        since = dict(waited)
+        sequence, time = self.last, self.time(now)
+        times = subjects.times(keys)
+        event_times = [NO_TIME] * len(keys) if times is None else times.tolist()
+        points = keyed(subjects.hull.state).positions(keys)
+        distances = subjects.distances(self.row.config, self.area, keys, points)
+        hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
+        columns = zip(key_list(keys), points.tolist(), distances, event_times, strict=True)
+        for key, (x, y), distance, event_time in columns:
+            sequence += 1
+            self.events.append(
+                FenceEvent(
+                    sequence,
+                    EventType.DWELL,
+                    Cause.TIME,
+                    hull,
+                    key,
+                    revision,
+                    self.area_revision,
+                    (x, y),
+                    None,
+                    distance,
+                    event_time,
+                    time,
+                    since[key],
+                )
+            )
+
     def paired(self, pair: Pair, causes: int, now: int) -> None:
         """Make the event that two hulls begin or cease to be near."""
         self.events.append(
@@ -238,6 +271,7 @@ class FenceLeg:
     def publish(self) -> None:
         """Make the changes, which are committed, those of the fence."""
         fence = self.fence
+        begins = self.created or self.row.waits != fence.row.waits
         fence.row, fence.consumers, fence.first = self.row, self.consumers, self.first
         fence.area, fence.pair = self.area, self.pair
         fence.ended = self.deleted
@@ -245,16 +279,20 @@ class FenceLeg:
             fence.published(self.events)
         if not self.deleted:
             fence.count_inside()
+            if begins:
+                fence.time = max(fence.time, self.row.waits.time)
+                fence.dwelling = Dwelling(self.row.waits, members(fence)) if self.row.config.dwell else None
 
 
-def members(fence: Fence) -> Iterator[Members]:
-    """The subjects that are inside, by hull; no keys of a hull that is near as a whole."""
+def members(fence: Fence, dwelling: Dwelling | None = None) -> Iterator[Members]:
+    """The subjects that are inside, by hull, and since when they wait; no keys of a hull that is near as a whole."""
     if fence.pair is not None and fence.pair.near:
         yield Members(fence.pair.other.name, PackedKeys(b"", b""), fence.pair.other.state.counts.revision)
     for subjects in fence.subjects.values():
         keys = subjects.index.inside(fence.number)
         if len(keys):
-            yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision)
+            since = None if dwelling is None else dwelling.times(subjects.hull.name, keys)
+            yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision, since)
 
 
 def _caused(causes: int, swap: Swap | None) -> int:

@@ -32,7 +32,7 @@ from .fence import Fence
 from .fence_leg import FenceLeg, Swap, members
 from .line import Line
 from .pair import Pair
-from .records import Cause, Consumer, EventType, FenceRow, Inside, KeptFence
+from .records import NO_WAITS, Cause, Consumer, EventType, FenceRow, Inside, KeptFence, Key, Waits
 from .requests import (
     STRUCTURAL,
     CreateFence,
@@ -40,6 +40,7 @@ from .requests import (
     DropConsumer,
     DropEvents,
     FenceRequest,
+    PassTime,
     PutConsumer,
     ReadFence,
     ReplaceFence,
@@ -50,6 +51,8 @@ POINT_BYTES = 16
 # The hull removes keys whose time has come; the area of a fence that is replaced does not move.
 EXPIRY: Swap = Cause.REMOVED, Cause.EXPIRED
 REPLACEMENT: Swap = Cause.AREA, Cause.CHANGED
+# The most subjects that make an event together because time has passed.
+MOST_DUE = 4096
 # How the library names a ring.
 RING = re.compile(r"polygon (\d+)(?: ring (\d+))? (.*)", re.DOTALL)
 
@@ -226,6 +229,8 @@ class LineTrip(Trip):
 
     def _cross(self, crossed: Iterable[tuple[Subjects, Crossings]], swap: Swap | None, now: int) -> None:
         for subjects, crossings in crossed:
+            if not len(crossings):
+                continue
             numbers = crossings.fences
             starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1])).tolist()
             for first, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
@@ -279,11 +284,13 @@ class LineTrip(Trip):
         if fence is None:
             if isinstance(request, DropEvents):
                 return None
+            if isinstance(request, PassTime):
+                return 0
             raise FenceNotFoundError(request.name)
         match request:
             case ReadFence():
                 leg = self.fence_legs.get(fence.number)
-                return request.function(fence, fence.last if leg is None else leg.last)
+                return request.function(fence, () if leg is None else leg.events)
             case ReplaceFence():
                 return self._replace(request, fence)
             case DeleteFence():
@@ -299,6 +306,9 @@ class LineTrip(Trip):
                     raise ConsumerNotFoundError(fence.name, request.consumer)
                 leg.consumers = {name: each for name, each in leg.consumers.items() if name != request.consumer}
                 return None
+            case PassTime():
+                self._pass_time(request, fence)
+                return 0
             case DropEvents():
                 self._drop_events(request, fence)
                 return None
@@ -310,7 +320,14 @@ class LineTrip(Trip):
             raise FenceExistsError(request.name)
         if ground.refusal is not None:
             raise ground.refusal
-        row = FenceRow(ground.number, request.name, request.birth.uid, request.birth.created, config)
+        row = FenceRow(
+            ground.number,
+            request.name,
+            request.birth.uid,
+            request.birth.created,
+            config,
+            _waits(config, 0, request.time),
+        )
         fence = Fence(row, ground.limits.fence_history_bytes)
         fence.area = self._area(config)
         if config.kind == "other":
@@ -353,7 +370,10 @@ class LineTrip(Trip):
             self.applied = True
         if fence.pair is not None and area is not None:
             self._replace_pair(fence.pair, Pair(area, fence.pair.other, config.near), leg, request.time)
-        leg.row = replace(leg.row, config=config)
+        waits = leg.row.waits
+        if config.dwell != leg.row.config.dwell:
+            waits = _waits(config, leg.last, leg.time(request.time))
+        leg.row = replace(leg.row, config=config, waits=waits)
         leg.area = area
         try:
             for subjects in fence.subjects.values():
@@ -395,6 +415,20 @@ class LineTrip(Trip):
             _check(config, self._area(config))
         return [known.get(hull.name) or Subjects(hull) for hull in keyed]
 
+    def _pass_time(self, request: PassTime, fence: Fence) -> None:
+        """Make the events of those who have been inside long enough, in the order of hulls and keys."""
+        if fence is not request.fence or fence.dwelling is None:
+            return
+        made = self.fence_legs.get(fence.number)
+        # The events of this trip come after those that `dwelling` knows.
+        changed = set() if made is None else {(event.hull, event.key) for event in made.events}
+        waited: dict[str, list[tuple[Key, int]]] = {}
+        for (hull, key), since in fence.dwelling.due(request.time - fence.row.config.dwell, MOST_DUE):
+            if (hull, key) not in changed:
+                waited.setdefault(hull, []).append((key, since))
+        for hull, keys in sorted(waited.items()):
+            self._fence_leg(fence).dwelt(fence.subjects[hull], keys, request.time)
+
     def _put_consumer(self, request: PutConsumer, leg: FenceLeg) -> Consumer:
         fence = leg.fence
         if request.uid and request.uid != fence.row.uid:
@@ -421,6 +455,10 @@ class LineTrip(Trip):
             if lost > 0:
                 leg.acknowledge(Consumer(name, consumer.acknowledged, consumer.lost + lost))
         leg.first = request.first
+
+
+def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:
+    return Waits(sequence, time) if config.dwell else NO_WAITS
 
 
 def _check(config: FenceConfig, area: Hull | None) -> None:

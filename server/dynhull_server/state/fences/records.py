@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
-from ..records import NO_TIME, Keys
+from ..records import NO_TIME, Keys, Times
 from .config import FenceConfig
 
 Key = str | int
@@ -38,11 +38,16 @@ class Cause(IntFlag):
 
 
 class Members(NamedTuple):
-    """Some keys of one hull, ascending, and the revision of the hull."""
+    """Some keys of one hull, ascending, and the revision of the hull.
+
+    Attributes:
+        since: since when each key waits for its dwell event, NO_TIME if it has made it; None if that is not known.
+    """
 
     hull: str
     keys: Keys
     revision: int
+    since: Times | None = None
 
 
 class FenceEvent(NamedTuple):
@@ -59,7 +64,7 @@ class FenceEvent(NamedTuple):
         distance: the distance from the position to the area; None if the subject is gone.
         event_time: the time of the position, NO_TIME if it has none.
         time: when the event was made, in microseconds since 1970 by the server's clock.
-        first_time: when the subject changed its side, if the event waited for a confirmation; otherwise NO_TIME.
+        first_time: since when the subject has been inside, in a dwell event; otherwise NO_TIME.
         inside: the subjects that were inside, in a snapshot and at the end.
     """
 
@@ -79,6 +84,21 @@ class FenceEvent(NamedTuple):
     inside: tuple[Members, ...] = ()
 
 
+class Waits(NamedTuple):
+    """Since when subjects count that were inside when the fence began to ask for how long.
+
+    Attributes:
+        sequence: the sequence of the last event then.
+        time: the time of the server's clock, in microseconds since 1970.
+    """
+
+    sequence: int = 0
+    time: int = 0
+
+
+NO_WAITS = Waits()
+
+
 @dataclass(frozen=True, slots=True)
 class FenceRow:
     """A fence as stored.
@@ -89,6 +109,7 @@ class FenceRow:
         uid: distinguishes it from other fences of its name.
         created: seconds since 1970.
         config: its settings.
+        waits: since when subjects count that were inside before.
     """
 
     number: int
@@ -96,6 +117,7 @@ class FenceRow:
     uid: str
     created: float
     config: FenceConfig
+    waits: Waits = NO_WAITS
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,10 @@ from ..events import Birth, Request
 from .config import FenceConfig
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from .fence import Fence
+    from .records import FenceEvent
 
 # Fences and hulls have names of their own, and queues of their own: no name of a hull has a colon.
 PREFIX = "fence:"
@@ -57,10 +58,10 @@ class ReadFence(FenceRequest):
     """Read a fence between two changes. The result is the value of `function`.
 
     Attributes:
-        function: called with the fence and the sequence of its last event.
+        function: called with the fence, and with its events that are not yet committed.
     """
 
-    function: "Callable[[Fence, int], Any]"
+    function: "Callable[[Fence, Sequence[FenceEvent]], Any]"
 
 
 @dataclass(slots=True, eq=False)
@@ -95,6 +96,19 @@ class DropEvents(FenceRequest):
 
     fence: "Fence"
     first: int
+
+
+@dataclass(slots=True, eq=False)
+class PassTime(FenceRequest):
+    """Make the events of subjects that have been inside long enough at `time`. The result is 0: no point leaves.
+
+    The core makes it at a Tick.
+
+    Attributes:
+        fence: the fence: another one of that name is left alone.
+    """
+
+    fence: "Fence"
 
 
 # Requests that change which hulls share a queue, or what they are compared with.

@@ -1,13 +1,14 @@
 """The keys of one hull as the subjects of fences."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynhull import FenceIndex, KeyedHull
 from dynhull.arrays import Points
-from dynhull.keys import PackedKeys
+from dynhull.keys import KeyType, PackedKeys, key_list
 
 from ..contents.keyed import Keyed, stored_times
 from ..hull import Hull
@@ -49,6 +50,26 @@ class Subjects:
         contents = self.hull.state.contents
         assert isinstance(contents, Keyed)
         return stored_times(contents.hull.times(keys)) if contents.timed else None
+
+    def distances(self, config: FenceConfig, area: Hull | None, keys: Keys, points: Points) -> list[float]:
+        """The distances from keys that are inside of a fence to its area: positive only with a margin.
+
+        Args:
+            config: the settings of the fence, not with `without_self`.
+            area: the hull that is its area, None for other areas.
+            keys: n keys.
+            points: (n, 2) their positions.
+        """
+        if not config.margin:
+            return [0.0] * len(keys)
+        # Without the margin those leave that are outside of the area.
+        kind: KeyType = "str" if isinstance(keys, PackedKeys) else "int"
+        index = FenceIndex(KeyedHull.from_entities(keys, points, None, kind))
+        bare = replace(config, margin=0.0, crosses=False)
+        lay(index, 0, bare, None if area is None else area.state.vertices(), keys)
+        left = index.take()
+        far = dict(zip(key_list(left.keys), left.distances.tolist(), strict=True))
+        return [far.get(key, 0.0) for key in key_list(keys)]
 
     def keys(self, keys: Collection[Key]) -> Keys:
         """Keys of the hull's kind, ascending."""

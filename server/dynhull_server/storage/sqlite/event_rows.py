@@ -11,7 +11,7 @@ from dynhull.keys import PackedKeys
 
 from ...state.fences.records import EventType, FenceEvent, Inside, Key, Members, Position
 from ...state.records import NO_TIME, Keys
-from .columns import Cursor, key_bytes
+from .columns import Cursor, key_bytes, time_bytes
 
 POSITION = struct.Struct(">dd")
 PAIR = struct.Struct(">QQ")
@@ -25,6 +25,8 @@ HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
 NO_KEY, STRING_KEY, INTEGER_KEY = 0, 1, 2
 KEY_BITS = 3
 HAS_FIRST_TIME, HAS_HULL, HAS_INSIDE = 4, 8, 16
+# Of some keys inside: beside their kind, whether their times follow.
+HAS_SINCE = 4
 SEVEN_BITS, MORE = 127, 128
 
 
@@ -138,9 +140,12 @@ def _members(out: bytearray, members: tuple[Members, ...]) -> None:
     for each in members:
         _text(out, each.hull)
         _unsigned(out, each.revision)
-        out.append(STRING_KEY if isinstance(each.keys, PackedKeys) else INTEGER_KEY)
+        kind = STRING_KEY if isinstance(each.keys, PackedKeys) else INTEGER_KEY
+        out.append(kind if each.since is None else kind | HAS_SINCE)
         _unsigned(out, len(each.keys))
         out += key_bytes(each.keys)
+        if each.since is not None:
+            out += time_bytes(each.since)
 
 
 def _read_members(cursor: Cursor) -> tuple[Members, ...]:
@@ -149,8 +154,8 @@ def _read_members(cursor: Cursor) -> tuple[Members, ...]:
         hull, revision = _read_text(cursor), _read_unsigned(cursor)
         (kind,) = cursor.take(1)
         count = _read_unsigned(cursor)
-        keys: Keys = cursor.strings(count) if kind == STRING_KEY else cursor.integers(count)
-        members.append(Members(hull, keys, revision))
+        keys: Keys = cursor.strings(count) if kind & KEY_BITS == STRING_KEY else cursor.integers(count)
+        members.append(Members(hull, keys, revision, cursor.times(count) if kind & HAS_SINCE else None))
     return tuple(members)
 
 

@@ -384,7 +384,12 @@ def inside_steps(number: int, inside: Inside, place: Callable[[], int]) -> list[
     if not inside.members and not inside.sequence:
         return []
     pieces = [
-        Members(each.hull, each.keys[start : start + KEYS_A_ROW], each.revision)
+        Members(
+            each.hull,
+            each.keys[start : start + KEYS_A_ROW],
+            each.revision,
+            None if each.since is None else each.since[start : start + KEYS_A_ROW],
+        )
         for each in inside.members
         for start in range(0, max(len(each.keys), 1), KEYS_A_ROW)
     ]

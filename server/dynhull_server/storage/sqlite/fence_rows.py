@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ...state.fences.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
-from ...state.fences.records import Consumer, FenceRow
+from ...state.fences.records import NO_WAITS, Consumer, FenceRow, Waits
 from .encoding import checksum
 
 Values = tuple[int, str, str, float, str, int]
@@ -34,7 +34,7 @@ class FoundFence:
 
 def values(row: FenceRow) -> Values:
     """The values of the columns, with their checksum."""
-    config = config_text(row.config)
+    config = settings_text(row)
     return (
         row.number,
         row.name,
@@ -51,21 +51,25 @@ def consumer_values(fence: int, consumer: Consumer) -> tuple[int, str, int, int,
     return fence, consumer.name, consumer.acknowledged, consumer.lost, stored
 
 
-def config_text(config: FenceConfig) -> str:
+def settings_text(row: FenceRow) -> str:
     """Settings as JSON, without those that have their default value; rings of polygons in base 64."""
-    given = {
+    config = row.config
+    given: dict[str, Any] = {
         each.name: getattr(config, each.name)
         for each in fields(config)
         if each.name != "area" and getattr(config, each.name) != each.default
     }
     given["area"] = _area_as_json(config.area)
+    if row.waits != NO_WAITS:
+        given["waits"] = row.waits
     return json.dumps(given, sort_keys=True)
 
 
-def config_from(text: str) -> FenceConfig:
-    """The inverse of `config_text`; ValueError, TypeError or KeyError for other texts."""
+def settings_from(text: str) -> tuple[FenceConfig, Waits]:
+    """The inverse of `settings_text`; ValueError, TypeError, KeyError or AttributeError for other texts."""
     given = json.loads(text)
-    return FenceConfig(**{**given, "area": _area_from_json(given["area"])})
+    waits = Waits(*given.pop("waits", NO_WAITS))
+    return FenceConfig(**{**given, "area": _area_from_json(given["area"])}), waits
 
 
 def found_fences(connection: sqlite3.Connection) -> Iterator[FoundFence]:
@@ -73,7 +77,7 @@ def found_fences(connection: sqlite3.Connection) -> Iterator[FoundFence]:
     query = "SELECT id, name, uid, created, config, checksum FROM fences"
     for number, name, uid, created, config, stored in connection.execute(query):
         try:
-            row = FenceRow(number, name, uid, created, config_from(config))
+            row = FenceRow(number, name, uid, created, *settings_from(config))
             whole = _checksum(number, name, uid, created, config) == stored
         except (ValueError, TypeError, KeyError, AttributeError, struct.error):
             whole = False

@@ -1,0 +1,95 @@
+"""Who has been inside of a fence for how long, and has not made its event so far."""
+
+from collections import OrderedDict
+from collections.abc import Iterable
+from itertools import islice
+
+import numpy as np
+
+from dynhull.keys import key_list
+
+from ..records import NO_TIME, Keys, Times
+from .records import EventType, FenceEvent, KeptFence, Key, Members, Waits
+
+Subject = tuple[str, Key]  # the name of its hull, and its key
+
+
+class Dwelling:
+    """The subjects inside that wait for their event, with the times since when they count.
+
+    It follows from committed events alone, so that a restart finds it again in the storage.
+
+    Args:
+        waits: since when subjects count that were inside before.
+        members: who is inside already, and waits. O(n log n).
+    """
+
+    def __init__(self, waits: Waits, members: Iterable[Members] = ()) -> None:
+        self._waits = waits
+        found: list[tuple[int, Subject]] = []
+        for each in members:
+            times = [waits.time] * len(each.keys) if each.since is None else each.since.tolist()
+            found += [
+                (time, (each.hull, key))
+                for key, time in zip(key_list(each.keys), times, strict=True)
+                if time != NO_TIME
+            ]
+        # Ascending by time: of one fence the time of events never goes back.
+        self._since = OrderedDict((subject, time) for time, subject in sorted(found, key=lambda each: each[0]))
+
+    @property
+    def first(self) -> int | None:
+        """Since when the one counts that has waited longest; None if nobody waits."""
+        return next(iter(self._since.values()), None)
+
+    def __len__(self) -> int:
+        """The number of subjects that wait."""
+        return len(self._since)
+
+    def copy(self) -> "Dwelling":
+        """Another one with the same subjects. O(n)."""
+        other = Dwelling(self._waits)
+        other._since = self._since.copy()
+        return other
+
+    def follow(self, events: Iterable[FenceEvent]) -> None:
+        """Take in the next events."""
+        since = self._since
+        for event in events:
+            before = event.sequence <= self._waits.sequence
+            time = self._waits.time if before else event.time
+            if event.type is EventType.SNAPSHOT:
+                for each in event.inside:
+                    since.update(((each.hull, key), time) for key in key_list(each.keys))
+            elif event.key is not None and event.type is EventType.ENTER:
+                since[event.hull, event.key] = time
+            elif event.key is not None and (
+                event.type is EventType.EXIT or (event.type is EventType.DWELL and not before)
+            ):
+                since.pop((event.hull, event.key), None)
+
+    def due(self, until: int, most: int) -> list[tuple[Subject, int]]:
+        """At most that many subjects that have counted since `until` or longer, with their times."""
+        found = []
+        for subject, time in islice(self._since.items(), most):
+            if time > until:
+                break
+            found.append((subject, time))
+        return found
+
+    def times(self, hull: str, keys: Keys) -> Times:
+        """Since when keys of a hull count; NO_TIME for those that have made their event."""
+        return np.array([self._since.get((hull, key), NO_TIME) for key in key_list(keys)], np.int64)
+
+
+def dwelling_after(kept: KeptFence) -> Dwelling | None:
+    """Who waits after the last stored event; None for a fence that does not ask how long. O(stored + events)."""
+    if not kept.row.config.dwell:
+        return None
+    inside = kept.inside
+    members: Iterable[Members] = inside.members
+    if inside.sequence <= kept.row.waits.sequence:  # what they had made of it then no longer counts
+        members = [each._replace(since=None) for each in members]
+    dwelling = Dwelling(kept.row.waits, members)
+    dwelling.follow(kept.events)
+    return dwelling

@@ -1,0 +1,268 @@
+"""Fences that wait: who has been inside for a time makes an event, over kills and restarts."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import grpc
+import pytest
+from fence_calls import create, delete, events, insert, polygon, put, refused_by, remove, told
+from fence_server import fence_server
+from patience import wait_until
+
+from dynhull_proto.v1 import batch_pb2, fence_pb2, points_pb2
+from dynhull_proto.v1 import fence_service_pb2 as fs
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+CIRCLE = {"radius": 5}
+SECOND = 1_000_000
+MANY = 5000  # more than make an event in one commit
+
+
+@pytest.fixture(scope="module", params=["memory", "durable"])
+def address(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    options = [] if request.param == "memory" else ["--data", str(tmp_path_factory.mktemp("rules"))]
+    with fence_server(*options) as process:
+        yield process.address
+
+
+@pytest.fixture
+def fences(channel: grpc.Channel) -> FenceServiceStub:
+    return FenceServiceStub(channel)
+
+
+@pytest.fixture
+def fleet(stub: HullServiceStub, name: str) -> str:
+    return keyed(stub, f"{name}/fleet")
+
+
+def keyed(stub: HullServiceStub, hull: str) -> str:
+    stub.CreateHull(pb.CreateHullRequest(name=hull, config={"identity": "IDENTITY_STRING_KEYS"}))
+    return hull
+
+
+def span(seconds: float) -> dict[str, int]:
+    return {"seconds": int(seconds), "nanos": round(seconds % 1 * 1e9)}
+
+
+def waited(fences: FenceServiceStub, fence: str, last: int, after: int = 0) -> list[fence_pb2.FenceEvent]:
+    """The events of a fence after a sequence, once it has this many."""
+    wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=fence)).fence.last_sequence >= last)
+    return events(fences, fence, after)
+
+
+def dwells(found: list[fence_pb2.FenceEvent]) -> list[str]:
+    return [event.string_key for event in found if event.type == fence_pb2.FENCE_EVENT_TYPE_DWELL]
+
+
+def stayed(event: fence_pb2.FenceEvent) -> int:
+    """The time from entering to the dwell event, in microseconds."""
+    return event.time.ToMicroseconds() - event.first_time.ToMicroseconds()
+
+
+def test_who_stays_inside_makes_one_event(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(0.4))
+    put(stub, fleet, a=(1, 0), b=(9, 0))
+    revision = put(stub, fleet, a=(2, 0))  # it stays inside
+    entered, dwelt = waited(fences, name, 2)
+    assert [told(each) for each in (entered, dwelt)] == ["ENTER a SUBJECT_APPEARED", "DWELL a TIME_PASSED"]
+    assert dwelt.first_time == entered.time
+    assert stayed(dwelt) >= 0.4 * SECOND
+    assert (dwelt.subject_hull, dwelt.subject_revision, dwelt.position.x, dwelt.distance) == (fleet, revision, 2, 0)
+    assert not entered.HasField("first_time")
+    time.sleep(0.8)
+    put(stub, fleet, a=(9, 0))
+    put(stub, fleet, a=(3, 0))
+    found = waited(fences, name, 5, after=2)
+    assert [told(each) for each in found] == [
+        "EXIT a SUBJECT_MOVED",
+        "ENTER a SUBJECT_MOVED",
+        "DWELL a TIME_PASSED",
+    ]
+    assert found[2].first_time == found[1].time
+
+
+def test_a_stay_that_breaks_off_begins_anew(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(1))
+    put(stub, fleet, a=(1, 0), b=(1, 1), c=(2, 2))
+    put(stub, fleet, a=(9, 0))
+    remove(stub, fleet, "b")
+    time.sleep(0.5)
+    put(stub, fleet, a=(1, 0))
+    found = waited(fences, name, 8)
+    assert dwells(found) == ["c", "a"]
+    again = next(each for each in found[4:] if each.type == fence_pb2.FENCE_EVENT_TYPE_ENTER)
+    assert found[-1].first_time == again.time
+    assert stayed(found[-1]) >= SECOND
+
+
+@pytest.mark.parametrize("initial", ["SNAPSHOT", "EVENTS", "NONE"])
+def test_who_is_inside_at_first_counts_from_the_creation(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str, initial: str
+) -> None:
+    put(stub, fleet, a=(1, 0), b=(9, 0), c=(0, 1))
+    before = time.time_ns() // 1000
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial=f"FENCE_INITIAL_{initial}", dwell=span(0.3))
+    first = {"SNAPSHOT": 1, "EVENTS": 2, "NONE": 0}[initial]
+    found = waited(fences, name, first + 2, after=first)
+    assert dwells(found) == ["a", "c"]
+    assert min(stayed(each) for each in found) >= 0.3 * SECOND
+    assert all(each.first_time.ToMicroseconds() > before - SECOND for each in found)
+
+
+def test_areas_that_move_end_and_begin_a_stay(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    zone = f"{name}/zone"
+    stub.CreateHull(pb.CreateHullRequest(name=zone))
+    insert(stub, zone, 0, 0, 10, 0, 10, 10, 0, 10)
+    put(stub, fleet, a=(1, 1), b=(12, 5))
+    create(fences, name, hull_area={"name": zone}, subject_prefix=f"{name}/", dwell=span(0.4))
+    revision = insert(stub, zone, 15, 5)
+    delete(stub, zone, 0, 0)
+    found = waited(fences, name, 4, after=1)
+    assert [told(each) for each in found] == ["ENTER b AREA_MOVED", "EXIT a AREA_MOVED", "DWELL b TIME_PASSED"]
+    assert found[2].area_revision == revision + 1
+
+
+@pytest.mark.parametrize("area", ["circle", "polygon", "hull"])
+def test_with_a_margin_the_distance_is_that_to_the_area(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str, area: str
+) -> None:
+    zone = f"{name}/zone"
+    square = [-5.0, -5.0, 5.0, -5.0, 5.0, 5.0, -5.0, 5.0]
+    stub.CreateHull(pb.CreateHullRequest(name=zone))
+    insert(stub, zone, *square)
+    config = {
+        "circle": {"circle_area": CIRCLE},
+        "polygon": {"polygon_area": polygon(square)},
+        "hull": {"hull_area": {"name": zone}},
+    }[area]
+    put(stub, fleet, a=(5, 0), b=(4, 0), c=(6.5, 0))
+    create(fences, name, **config, subject_hull=fleet, margin=2, dwell=span(0.5), report_crosses=True)
+    put(stub, fleet, a=(6.5, 0))
+    found = waited(fences, name, 3, after=1)
+    assert dwells(found) == ["a", "b"]
+    assert [(each.position.x, each.distance) for each in found] == [(6.5, 1.5), (4, 0)]
+
+
+def test_another_dwell_begins_anew_and_another_area_does_not(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    def replace(radius: float, dwell: float) -> None:
+        config = {"circle_area": {"radius": radius}, "subject_hull": fleet, "dwell": span(dwell)}
+        fences.ReplaceFence(fs.ReplaceFenceRequest(name=name, config=config))
+
+    put(stub, fleet, a=(1, 0), b=(6, 0))
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet)
+    replace(5, 0.3)
+    (first,) = waited(fences, name, 2, after=1)
+    assert told(first) == "DWELL a TIME_PASSED"
+    replace(7, 0.3)
+    found = waited(fences, name, 4, after=2)
+    assert [told(each) for each in found] == ["ENTER b FENCE_CHANGED", "DWELL b TIME_PASSED"]
+    replace(7, 0.4)
+    again = waited(fences, name, 6, after=4)
+    assert dwells(again) == ["a", "b"]
+    assert again[0].first_time == again[1].first_time
+    assert again[0].first_time.ToMicroseconds() >= found[1].time.ToMicroseconds()
+    replace(7, 0)
+    put(stub, fleet, c=(0, 0))
+    time.sleep(0.7)
+    assert [told(each) for each in events(fences, name, after=6)] == ["ENTER c SUBJECT_APPEARED"]
+
+
+def test_many_that_stay_make_an_event_each(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    keys = [f"{number:04}" for number in range(MANY)]
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(0.2))
+    batch = batch_pb2.Batch(
+        puts=batch_pb2.Puts(keys=points_pb2.Keys(strings=keys), points=points_pb2.Points(coordinates=[1.0, 2.0] * MANY))
+    )
+    stub.Apply(pb.ApplyRequest(name=fleet, batch=batch))
+    found = waited(fences, name, 2 * MANY, after=MANY)
+    assert sorted(dwells(found)) == keys
+    assert len(found) == MANY
+
+
+def test_stays_survive_kills(tmp_path: Path, name: str) -> None:
+    """Who waits, who has made the event, and since when; also where the events that said so have been dropped."""
+    fleet, kept, short = f"{name}/fleet", f"{name}/kept", f"{name}/short"
+    with fence_server("--data", str(tmp_path), killed=True) as server:
+        with grpc.insecure_channel(server.address) as channel:
+            stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+            keyed(stub, fleet)
+            put(stub, fleet, a=(1, 0), z=(9, 9))
+            for fence, most in ((kept, 0), (short, 2)):
+                create(fences, fence, circle_area=CIRCLE, subject_hull=fleet, dwell=span(2), max_events=most)
+            for fence in (kept, short):
+                assert dwells(waited(fences, fence, 2)) == ["a"]
+            put(stub, fleet, b=(2, 0))
+            entered = waited(fences, kept, 3)[2]
+            put(stub, fleet, z=(0, 0))
+            put(stub, fleet, z=(9, 9))
+            wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=short)).fence.first_sequence > 3)
+        server.process.kill()
+    for life in range(2):
+        with fence_server("--data", str(tmp_path), killed=True) as server:
+            with grpc.insecure_channel(server.address) as channel:
+                stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+                for fence in (kept, short):
+                    (dwelt,) = waited(fences, fence, 6, after=5)
+                    assert told(dwelt) == "DWELL b TIME_PASSED"
+                    assert dwelt.first_time == entered.time
+                    assert stayed(dwelt) >= 2 * SECOND
+                if life:
+                    time.sleep(2.5)
+                    assert [len(events(fences, fence, after=5)) for fence in (kept, short)] == [1, 1]
+            server.process.kill()
+
+
+def test_a_stay_goes_on_while_the_server_is_down(tmp_path: Path, name: str) -> None:
+    """The time of the replacement is kept, too."""
+    config = {"circle_area": CIRCLE, "subject_hull": name, "initial": "FENCE_INITIAL_NONE"}
+    with fence_server("--data", str(tmp_path), killed=True) as server:
+        with grpc.insecure_channel(server.address) as channel:
+            stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+            put(stub, keyed(stub, name), a=(1, 0))
+            fences.CreateFence(fs.CreateFenceRequest(name="new", config=config | {"dwell": span(1)}))
+            fences.CreateFence(fs.CreateFenceRequest(name="replaced", config=config))
+            begun = time.time_ns() // 1000
+            fences.ReplaceFence(fs.ReplaceFenceRequest(name="replaced", config=config | {"dwell": span(1)}))
+        server.process.kill()
+    time.sleep(1)
+    with fence_server("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        for fence in ("new", "replaced"):
+            (dwelt,) = waited(fences, fence, 1)
+            assert told(dwelt) == "DWELL a TIME_PASSED"
+            assert stayed(dwelt) >= SECOND
+            assert abs(dwelt.first_time.ToMicroseconds() - begun) < SECOND
+
+
+@pytest.mark.parametrize(
+    ("config", "field", "problem"),
+    [
+        ({"confirmations": 2}, "config.confirmations", "does not support"),
+        ({"min_dwell": {"seconds": 1}}, "config.min_dwell", "does not support"),
+        ({"dwell": {"seconds": -1}}, "config.dwell", "least"),
+        ({"dwell": {"seconds": 1}, "margin": 1, "circle_area": None}, "config.dwell", "without_self"),
+    ],
+)
+def test_rules_that_are_refused(
+    fences: FenceServiceStub, name: str, fleet: str, config: dict[str, object], field: str, problem: str
+) -> None:
+    config = {"circle_area": CIRCLE, "subject_hull": fleet} | config
+    if config["circle_area"] is None:
+        config["hull_area"] = {"name": fleet, "without_self": True}
+    refused = refused_by(fences.CreateFence, fs.CreateFenceRequest(name=name, config=config))
+    assert (refused.code, refused.metadata["field"]) == (grpc.StatusCode.INVALID_ARGUMENT, field)
+    assert problem in refused.metadata.get("problem", problem)
+    assert refused_by(fences.GetFence, fs.GetFenceRequest(name=name)).reason == "FENCE_NOT_FOUND"
