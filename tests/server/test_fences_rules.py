@@ -1,5 +1,6 @@
 """Fences that wait: who has been inside for a time makes an event, over kills and restarts."""
 
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,8 +8,8 @@ from pathlib import Path
 import grpc
 import pytest
 from fence_calls import create, delete, events, insert, polygon, put, refused_by, remove, told
-from fence_server import fence_server
-from patience import wait_until
+from patience import PATIENCE, wait_until
+from server_process import server_process
 
 from dynhull_proto.v1 import batch_pb2, fence_pb2, points_pb2
 from dynhull_proto.v1 import fence_service_pb2 as fs
@@ -24,7 +25,7 @@ MANY = 5000  # more than make an event in one commit
 @pytest.fixture(scope="module", params=["memory", "durable"])
 def address(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     options = [] if request.param == "memory" else ["--data", str(tmp_path_factory.mktemp("rules"))]
-    with fence_server(*options) as process:
+    with server_process(*options) as process:
         yield process.address
 
 
@@ -100,6 +101,21 @@ def test_a_stay_that_breaks_off_begins_anew(
     again = next(each for each in found[4:] if each.type == fence_pb2.FENCE_EVENT_TYPE_ENTER)
     assert found[-1].first_time == again.time
     assert stayed(found[-1]) >= SECOND
+
+
+def test_conflated_watches_leave_out_stays_that_have_ended(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(0.1))
+    put(stub, fleet, a=(1, 0), b=(2, 0))
+    waited(fences, name, 4)
+    put(stub, fleet, a=(9, 0))
+    watch = fences.WatchFence(fs.WatchFenceRequest(name=name, after_sequence=0, conflate=True), timeout=PATIENCE)
+    next(watch)
+    response = next(watch)
+    watch.cancel()
+    assert [told(event) for event in response.events] == ["ENTER b SUBJECT_APPEARED", "DWELL b TIME_PASSED"]
+    assert (response.conflated, response.sequence) == (3, 5)
 
 
 @pytest.mark.parametrize("initial", ["SNAPSHOT", "EVENTS", "NONE"])
@@ -195,7 +211,7 @@ def test_many_that_stay_make_an_event_each(
 def test_stays_survive_kills(tmp_path: Path, name: str) -> None:
     """Who waits, who has made the event, and since when; also where the events that said so have been dropped."""
     fleet, kept, short = f"{name}/fleet", f"{name}/kept", f"{name}/short"
-    with fence_server("--data", str(tmp_path), killed=True) as server:
+    with server_process("--data", str(tmp_path), killed=True) as server:
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             keyed(stub, fleet)
@@ -211,7 +227,7 @@ def test_stays_survive_kills(tmp_path: Path, name: str) -> None:
             wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=short)).fence.first_sequence > 3)
         server.process.kill()
     for life in range(2):
-        with fence_server("--data", str(tmp_path), killed=True) as server:
+        with server_process("--data", str(tmp_path), killed=True) as server:
             with grpc.insecure_channel(server.address) as channel:
                 stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
                 for fence in (kept, short):
@@ -228,7 +244,7 @@ def test_stays_survive_kills(tmp_path: Path, name: str) -> None:
 def test_a_stay_goes_on_while_the_server_is_down(tmp_path: Path, name: str) -> None:
     """The time of the replacement is kept, too."""
     config = {"circle_area": CIRCLE, "subject_hull": name, "initial": "FENCE_INITIAL_NONE"}
-    with fence_server("--data", str(tmp_path), killed=True) as server:
+    with server_process("--data", str(tmp_path), killed=True) as server:
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             put(stub, keyed(stub, name), a=(1, 0))
@@ -238,13 +254,37 @@ def test_a_stay_goes_on_while_the_server_is_down(tmp_path: Path, name: str) -> N
             fences.ReplaceFence(fs.ReplaceFenceRequest(name="replaced", config=config | {"dwell": span(1)}))
         server.process.kill()
     time.sleep(1)
-    with fence_server("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
+    with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
         for fence in ("new", "replaced"):
             (dwelt,) = waited(fences, fence, 1)
             assert told(dwelt) == "DWELL a TIME_PASSED"
             assert stayed(dwelt) >= SECOND
             assert abs(dwelt.first_time.ToMicroseconds() - begun) < SECOND
+
+
+@pytest.mark.parametrize("fault", ["commit", "settle"])
+def test_a_commit_that_fails_makes_no_second_event(tmp_path: Path, name: str, fault: str) -> None:
+    """The commit of the event is kept but reported as failed; with `settle`, nobody can say so for a while."""
+    faults = tmp_path / "faults"
+    faults.mkdir()
+    wrap = (sys.executable, str(Path(__file__).with_name("faulty.py")), str(faults))
+    with (
+        server_process("--data", str(tmp_path / "data"), wrap=wrap, complaints="Input/output error") as server,
+        grpc.insecure_channel(server.address) as channel,
+    ):
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        keyed(stub, name)
+        create(fences, name, circle_area=CIRCLE, subject_hull=name, initial="FENCE_INITIAL_NONE", dwell=span(0.5))
+        put(stub, name, a=(1, 0), b=(2, 0))
+        for each in {"commit", fault}:
+            (faults / each).touch()
+        time.sleep(2)
+        for each in {"commit", fault}:
+            (faults / each).unlink()
+        waited(fences, name, 4)
+        time.sleep(1.5)
+        assert dwells(events(fences, name, after=2)) == ["a", "b"]
 
 
 @pytest.mark.parametrize(

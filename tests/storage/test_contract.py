@@ -12,6 +12,7 @@ from folders import event, events, fence_row, fill_fence, same
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.fences.records import (
+    NO_WAITS,
     AddFence,
     AppendEvents,
     ChangeFence,
@@ -23,6 +24,7 @@ from dynhull_server.state.fences.records import (
     Inside,
     Members,
     PutConsumer,
+    Waits,
 )
 from dynhull_server.state.records import (
     FOREVER,
@@ -505,6 +507,30 @@ def test_who_is_inside_replaces_earlier_events(opened):
         assert opened.storage.read_events(9, 0, 10) == events(5, 6)
         assert opened.storage.read_fence(9).first == 5
         opened.reopen()
+
+
+def test_since_when_who_is_inside_waits_comes_back(opened):
+    fenced(opened, 2)
+    strings = Members("fleet", PackedKeys.pack(f"é{i:05}" for i in range(40_000)), 4, np.arange(40_000) - 3)
+    integers = Members("b", np.array([2, 2**63], np.uint64), 5, np.array([NO_TIME, 2**62]))
+    opened.carry_out(opened.storage.inside(9, Inside(2, (strings, integers, Members("c", PackedKeys.pack(["a"]), 6)))))
+    for _ in range(2):
+        kept = opened.storage.read_fence(9).inside.members
+        found = {each.hull: [] for each in kept}
+        for each in kept:
+            found[each.hull] += [None] if each.since is None else each.since.tolist()
+        assert found == {"fleet": strings.since.tolist(), "b": [NO_TIME, 2**62], "c": [None]}
+        opened.reopen()
+
+
+def test_since_when_a_fence_asks_for_how_long_comes_back(opened):
+    fenced(opened, 2)
+    for waits in (Waits(2, 2**60), NO_WAITS):
+        changed = replace(fence_row(), config=replace(fence_row().config, dwell=waits.time), waits=waits)
+        opened.commit(ChangeFence(changed))
+        for _ in range(2):
+            assert opened.storage.read_fence(9).row == changed
+            opened.reopen()
 
 
 def test_settings_and_consumers_of_a_fence_change(opened):

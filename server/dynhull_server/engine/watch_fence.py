@@ -80,11 +80,16 @@ async def watch_fence(
 
 
 def conflated(events: list[FenceEvent]) -> list[FenceEvent]:
-    """The events without pairs of an enter and an exit of one subject. O(number of events)."""
+    """The events without pairs of an enter and an exit of one subject, and what was between. O(number of events)."""
     last: dict[tuple[str, str | int | None], list[int]] = {}
     for row, event in enumerate(events):
         if event.type in (EventType.ENTER, EventType.EXIT):
             last.setdefault((event.hull, event.key), []).append(row)
     # Of one subject they alternate: an even number of them is nothing, of an odd one the last one stays.
     left_out = {row for rows in last.values() for row in (rows if len(rows) % 2 == 0 else rows[:-1])}
+    for row, event in enumerate(events):
+        if event.type is EventType.DWELL:
+            rows = last.get((event.hull, event.key))
+            if rows and rows[0] < row < rows[-1]:  # the stay has begun and ended, and is left out
+                left_out.add(row)
     return [event for row, event in enumerate(events) if row not in left_out]
