@@ -43,6 +43,8 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 		&& build/fuzz_keyed$$leaf --seconds $(SECONDS) || exit 1; \
 	done
 	$(FUZZ) -DDYNHULL_LEAF=4 tests/kernel/fuzz_window.cpp -o build/fuzz_window && build/fuzz_window --seconds $(SECONDS)
+	$(FUZZ) -DDYNHULL_HASH_SEED=1 -DDYNHULL_LEAF=4 tests/kernel/fuzz_fences.cpp -o build/fuzz_fences \
+	&& build/fuzz_fences --seconds $(SECONDS)
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
 	$(BIN)/python tests/support/lives.py --operations $(OPERATIONS)
@@ -101,6 +103,7 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/server/callers.py --calls 10000 --kills 5
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 	$(BIN)/python tests/robustness/fences/fence_torture.py --steps 1000000
+	$(BIN)/python tests/robustness/fences/kill_torture.py --steps 1000000 --kills 1000
 
 SEED ?= 1
 MUTANTS ?= 200

@@ -1,9 +1,11 @@
 """The part `server` of entities.py: moves of entities in a durable keyed hull, beside the same moves in Redis.
 
 Both servers sync each batch to the disk before they acknowledge it, and neither compacts its log meanwhile: no
-snapshots, no rewrites. Both get messages made beforehand over one connection. Redis gets raw RESP over a Unix socket,
-which costs less than any client library. Its members are the keys in decimal. Coordinates have seven decimals, finer
-than the 52 bits of a geohash.
+snapshots, no rewrites. Both get bytes made beforehand over one connection, with at most so many batches or commands
+not acknowledged. Redis gets raw RESP over a Unix socket, which costs less than any client library; commands that come
+together share its sync. dynhull gets those batches in one message that there is room for, as from the SDK's writers; in
+the row "one a message", each in a message of its own, as from clients that do not know messages with several. Members
+of Redis are the keys in decimal. Coordinates have seven decimals, finer than the 52 bits of a geohash.
 """
 
 import asyncio
@@ -49,13 +51,14 @@ class Side:
 
 
 @contextmanager
-def redis(folder: Path) -> Iterator[str]:
+def redis(folder: Path, *, log: bool = True) -> Iterator[str]:
     folder.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as short:  # the system limits the path of a socket to about 100 bytes
         address = str(Path(short) / "redis.sock")
         options = ["--port", "0", "--unixsocket", address, "--dir", str(folder), "--save", ""]
-        log = ["--appendonly", "yes", "--appendfsync", "always", "--auto-aof-rewrite-percentage", "0"]
-        with subprocess.Popen(["redis-server", *options, *log], stdout=subprocess.PIPE, text=True) as process:
+        if log:
+            options += ["--appendonly", "yes", "--appendfsync", "always", "--auto-aof-rewrite-percentage", "0"]
+        with subprocess.Popen(["redis-server", *options], stdout=subprocess.PIPE, text=True) as process:
             try:
                 printed = []
                 while "ready to accept connections" not in (line := process.stdout.readline()):
@@ -88,18 +91,24 @@ def geoadd(keys: np.ndarray, places: np.ndarray) -> bytes:
 def puts(keys: np.ndarray, places: np.ndarray) -> bytes:
     packed = {"packed_integers": keys.astype("<u8").tobytes()}
     batch = batch_pb2.Batch(puts=batch_pb2.Puts(keys=packed, points=server.packed(places)))
-    return pb.StreamRequest(name=NAME, batch=batch).SerializeToString()
+    return pb.StreamRequest(batches=[pb.NumberedBatch(batch=batch)]).SerializeToString()
 
 
-def pipeline(address: str, commands: list[bytes]) -> float:
+def single(keys: np.ndarray, places: np.ndarray) -> bytes:
+    numbered = pb.StreamRequest.FromString(puts(keys, places)).batches[0]
+    return pb.StreamRequest(name=NAME, batch=numbered.batch).SerializeToString()
+
+
+def pipeline(address: str, commands: list[bytes], in_flight: int = IN_FLIGHT) -> float:
     with socket.socket(socket.AF_UNIX) as connection:
         connection.connect(address)
         begun = time.perf_counter()
         sent = answered = 0
         while answered < len(commands):
-            while sent < min(answered + IN_FLIGHT, len(commands)):
-                connection.sendall(commands[sent])
-                sent += 1
+            end = min(answered + in_flight, len(commands))
+            if sent < end:
+                connection.sendall(b"".join(commands[sent:end]))
+                sent = end
             replies = connection.recv(BUFFER)
             if not replies or b"-" in replies:
                 sys.exit(f"Redis failed: {replies!r}")
@@ -107,11 +116,19 @@ def pipeline(address: str, commands: list[bytes]) -> float:
         return len(commands) / (time.perf_counter() - begun)
 
 
-def stream(address: str, requests: list[bytes]) -> float:
+def together(address: str, batches: list[bytes]) -> float:
+    return asyncio.run(server.together(address, NAME, batches, IN_FLIGHT))
+
+
+def one_by_one(address: str, requests: list[bytes]) -> float:
     return asyncio.run(server.stream(address, requests, len(requests), IN_FLIGHT))
 
 
-SIDES = {"Redis": Side(redis, geoadd, pipeline), "dynhull": Side(dynhull, puts, stream)}
+SIDES = {
+    "Redis": Side(redis, geoadd, pipeline),
+    "dynhull": Side(dynhull, puts, together),
+    "dynhull, one a message": Side(dynhull, single, one_by_one),
+}
 
 
 def require_redis() -> None:

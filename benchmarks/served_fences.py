@@ -1,4 +1,7 @@
-"""Fences in a durable server: `python benchmarks/served_fences.py [--works moves hull] [--subjects N] [--fences N]`.
+"""Fences in a durable server: `python benchmarks/served_fences.py [--works many moves hull] [--subjects N]`.
+
+many: one client creates many polygon fences around many subjects, lists them, restarts the server and deletes them.
+Columns: seconds of each, and seconds of the same start without fences.
 
 moves: keyed moves of many subjects among many polygon fences, and the same moves in a server without fences, in turn.
 Each subject walks at random; the length of a step decides how many moves make an event. Columns: batch, moves a second
@@ -7,6 +10,10 @@ without and with fences, the median of the ratios, and the share of moves that m
 hull: one fence around a hull that changes some times a second, and many subjects that stay. Columns: changes a second,
 processor time of the server a change; the delay of events, from the moment at which the change is sent to the moment
 at which its events are read, median and 99th percentile; and how many changes had events.
+
+stalled: single writes that make events each, alternately without anybody who watches and with watches that never read,
+and a consumer that never acknowledges. Columns: latency of a write, median and 99th percentile, and the growth of the
+server's memory a round.
 """
 
 import argparse
@@ -16,7 +23,8 @@ import statistics
 import tempfile
 import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import durability
@@ -29,12 +37,14 @@ from dynhull_proto.v1 import fence_service_pb2 as fences
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 
+WORKS = ["many", "moves", "hull", "stalled"]
 NAME = "fleet"
 IN_FLIGHT = 8
 LOADED = 8192
 CORNERS = 8
 NO_SNAPSHOTS = 10**12
 AT_ONCE = 64  # fences created at a time
+STALLED, CROSSING, WRITES = 8, 16, 2000  # watches that never read, subjects that cross in a write, writes of a round
 MOVES = 2**18  # of a run, if these limits on its batches allow
 FEWEST, MOST = 16, 2048
 COVERED = 0.7  # of the side of a cell that a fence fills
@@ -70,15 +80,24 @@ def polygons(number: int) -> list[np.ndarray]:
 
 
 async def create_fences(address: str, areas: list[np.ndarray]) -> None:
+    requests = [fences.CreateFenceRequest(name=f"fence/{i}", config=polygon(area)) for i, area in enumerate(areas)]
+    await call_all(address, "CreateFence", requests)
+
+
+async def delete_fences(address: str, number: int) -> None:
+    await call_all(address, "DeleteFence", [fences.DeleteFenceRequest(name=f"fence/{i}") for i in range(number)])
+
+
+async def call_all(address: str, method: str, requests: Iterable[object]) -> None:
+    """Call a method with each request, some at a time."""
     async with grpc.aio.insecure_channel(address) as channel:
-        stub = FenceServiceStub(channel)
-        for first in range(0, len(areas), AT_ONCE):
-            await asyncio.gather(
-                *(
-                    stub.CreateFence(fences.CreateFenceRequest(name=f"fence/{first + i}", config=polygon(area)))
-                    for i, area in enumerate(areas[first : first + AT_ONCE])
-                )
-            )
+        call, left = getattr(FenceServiceStub(channel), method), iter(requests)
+
+        async def work() -> None:
+            for request in left:
+                await call(request)
+
+        await asyncio.gather(*(work() for _ in range(AT_ONCE)))
 
 
 def polygon(area: np.ndarray) -> fence_pb2.FenceConfig:
@@ -101,6 +120,36 @@ def events(address: str) -> int:
                 return total
 
 
+def many(folder: Path, n: int, number: int) -> None:
+    places = np.random.default_rng(0).random((n, 2))
+    load = [puts(np.arange(i, min(i + LOADED, n)), places[i : i + LOADED]) for i in range(0, n, LOADED)]
+    took: dict[str, float] = {}
+
+    @contextmanager
+    def timed(name: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        took[name] = time.perf_counter() - begun
+
+    with ExitStack() as stack:
+        address = started(stack, folder / "many")
+        send(address, load)
+        with timed("create"):
+            asyncio.run(create_fences(address, polygons(number)))
+        with timed("list"):
+            events(address)
+    with ExitStack() as stack:
+        with timed("start"):
+            address = stack.enter_context(durability.serving("--data", str(folder / "many"), "--durability", "sync"))
+        with timed("delete"):
+            asyncio.run(delete_fences(address, number))
+    with timed("start without fences"), durability.serving("--data", str(folder / "many")):
+        pass
+    print(f"\n| {number:,} fences, {n:,} subjects | {' | '.join(took)} |")
+    print(f"| --- |{' ---: |' * len(took)}")
+    print(f"| seconds | {' | '.join(f'{seconds:.2f}' for seconds in took.values())} |", flush=True)
+
+
 def moves(folder: Path, n: int, number: int, batches: list[int], steps: list[float], repeat: int) -> None:
     random = np.random.default_rng(0)
     places = random.random((n, 2))
@@ -109,10 +158,7 @@ def moves(folder: Path, n: int, number: int, batches: list[int], steps: list[flo
         load = [puts(np.arange(i, min(i + LOADED, n)), places[i : i + LOADED]) for i in range(0, n, LOADED)]
         for address in (plain, fenced):
             send(address, load)
-        begun = time.perf_counter()
         asyncio.run(create_fences(fenced, polygons(number)))
-        took = time.perf_counter() - begun
-        print(f"{number:,} fences around {n:,} subjects were created in {took:.1f} s\n")
         print("| batch | step | without fences, moves/s | with fences, moves/s | ratio | moves with an event |")
         print("| ---: | ---: | ---: | ---: | ---: | ---: |")
         for size in batches:
@@ -182,6 +228,44 @@ def hull(folder: Path, n: int, rates: list[float], seconds: float) -> None:
             )
 
 
+def stalled(folder: Path, rounds: int) -> None:
+    """Rounds of writes; in every second one, watches are open that are never read."""
+    inside, outside = np.full((CROSSING, 2), 0.5), np.full((CROSSING, 2), 5.0)
+    requests = [
+        pb.ApplyRequest(name=NAME, batch=area_batch(np.arange(CROSSING), places)) for places in (inside, outside)
+    ]
+    found: dict[bool, list[tuple[float, float, float]]] = {False: [], True: []}
+    with ExitStack() as stack:
+        address = started(stack, folder / "stalled")
+        stub, channel = stack.enter_context(durability.service(address)), grpc.insecure_channel(address)
+        fence_stub = FenceServiceStub(stack.enter_context(channel))
+        around = polygon(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float))
+        fence_stub.CreateFence(fences.CreateFenceRequest(name="around", config=around))
+        for number in range(-2, 2 * rounds):  # the first two are not counted
+            is_stalled = number % 2 == 1
+            watches = [
+                fence_stub.WatchFence(fences.WatchFenceRequest(name="around", consumer=f"idle-{each}"))
+                for each in range(STALLED if is_stalled else 0)
+            ]
+            memory, times = resident(), []
+            for write in range(WRITES):
+                begun = time.perf_counter()
+                stub.Apply(requests[write % 2])
+                times.append(time.perf_counter() - begun)
+            grown = resident() - memory
+            for watch in watches:
+                watch.cancel()
+            if number >= 0:
+                times.sort()
+                found[is_stalled].append((statistics.median(times), times[int(len(times) * 0.99)], grown))
+    print("\n| | median | p99 | memory grows by |")
+    print("| --- | ---: | ---: | ---: |")
+    for is_stalled, rows in found.items():
+        median, p99, grown = (statistics.median(column) for column in zip(*rows, strict=True))
+        who = f"with {STALLED} stalled watches" if is_stalled else "without a watch"
+        print(f"| {who} | {median * 1e3:.2f} ms | {p99 * 1e3:.2f} ms | {grown / 2**20:.2f} MB |", flush=True)
+
+
 def area_batch(keys: np.ndarray, places: np.ndarray) -> batch_pb2.Batch:
     packed = {"packed_integers": keys.astype("<u8").tobytes()}
     return batch_pb2.Batch(puts=batch_pb2.Puts(keys=packed, points=server.packed(places)))
@@ -200,21 +284,28 @@ def read(watch, seen: dict[int, float]) -> None:
 
 def processor_seconds() -> float:
     """The processor time of all processes that this one has started, so far."""
-    tick = os.sysconf("SC_CLK_TCK")
-    total = 0.0
+    return sum(int(fields[11]) + int(fields[12]) for fields in children()) / os.sysconf("SC_CLK_TCK")
+
+
+def resident() -> float:
+    """The bytes of memory of these processes."""
+    return sum(int(fields[21]) for fields in children()) * os.sysconf("SC_PAGE_SIZE")
+
+
+def children() -> Iterator[list[str]]:
+    """The fields of /proc/PID/stat after the name of the command, of each process that this one has started."""
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rsplit(")", 1)[1].split()
         except (OSError, IndexError):  # it has ended
             continue
         if int(fields[1]) == os.getpid():
-            total += (int(fields[11]) + int(fields[12])) / tick
-    return total
+            yield fields
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--works", nargs="+", choices=["moves", "hull"], default=["moves", "hull"])
+    parser.add_argument("--works", nargs="+", choices=WORKS, default=WORKS)
     parser.add_argument("--subjects", type=float, default=1e6)
     parser.add_argument("--fences", type=float, default=23_000)
     parser.add_argument("--batches", type=int, nargs="+", default=[64, 8192])
@@ -226,11 +317,15 @@ def main() -> None:
     arguments = parser.parse_args()
     print(f"load average {os.getloadavg()[0]:.1f}")
     with tempfile.TemporaryDirectory(dir=arguments.folder) as data:
+        if "many" in arguments.works:
+            many(Path(data), int(arguments.subjects), int(arguments.fences))
         if "moves" in arguments.works:
             number = int(arguments.fences)
             moves(Path(data), int(arguments.subjects), number, arguments.batches, arguments.steps, arguments.repeat)
         if "hull" in arguments.works:
             hull(Path(data), int(arguments.subjects), arguments.rates, arguments.seconds)
+        if "stalled" in arguments.works:
+            stalled(Path(data), arguments.repeat)
     print(f"\nload average at the end {os.getloadavg()[0]:.1f}")
 
 

@@ -28,6 +28,7 @@ OPTIONS = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_leng
 # Messages of a cycle that ends where it began: inserts, then their deletes.
 CYCLE = 64
 IN_FLIGHT = 256
+MESSAGE_BYTES = 2**16  # batches share a message up to this size
 WATCHERS, RATE, UPDATES_PER_SECOND = 200, 10.0, 100_000
 
 
@@ -73,6 +74,38 @@ async def stream(address, requests, messages, in_flight=IN_FLIGHT):
         await writing
         assert await call.code() == grpc.StatusCode.OK
     return messages / took
+
+
+async def together(address, name, batches, in_flight=IN_FLIGHT):
+    """Batches a second, acknowledged: those that there is room for share a message, as those of the SDK's writers do.
+
+    Each is a serialised message with one batch in `batches`: one after the other they are a message with all of them.
+    """
+    async with grpc.aio.insecure_channel(address, options=OPTIONS) as channel:
+        method = channel.stream_stream(SERVICE + "Stream", response_deserializer=pb.StreamResponse.FromString)
+        call = method()
+        await call.write(pb.StreamRequest(name=name, accept_results=True).SerializeToString())
+        most = (await call.read()).max_batches
+        begun = time.perf_counter()
+        sent = acknowledged = 0
+        while acknowledged < len(batches):
+            end = min(acknowledged + in_flight, sent + most, len(batches))
+            if sent < end:
+                size, first = len(batches[sent]), sent
+                sent += 1
+                while sent < end and size + len(batches[sent]) <= MESSAGE_BYTES:
+                    size += len(batches[sent])
+                    sent += 1
+                await call.write(b"".join(batches[first:sent]))
+                if sent < min(acknowledged + in_flight, len(batches)):
+                    continue
+            response = await call.read()
+            assert response is not grpc.aio.EOF
+            acknowledged += len(response.results)
+        took = time.perf_counter() - begun
+        await call.done_writing()
+        assert await call.code() == grpc.StatusCode.OK
+    return len(batches) / took
 
 
 async def locate(address, name, calls):

@@ -315,6 +315,59 @@ def maps(axes) -> None:
     right.set_aspect(1.4)
 
 
+def flights_in_the_air(clock: str) -> tuple[list[str], np.ndarray]:
+    """Names of the demo's flights at a minute of 8 March 2013, and their places in kilometres on an equal-area map."""
+    from datetime import date
+
+    from dynhull_cli.demo.flights import CENTER, Flights
+    from dynhull_cli.demo.map import Globe
+
+    frame = next(frame for frame in Flights(date(2013, 3, 8)).frames() if frame.clock == clock)
+    return list(frame.names), Globe(CENTER).place(frame.positions)
+
+
+def outliers(axes) -> None:
+    """Layers with one corrupted position, the nearest 95 percent, and a sketch."""
+    left, middle, right = panels(axes, 1, 3, (11, 3.6)).flat
+    names, positions = flights_in_the_air("16:00")
+    wrong = int(positions[:, 0].argmin())
+    positions[wrong, 1] += 2.5 * np.ptp(positions[:, 1])
+    hull = DynamicHull(positions)
+    left.plot(*positions.T, ".", color=GREY, ms=3)
+    for layer, colour in zip(hull.layers(4), (RED, BLUE, GREEN, ORANGE), strict=True):
+        left.plot(*closed(layer), color=colour, lw=1.2)
+    share = hull.influence() / hull.area
+    left.annotate(
+        f"{names[wrong]}:\n{share.max():.0%} of the area",
+        hull.vertices()[share.argmax()],
+        textcoords="offset points",
+        xytext=(8, -10),
+        fontsize=8,
+    )
+    left.set_title("Flights, one position corrupted: four layers", fontsize=10)
+
+    france = cities("FR", 46)
+    hull = DynamicHull(france)
+    middle.plot(*france.T, ",", color=GREY)
+    middle.plot(*closed(hull.vertices()), color=RED, label="all")
+    middle.plot(*closed(hull.mcp(95)), color=BLUE, label="the nearest 95 %")
+    middle.plot(*france.mean(axis=0), "+", color=BLUE)
+    middle.legend(fontsize=8, loc="lower left")
+    middle.set_title("Towns of France", fontsize=10)
+
+    rng = np.random.default_rng(2)
+    angle, away = rng.random(100_000) * 2 * np.pi, np.sqrt(rng.random(100_000))
+    hull = DynamicHull(np.column_stack([1.6 * away * np.cos(angle), away * np.sin(angle)]))
+    few, error = hull.sketch(12)
+    right.plot(*closed(hull.vertices()), color=GREY, label=f"{len(hull.vertices())} vertices")
+    right.plot(*closed(few), "o-", color=BLUE, ms=4, label=f"{len(few)} of them, at most {error:.3f} away")
+    right.legend(fontsize=8, loc="center")
+    right.set_title("A sketch", fontsize=10)
+    for panel in (left, middle, right):
+        panel.set_aspect("equal")
+        panel.axis("off")
+
+
 def definitions(axes) -> None:
     points = np.random.default_rng(12).normal(size=(40, 2))
     corners = convex_hull(points)
@@ -595,7 +648,7 @@ def how_sign(axes) -> None:
 PICTURES: dict[str, Callable] = {
     f.__name__.replace("_", "-"): f
     for f in (
-        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting, windows, maps),
+        *(measures, support, gjk, pieces, margin, defects, phases, frontier, sorting, windows, maps, outliers),
         *(definitions, degenerate, duality, culling),
         *(how_bridge, how_tree, how_climb, how_batch, how_sign),
     )

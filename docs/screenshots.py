@@ -63,7 +63,7 @@ def main():
     ):
         flown = [*((scene, scene.hull_name) for scene in scenes), (scenes[-1], FENCED)]
         for _, name in flown:
-            client.create_hull(name, keyed="str")
+            client.create_hull(name, keyed="str", geographic=True, center=scenes[0].center)
         for name, circle in scenes[-1].circles.items():
             client.create_fence(name, Circle(*circle), FENCED)
         flights = [threading.Thread(target=fly, args=(client, scene, name)) for scene, name in flown]

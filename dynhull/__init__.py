@@ -5,7 +5,7 @@ from sys import modules as _modules
 from . import _hull, static
 from ._entities import DuplicateKeyError, MissingKeyError
 from ._fence_index import Crossings, FenceIndex
-from ._geo import GeoHull
+from ._geo import GeoHull, GeoKeyedHull, GeoWindowHull
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL
 from ._keyed import KeyedHull, Put
@@ -20,6 +20,8 @@ __all__ = [
     "DynamicHull",
     "FenceIndex",
     "GeoHull",
+    "GeoKeyedHull",
+    "GeoWindowHull",
     "KeyedHull",
     "MissingKeyError",
     "MissingPointError",
@@ -54,6 +56,8 @@ for _public in (
     Crossings,
     WindowHull,
     GeoHull,
+    GeoKeyedHull,
+    GeoWindowHull,
 ):
     _public.__module__ = "dynhull"
 _modules["dynhull.hull"] = _hull  # where pickles of version 0.1 look for the classes

@@ -1,41 +1,63 @@
-"""Hull: what every live hull answers. Checks arguments and returns numpy arrays."""
+"""What live hulls answer: `Live` wherever the points are, `Hull` in the plane.
+
+They check arguments and return numpy arrays.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from . import measure
+from . import measure, robust
 from ._nodes import LOWER, UPPER
 from ._shown import geometry, svg
-from .arrays import Points, as_directions, as_points, repr_of
+from .arrays import Points, as_coordinate, as_count, as_directions, as_points, repr_of
+from .robust._sketch_error import few_vertices, sketch_error
+from .static import convex_hull
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from . import _kernel
+    from ._predicates import Point
     from ._tree import HullTree
+
+    AnyTree = HullTree | _kernel.HullTree | _kernel.Entities
 
 T = TypeVar("T")
 
 MOST_POINTS_DRAWN = 2000
 
 
-class Hull:
-    """A convex hull of points that come and go: what the classes that hold the points have in common.
+class Live:
+    """A convex hull of points that come and go, in the plane or on the globe.
 
     Several threads may ask one hull; each answer belongs to one state of it.
     """
 
     __slots__ = ("_measured", "_tree")
     __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
-    dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
-    _tree_type: ClassVar[type[HullTree | _kernel.HullTree | _kernel.Entities]]
+    _coordinates: ClassVar[str] = "(x, y)"
+    _tree_type: ClassVar[type[AnyTree]]
 
-    _tree: HullTree | _kernel.HullTree | _kernel.Entities
+    _tree: AnyTree
     _measured: tuple[int, dict[str, Any]]
+
+    @staticmethod
+    def _as_points(points: npt.ArrayLike) -> Points:
+        """(k, 2) points of an argument, checked."""
+        return as_points(points)
+
+    @staticmethod
+    def _as_point(x: float, y: float) -> Point:
+        """A point of two arguments, checked."""
+        return as_coordinate(x, "x"), as_coordinate(y, "y")
+
+    def _same_frame(self, other: Live) -> bool:
+        """Whether the other hull is in the plane, or on the globe with the same centre, like this one."""
+        raise NotImplementedError
 
     # Contents
 
@@ -54,23 +76,23 @@ class Hull:
         return self._tree.changes
 
     def count(self, x: float, y: float) -> int:
-        """The number of copies of the point. O(log n)."""
+        """The number of copies of the point. O(log n), on the globe O(1)."""
         return self._tree.count(x, y)
 
     def count_many(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """(k,) numbers of copies of (k, 2) points. O(log n) each."""
-        return self._tree.count_many(as_points(xy))
+        """(k,) numbers of copies of (k, 2) points. O(log n) each, on the globe O(1)."""
+        return self._tree.count_many(self._as_points(xy))
 
     def __contains__(self, point: tuple[float, float]) -> bool:
-        """Whether (x, y) is one of the points. O(log n)."""
+        """Whether the point is one of the points. O(log n), on the globe O(1)."""
         try:
             x, y = point
         except (TypeError, ValueError):
-            raise ValueError(f"a point is (x, y), got {repr_of(point)}") from None
+            raise ValueError(f"a point is {self._coordinates}, got {repr_of(point)}") from None
         return self.count(x, y) > 0
 
     def points(self) -> Points:
-        """(n, 2) points in lexicographic order, with multiplicity. O(n)."""
+        """(n, 2) points in lexicographic order, with multiplicity. O(n), on the globe O(n log n)."""
         return self._tree.points()
 
     def vertices(self) -> Points:
@@ -79,6 +101,57 @@ class Hull:
         No points: shape (0, 2). One point, in any number of copies: one vertex. All points collinear: two vertices.
         """
         return self._tree.vertices()
+
+    def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
+        """(k,) signs of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
+        return self._tree.locate(self._as_points(xy))
+
+    def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """(k,) booleans: which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
+        return self.locate(xy) >= 0
+
+    def _measure(self, measure_of: Callable[[Points], T]) -> T:
+        """A measure of the vertices. Reads `changes` first, so that a concurrent update outdates the result."""
+        changes = self.changes
+        if self._measured[0] != changes:
+            self._measured = (changes, {})
+        known = self._measured[1]
+        name = measure_of.__name__
+        if name not in known:
+            known[name] = measure_of(self.vertices())
+        value: T = known[name]
+        return value
+
+    # As a value
+
+    def copy(self) -> Self:
+        """An independent hull of the same points. O(n)."""
+        new = type(self).__new__(type(self))
+        new._tree = self._tree.copy()
+        new._measured = (0, {})
+        return new
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.copy()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self)} points, {len(self.vertices())} vertices>"
+
+    def check(self) -> None:
+        """Raise AssertionError if an invariant of the tree is broken, for tests and bug reports. O(n log n)."""
+        self._tree.check()
+
+
+class Hull(Live):
+    """A live hull in the plane."""
+
+    __slots__ = ()
+    dimension: ClassVar[int] = 2  # a hull is a shape: see dynhull.convex.Convex
+
+    def _same_frame(self, other: Live) -> bool:
+        return isinstance(other, Hull)
 
     def upper(self) -> Points:
         """(k, 2) vertices of the upper chain, left to right. O(h log n)."""
@@ -89,14 +162,6 @@ class Hull:
         return self._tree.chain(LOWER)
 
     # Queries
-
-    def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
-        """(k,) signs of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
-        return self._tree.locate(as_points(xy))
-
-    def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """(k,) booleans: which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
-        return self.locate(xy) >= 0
 
     def support(self, directions: npt.ArrayLike) -> Points:
         """(k, 2) extreme vertices, one for each of (k, 2) directions of any length. Exact. O(log n) each.
@@ -145,18 +210,6 @@ class Hull:
         return self._tree.intersect_lines(starts, ends)
 
     # Measures, each kept until the hull changes
-
-    def _measure(self, measure_of: Callable[[Points], T]) -> T:
-        """A measure of the vertices. Reads `changes` first, so that a concurrent update outdates the result."""
-        changes = self.changes
-        if self._measured[0] != changes:
-            self._measured = (changes, {})
-        known = self._measured[1]
-        name = measure_of.__name__
-        if name not in known:
-            known[name] = measure_of(self.vertices())
-        value: T = known[name]
-        return value
 
     @property
     def area(self) -> float:
@@ -207,22 +260,74 @@ class Hull:
         """
         return self._measure(measure.min_circle)
 
-    # As a value
+    # Shapes that a few bad points cannot spoil
 
-    def copy(self) -> Self:
-        """An independent hull of the same points. O(n)."""
-        new = type(self).__new__(type(self))
-        new._tree = self._tree.copy()
-        new._measured = (0, {})
-        return new
+    def layers(self, k: int) -> list[Points]:
+        """The (h, 2) vertices of the k outermost convex layers, outermost first, each as `vertices`. Exact.
 
-    __copy__ = copy
+        Layer 1 is the hull; layer i + 1 is the hull of the points left when the vertices of layers 1 to i, all their
+        copies, are taken out. Fewer layers where no points are left. O(log² n) a vertex; the hull stays as it is, and
+        other threads may ask it meanwhile. Chazelle, "On the convex layers of a planar set" (1985).
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return self.copy()
+        Raises:
+            ValueError: k is negative.
+        """
+        return self._tree.layers(as_count(k, "k"))
 
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {len(self)} points, {len(self.vertices())} vertices>"
+    def depth(self, xy: npt.ArrayLike, k: int) -> npt.NDArray[np.int64]:
+        """(m,) depths of (m, 2) points: how many of the first k layers' hulls hold each, boundary included. Exact.
+
+        O(log² n) for each vertex of the layers, and O(k log n) a point.
+
+        Raises:
+            ValueError: k is negative.
+        """
+        return robust.depth(self.layers(k), as_points(xy))
+
+    def influence(self) -> npt.NDArray[np.float64]:
+        """(h,) for each of `vertices` the area that the hull loses without it (all its copies).
+
+        The exact value rounded once; inf if it is beyond every double. O(log² n) a vertex.
+        """
+        return self._tree.influence()
+
+    def mcp(self, percent: float, center: Literal["mean", "median"] = "mean") -> Points:
+        """(h, 2) vertices of the hull of the points nearest to the centre. Exact.
+
+        The minimum convex polygon of ecology: of n points, with multiplicity, those whose distance from the centre is
+        at most the one with index (n - 1) percent / 100, rounded down, of all distances in order, as adehabitatHR
+        chooses them (Calenge 2006).
+        No points: shape (0, 2). O(n), and O(m log m) for m of them that floating point does not order.
+
+        Args:
+            percent: from 0 to 100.
+            center: the mean of the points, or the median of each coordinate.
+        """
+        share = as_coordinate(percent, "percent")
+        if not 0 <= share <= 100:
+            raise ValueError(f"percent is {share}: must be from 0 to 100")
+        if center not in ("mean", "median"):
+            raise ValueError(f'center must be "mean" or "median", got {center!r}')
+        points = self.points()
+        return convex_hull(robust.nearest_points(points, share, center)) if len(points) else points
+
+    def sketch(self, k: int) -> tuple[Points, float]:
+        """(m, 2) vertices, m at most k, that show the hull's shape, and how far the hull reaches beyond theirs.
+
+        The vertices are as those of `vertices`; the distance is Hausdorff's, the exact value rounded up. Begins with
+        the extreme vertices along the axes, and adds the one farthest from its edge, after the adaptive sampling of
+        Hershberger and Suri, "Adaptive sampling for geometric problems over data streams" (2008). O(k log n), and
+        O(h log n) for k below 4. No points: shape (0, 2) and 0.0.
+
+        Raises:
+            ValueError: k is less than 1.
+        """
+        most = as_count(k, "k", least=1)
+        if most < 4:
+            vertices = self.vertices()
+            return few_vertices(vertices, most) if len(vertices) else (vertices, 0.0)
+        vertices, beyond = self._tree.sketch(most)
+        return vertices, sketch_error(beyond)
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
@@ -235,7 +340,3 @@ class Hull:
     def _repr_svg_(self) -> str:
         points = self.points() if len(self) <= MOST_POINTS_DRAWN else None
         return svg(self.vertices(), repr(self), points)
-
-    def check(self) -> None:
-        """Raise AssertionError if an invariant of the tree is broken, for tests and bug reports. O(n log n)."""
-        self._tree.check()

@@ -44,7 +44,10 @@ def geod() -> Any:
 
 
 def area(vertices: Points) -> float:
-    """The area in square metres of the polygon whose edges are the geodesics between the vertices. O(h)."""
+    """The area in square metres of the polygon whose edges are the geodesics between (h, 2) vertices. O(h).
+
+    Within 0.1 m² a vertex (Karney 2013). 0.0 for fewer than three.
+    """
     if len(vertices) < 3:
         return 0.0
     square_metres, _ = geod().polygon_area_perimeter(*vertices.T)
@@ -52,14 +55,17 @@ def area(vertices: Points) -> float:
 
 
 def perimeter(vertices: Points) -> float:
-    """The length in metres of its boundary; two vertices count twice. O(h)."""
+    """The length in metres of the same polygon; two vertices count twice. O(h).
+
+    Within 15 nanometres an edge (Karney 2013).
+    """
     if len(vertices) < 2:
         return 0.0
     return float(_lengths(vertices, np.roll(vertices, -1, axis=0)).sum())
 
 
 def diameter(vertices: Points) -> float:
-    """The greatest distance in metres of two vertices; 0.0 for fewer. O(h²)."""
+    """The greatest distance in metres of two of (h, 2) vertices, within 15 nanometres; 0.0 for fewer. O(h²)."""
     if len(vertices) < 2:
         return 0.0
     directions = unit_vectors(vertices)
@@ -76,9 +82,13 @@ def diameter(vertices: Points) -> float:
 
 
 def distance(vertices: Points, lonlat: Points) -> Floats:
-    """The distance in metres of each of (k, 2) places, none of them inside, to the boundary; inf without vertices.
+    """(k,) distances in metres of (k, 2) places, none of them inside, to the boundary of great circles.
 
-    O(h) a place, and about thirty geodesics.
+    Within a micrometre; inf without vertices. O(h) a place, and about thirty geodesics.
+
+    Args:
+        vertices: (h, 2) vertices.
+        lonlat: (k, 2) places anywhere on the globe.
     """
     result = np.full(len(lonlat), inf)
     if not len(vertices):
@@ -102,7 +112,7 @@ def along(start: Points, end: Points, share: Floats) -> Points:
 
 def unit_vectors(lonlat: Points) -> Floats:
     """(k, 3) directions of (k, 2) places."""
-    (sin_lon, cos_lon), (sin_lat, cos_lat) = (sin_cos(value) for value in (lonlat[:, 0] / 2, lonlat[:, 1]))
+    ((sin_lon, _), (cos_lon, _)), ((sin_lat, _), (cos_lat, _)) = sin_cos(lonlat[:, 0] / 2), sin_cos(lonlat[:, 1])
     return np.column_stack([cos_lat * (1 - 2 * sin_lon * sin_lon), cos_lat * (2 * sin_lon * cos_lon), sin_lat])
 
 
@@ -143,7 +153,7 @@ def _falls(places: Points, start: Points, end: Points, share: Floats) -> npt.NDA
     here = along(start, end, share)
     a, b, p = unit_vectors(start), unit_vectors(end), unit_vectors(here)
     way = np.cross(np.cross(a, b), p)
-    (sin_lon, cos_lon), (sin_lat, cos_lat) = sin_cos(here[:, 0]), sin_cos(here[:, 1])
+    ((sin_lon, _), (cos_lon, _)), ((sin_lat, _), (cos_lat, _)) = sin_cos(here[:, 0]), sin_cos(here[:, 1])
     east = way[:, 1] * cos_lon - way[:, 0] * sin_lon
     north = way[:, 2] * cos_lat - (way[:, 0] * cos_lon + way[:, 1] * sin_lon) * sin_lat
     # From the globe to the ellipsoid, the ratio of the radii of curvature in the meridian and across.

@@ -16,7 +16,7 @@ import numpy as np
 
 from ._times import NO_TIME, as_time, as_times
 from ._tree import HullTree
-from .arrays import as_coordinate, as_points, as_tuples
+from .arrays import as_points, as_tuples
 from .keys import PackedKeys, as_key, as_keys, key_list
 
 if TYPE_CHECKING:
@@ -135,21 +135,22 @@ class Entities(HullTree):
         Raises:
             DuplicateKeyError: a key comes twice; nothing has changed.
         """
-        return self._put_rows(*checked_puts(keys, xy, times, self.key_type, self.ordered), only)
+        return self._put_rows(*self._checked(keys, xy, times, or_none=False), only)
 
     def load(self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None) -> None:
         """Put all rows, like `update`; a time that is NaN means none."""
-        self._put_rows(*checked_puts(keys, xy, times, self.key_type, self.ordered, or_none=not self.ordered), None)
+        self._put_rows(*self._checked(keys, xy, times, or_none=not self.ordered), None)
 
     def put(self, key: Any, x: float, y: float, time: float | None, only: Only | None) -> bool:
         """Insert or move one entity. True if the hull changed. O(log² n)."""
         checked = as_key(key, self.key_type)
-        p = as_coordinate(x, "x"), as_coordinate(y, "y")
+        p = self._as_point(x, y)
         if time is None and self.ordered:
             raise ValueError(f"time {NEEDED_IF_ORDERED}")
         moment = NO_TIME if time is None else as_time(time)
         before = self.changes
-        self._put([checked], [p], [moment], only)
+        with self._in_frame([p], "the point"):
+            self._put([checked], [p], [moment], only)
         return self.changes > before
 
     def remove(self, key: Any) -> bool:
@@ -188,9 +189,15 @@ class Entities(HullTree):
 
         return self._remove_all(heapq.nsmallest(count, self._held, key=age), EXPIRED)
 
-    def _put_rows(self, keys: Keys, points: Points, times: npt.NDArray[np.float64] | None, only: Only | None) -> Counts:
-        rows = distinct(keys)
-        return self._put(rows, as_tuples(points), [NO_TIME] * len(rows) if times is None else times.tolist(), only)
+    def _checked(
+        self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None, *, or_none: bool
+    ) -> tuple[Keys, Points, npt.NDArray[np.float64] | None]:
+        return checked_puts(keys, xy, times, self.key_type, self.ordered, or_none=or_none, checked=self._as_points)
+
+    def _put_rows(self, keys: Keys, xy: Points, times: npt.NDArray[np.float64] | None, only: Only | None) -> Counts:
+        rows, points = distinct(keys), as_tuples(xy)
+        with self._in_frame(points):
+            return self._put(rows, points, [NO_TIME] * len(rows) if times is None else times.tolist(), only)
 
     def _put(self, keys: Sequence[Key], points: list[Point], times: list[float], only: Only | None) -> Counts:
         new = moved = unmoved = stale = skipped = 0
@@ -290,17 +297,17 @@ class Entities(HullTree):
 
     def keys_at(self, xy: npt.ArrayLike) -> list[Any]:
         """The least key at each place, None where there is no entity. O(n + k)."""
-        return self._names(as_tuples(as_points(xy)))
+        return self._names(as_tuples(self._as_points(xy)))
 
     def vertex_keys(self) -> list[Any]:
         """The least key at each vertex, in the order of `vertices`. O(n)."""
-        return self._names(self._vertices())
+        return self._names(as_tuples(self.vertices()))
 
     def check(self) -> None:
         """Raise AssertionError if the tree is broken or holds other points than the entities'. O(n log n)."""
         super().check()
         places = Counter(p for p, _ in self._held.values())
-        if places != Counter({p: self._copies.get(p, 1) for p in self._all_points()}):
+        if places != Counter(as_tuples(self.points())):
             raise AssertionError("the tree does not hold the entities' points")
 
     def _entity(self, key: Any) -> tuple[Point, float]:
@@ -325,24 +332,25 @@ def checked_puts(
     ordered: bool,
     *,
     or_none: bool = False,
+    checked: Callable[[npt.ArrayLike], Points] = as_points,
 ) -> tuple[Keys, Points, npt.NDArray[np.float64] | None]:
-    """The arguments of `Entities.update` as arrays of the same length.
+    """The arguments of `Entities.update` as arrays of the same length. `checked` is what checks the points.
 
     Raises:
         ValueError, TypeError: a key, a point or a time is bad, the lengths differ, or the times are missing.
     """
-    checked = as_keys(keys, key_type)
-    points = as_points(xy)
-    if len(points) != len(checked):
-        raise ValueError(f"points must have one row for each key: {len(checked)}, got {len(points)}")
+    known = as_keys(keys, key_type)
+    points = checked(xy)
+    if len(points) != len(known):
+        raise ValueError(f"points must have one row for each key: {len(known)}, got {len(points)}")
     if times is None:
         if ordered:
             raise ValueError(f"times {NEEDED_IF_ORDERED}")
-        return checked, points, None
+        return known, points, None
     moments = as_times(times, or_none=or_none)
-    if len(moments) != len(checked):
-        raise ValueError(f"times must have one row for each key: {len(checked)}, got {len(moments)}")
-    return checked, points, moments
+    if len(moments) != len(known):
+        raise ValueError(f"times must have one row for each key: {len(known)}, got {len(moments)}")
+    return known, points, moments
 
 
 def distinct(keys: Keys) -> list[Any]:

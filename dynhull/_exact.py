@@ -12,6 +12,7 @@ from .arrays import Points
 
 Exact = tuple[Fraction, Fraction]
 Integers = npt.NDArray[Any]
+Factors = npt.NDArray[np.float64] | float
 
 MANTISSA = 53
 HALF = 27  # bits: a double holds the sum of 2**26 halves exactly
@@ -83,14 +84,14 @@ def exact_sum(terms: npt.NDArray[np.float64]) -> Fraction:
     return total * Fraction(2) ** (least - MANTISSA)
 
 
-def products(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def products(a: npt.NDArray[np.float64], b: Factors) -> npt.NDArray[np.float64]:
     """Two rows whose sum is a * b exactly, for factors that `safe_factors` (Dekker 1971, with Veltkamp's splitting)."""
     high = a * b
     (a_high, a_low), (b_high, b_low) = _split(a), _split(b)
     return np.stack([high, ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low])
 
 
-def _split(a: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _split(a: Factors) -> tuple[Factors, Factors]:
     scaled = SPLITTER * a
     high = scaled - (scaled - a)
     return high, a - high

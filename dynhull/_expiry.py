@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from ._predicates import Point
 from ._tree import HullTree
-from .arrays import Points, as_coordinate, as_points, as_times, as_tuples
+from .arrays import Points, as_times, as_tuples
 
 Item = tuple[float, int, Point]  # the time, the number of arrivals before, and the point
 Times = npt.NDArray[np.float64]
@@ -167,8 +167,12 @@ class WindowTree(HullTree):
         Returns:
             The number of points added.
         """
-        points = as_tuples(as_points(xy))
+        points = as_tuples(self._as_points(xy))
         moments = [self._now] * len(points) if times is None else as_times(times, len(points)).tolist()
+        with self._in_frame(points):
+            return self._add(points, moments)
+
+    def _add(self, points: list[Point], moments: list[float]) -> int:
         now = max(moments, default=self._now)
         now = max(now, self._now)
         limit = self._limit(now)
@@ -208,14 +212,14 @@ class WindowTree(HullTree):
 
     def delete(self, x: float, y: float) -> bool:
         """Remove the oldest copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n)."""
-        p = as_coordinate(x, "x"), as_coordinate(y, "y")
+        p = self._as_point(x, y)
         changed = super().delete(*p)
         self._order.delete(p, self._arrivals, len(self))
         return changed
 
     def delete_many(self, xy: npt.ArrayLike, ignore_missing: bool) -> int:
         """Remove the oldest copies of points as one batch, like `apply`. Returns the number of points removed."""
-        points = as_points(xy)
+        points = self._as_points(xy)
         rows = Counter(as_tuples(points))
         copies = {p: min(count, self._count(p)) for p, count in rows.items()}
         removed = super().apply(-1, points, ignore_missing)
@@ -246,7 +250,7 @@ class WindowTree(HullTree):
         for arrival, (time, p) in enumerate(zip(times.tolist(), entries, strict=True)):
             self._order.push((time, arrival, p))
         self._arrivals = len(entries)
-        self._build(Counter(entries))
+        self._apply_net(Counter(entries))
         self._now = NEVER if now is None else now
         self.changes, self.expired, self.evicted, self.late = totals
 

@@ -11,6 +11,7 @@ import numpy as np
 from ._entities import Entities
 from ._fences import Fences
 from ._implementation import kernel
+from ._keyed import KeyedHull
 from ._predicates import orient2d
 from ._rings import as_polygons
 from ._value import Value
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from . import _kernel
-    from ._keyed import KeyedHull
     from .arrays import Points
     from .keys import KeyType
 
@@ -91,6 +91,7 @@ class FenceIndex:
 
     Raises:
         ValueError: the hull has an index already.
+        TypeError: the subjects are no `KeyedHull`.
 
     A subject that stays away from all boundaries costs O(1) a move, others O(log n) for each fence nearby. A new or
     changed area costs O(log n) for each of its edges that changed, and for each subject near those. The implementation
@@ -123,6 +124,10 @@ class FenceIndex:
     __slots__ = ("_fences", "_subjects")
 
     def __init__(self, subjects: KeyedHull) -> None:
+        if not isinstance(subjects, KeyedHull):
+            raise TypeError(
+                f"subjects is a {type(subjects).__name__}: must be a KeyedHull, whose places are in the plane"
+            )
         tree = subjects._tree
         self._subjects = subjects
         self._fences: Fences | _kernel.Fences

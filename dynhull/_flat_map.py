@@ -29,8 +29,12 @@ class _Position(NamedTuple):
     sheet: int
 
 
-def dense(vertices: Points, max_segment: float | None, *, closed: bool) -> Points:
-    """The vertices, with places between them so that none is farther than `max_segment` metres from the next.
+def boundary(vertices: Points, max_segment: float | None = None) -> Points:
+    """(k, 2) places along the boundary, counter-clockwise from the first vertex; of two vertices, there and not back.
+
+    Args:
+        vertices: (h, 2) vertices.
+        max_segment: the greatest distance of neighbours in metres; None for the vertices alone.
 
     Raises:
         ValueError: `max_segment` is not positive, or leads to more than MOST_POSITIONS places.
@@ -40,6 +44,7 @@ def dense(vertices: Points, max_segment: float | None, *, closed: bool) -> Point
     if not max_segment > 0:
         raise ValueError(f"max_segment is {max_segment!r}: must be greater than 0 metres")
     ends = np.roll(vertices, -1, axis=0)
+    closed = len(vertices) > 2
     if not closed:
         vertices, ends = vertices[:-1], ends[:-1]
     pieces = np.ceil(edge_angles(vertices, ends) * GREATEST_RADIUS / max_segment).clip(1)
@@ -52,13 +57,18 @@ def dense(vertices: Points, max_segment: float | None, *, closed: bool) -> Point
     return places if closed else np.concatenate([places, ends[-1:]])
 
 
-def geometry(vertices: Points, max_segment: float | None) -> dict[str, Any]:
-    """A GeoJSON geometry: Polygon or MultiPolygon, a LineString or MultiLineString for two vertices, Point for one.
+def geojson(vertices: Points, max_segment: float | None = None) -> dict[str, Any]:
+    """The hull as a GeoJSON geometry by RFC 7946, with longitudes from -180 to 180.
 
-    A hull without points is an empty Polygon.
+    Polygon, or MultiPolygon across the antimeridian; LineString or MultiLineString for two vertices, Point for one. A
+    hull without points is an empty Polygon.
+
+    Args:
+        vertices: (h, 2) vertices.
+        max_segment: as for `boundary`, with the same errors.
     """
     closed = len(vertices) > 2
-    corners = as_tuples(dense(vertices, max_segment, closed=closed))
+    corners = as_tuples(boundary(vertices, max_segment))
     match len(corners):
         case 0:
             return {"type": "Polygon", "coordinates": ()}

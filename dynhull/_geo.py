@@ -1,167 +1,56 @@
-"""GeoHull: a hull of places on the globe, given in degrees."""
+"""Hulls of places on the globe, given in degrees: GeoHull, GeoKeyedHull and GeoWindowHull."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
 from . import _ellipsoid, _flat_map
-from ._globe import as_center, as_lonlat, as_place
-from ._globe_tree import GlobeTree
-from ._hull import MissingPointError
-from .arrays import as_operations, as_pairs, repr_of
+from ._base import Live
+from ._globe import Gnomonic, as_center, as_lonlat, as_place
+from ._globe_tree import GlobeEntities, GlobeTree, GlobeWindowTree
+from ._hull import Multiset
+from ._implementation import kernel
+from ._keyed import Keyed, known_kind
+from ._window import Windowed, checked_limits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import numpy.typing as npt
 
+    from . import _kernel
+    from ._entities import Only
+    from ._predicates import Point
     from .arrays import Points
+    from .keys import KeyType
 
-T = TypeVar("T")
 
+class Globe(Live):
+    """A live hull on the globe."""
 
-class GeoHull:
-    """The convex hull of a multiset of places on the globe, under inserts and deletes. Edges are great circles.
+    __slots__ = ()
+    _coordinates = "(lon, lat)"
 
-    Args:
-        lonlat: (n, 2) array-like of longitudes from -360 to 360 and latitudes from -90 to 90, in degrees; by default
-            the hull starts empty. O(n log n).
-        center: (longitude, latitude) in degrees. By default the first points choose it: the direction of their mean
-            vector. After that it stays, until `recenter`.
+    @staticmethod
+    def _as_points(points: npt.ArrayLike) -> Points:
+        return as_lonlat(points)
 
-    All points are within 85 degrees of the centre: a hull on the globe needs a hemisphere. The antimeridian and the
-    poles are places like others. A point is the pair of numbers that was given, and is returned as given; (180, 0) and
-    (-180, 0) are two points at one place.
+    @staticmethod
+    def _as_point(x: float, y: float) -> Point:
+        ((lon, lat),) = as_place(x, y).tolist()
+        return lon, lat
 
-    The hull is that of the points' gnomonic projections about the centre, doubles that are at most 3 nanometres away
-    from the points; all decisions about these are exact.
+    def _same_frame(self, other: Live) -> bool:
+        return isinstance(other, Globe) and self.center == other.center
 
-    Methods raise ValueError or TypeError for bad points, and for points to insert beyond 85 degrees. The message names
-    the first bad row, and nothing changes. Points may come in all forms that `DynamicHull` takes.
-
-    Measures are those of WGS84, in metres, and need pyproj: `pip install 'dynhull[geo]'`.
-
-    >>> fiji = GeoHull([(177.4, -17.8), (178.4, -18.1), (-179.9, -16.8), (179.4, -16.4)])
-    >>> fiji.vertices().tolist()
-    [[-179.9, -16.8], [179.4, -16.4], [177.4, -17.8], [178.4, -18.1]]
-    >>> fiji.contains([(179, -17), (0, 0)]).tolist()
-    [True, False]
-    """
-
-    __slots__ = ("_measured", "_tree")
-    __hash__ = None  # type: ignore[assignment]  # mutable, compared by content
-    _tree_type: ClassVar[type[GlobeTree]] = GlobeTree
-
-    _tree: GlobeTree
-    _measured: tuple[int, dict[str, float]]
-
-    def __init__(self, lonlat: npt.ArrayLike | None = None, center: tuple[float, float] | None = None) -> None:
-        self._tree = self._tree_type(None if center is None else as_center(center))
-        self._measured = (0, {})
-        if lonlat is not None:
-            self._tree.apply(+1, lonlat, False)
-            self._tree.changes = 0
-
-    # Contents
+    @property
+    def _globe(self) -> GlobeTree | _kernel.GlobeTree:
+        return cast("GlobeTree | _kernel.GlobeTree", self._tree)
 
     @property
     def center(self) -> tuple[float, float] | None:
         """The centre as longitude, from -180 to below 180, and latitude; None before the first points. O(1)."""
-        return self._tree.center
-
-    def __len__(self) -> int:
-        """The number of points, with multiplicity. O(1)."""
-        return len(self._tree)
-
-    @property
-    def distinct(self) -> int:
-        """The number of different points. O(1)."""
-        return self._tree.distinct
-
-    @property
-    def changes(self) -> int:
-        """The number of updates, single or batch, that changed the vertices. O(1)."""
-        return self._tree.changes
-
-    def count(self, lon: float, lat: float) -> int:
-        """The number of copies of the point. O(1)."""
-        return self._tree.count(lon, lat)
-
-    def count_many(self, lonlat: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """(k,) numbers of copies of (k, 2) points. O(1) each."""
-        return self._tree.count_many(as_lonlat(lonlat))
-
-    def __contains__(self, point: tuple[float, float]) -> bool:
-        """Whether (lon, lat) is one of the points. O(1)."""
-        try:
-            lon, lat = point
-        except (TypeError, ValueError):
-            raise ValueError(f"a point is (lon, lat), got {repr_of(point)}") from None
-        return self.count(lon, lat) > 0
-
-    def points(self) -> Points:
-        """(n, 2) points in lexicographic order, with multiplicity. O(n log n)."""
-        return self._tree.points()
-
-    def vertices(self) -> Points:
-        """(h, 2) vertices, counter-clockwise from the lexicographically smallest, strictly convex. O(h log n).
-
-        Of several points at one place, the smallest. No points: shape (0, 2). All points at one place: one vertex. All
-        points on one great circle, as the projection has them: two vertices.
-        """
-        return self._tree.vertices()
-
-    # Updates
-
-    def insert(self, lon: float, lat: float) -> bool:
-        """Add a point. Returns whether the hull changed. O(log² n)."""
-        return self._tree.insert(lon, lat)
-
-    def delete(self, lon: float, lat: float) -> bool:
-        """Remove one copy of a point. Returns whether the hull changed. O(log² n).
-
-        Raises:
-            MissingPointError: the hull does not hold the point.
-        """
-        try:
-            return self._tree.delete(lon, lat)
-        except KeyError:
-            (point,) = as_place(lon, lat).tolist()
-            raise MissingPointError((point[0], point[1])) from None
-
-    def insert_many(self, lonlat: npt.ArrayLike) -> int:
-        """Add k points as one batch. Returns k. O(log² n) each."""
-        return self._apply(+1, lonlat, "raise")
-
-    def delete_many(self, lonlat: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
-        """Remove points as one batch. Returns the number of points removed. O(log² n) each.
-
-        Args:
-            lonlat: (k, 2) array-like.
-            missing: for a row with more copies of a point than the hull holds, "raise" raises MissingPointError with
-                the row, before anything changes; "ignore" skips the row.
-        """
-        return self._apply(-1, lonlat, missing)
-
-    def apply(self, ops: npt.ArrayLike, lonlat: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
-        """Apply inserts and deletes as one batch. Returns the number of rows applied. O(log² n) each.
-
-        A batch is a set: the order of its rows does not matter, and a point inserted and deleted in one batch leaves no
-        trace.
-
-        Args:
-            ops: k numbers, +1 to insert and -1 to delete the point of that row.
-            lonlat: (k, 2) array-like.
-            missing: as for `delete_many`.
-        """
-        points = as_pairs(lonlat)
-        return self._apply(as_operations(ops, len(points)), points, missing)
-
-    def clear(self) -> None:
-        """Remove every point. The centre stays."""
-        self._tree.clear()
+        return self._globe.center
 
     def recenter(self, center: tuple[float, float] | None = None) -> None:
         """Move the centre, by default to the mean direction of the present points. O(n log n).
@@ -172,18 +61,20 @@ class GeoHull:
             ValueError: a point is beyond 85 degrees from the new centre; or there is no centre and no point. Nothing
                 changes.
         """
-        self._tree.recenter(None if center is None else as_center(center))
+        if center is None:
+            points = self.points()
+            if not len(points):
+                raise ValueError("center is None, and there are no points to choose it from")
+            center = Gnomonic.about(points).center
+        self._globe.recenter(as_center(center))
 
-    def _apply(self, ops: int | npt.NDArray[np.int8], lonlat: npt.ArrayLike, missing: str) -> int:
-        if missing not in ("raise", "ignore"):
-            raise ValueError(f'missing must be "raise" or "ignore", got {missing!r}')
-        try:
-            return self._tree.apply(ops, lonlat, missing == "ignore")
-        except KeyError as error:
-            if len(error.args) != 3:  # raised by the caller's own array-like
-                raise
-            lon, lat, row = error.args
-            raise MissingPointError((lon, lat), row) from None
+    def vertices(self) -> Points:
+        """(h, 2) vertices, counter-clockwise from the lexicographically smallest, strictly convex. O(h log n).
+
+        Of several points at one place, the smallest. No points: shape (0, 2). All points at one place: one vertex. All
+        points on one great circle, as the projection has them: two vertices.
+        """
+        return self._tree.vertices()
 
     # Queries
 
@@ -192,11 +83,7 @@ class GeoHull:
 
         Exact for the projections. Everything beyond 85 degrees from the centre is outside.
         """
-        return self._tree.locate(as_lonlat(lonlat))
-
-    def contains(self, lonlat: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """(k,) booleans: which of (k, 2) places are inside or on the boundary. O(log n) each."""
-        return self.locate(lonlat) >= 0
+        return super().locate(lonlat)
 
     def tangents(self, lonlat: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """(k, 2, 2) left and right tangent points seen from each of (k, 2) places. Exact for the projections.
@@ -221,17 +108,6 @@ class GeoHull:
         return result
 
     # Measures, each kept until the hull changes
-
-    def _measure(self, measure_of: Callable[[Points], float]) -> float:
-        """A measure of the vertices. Reads `changes` first, so that a concurrent update outdates the result."""
-        changes = self.changes
-        if self._measured[0] != changes:
-            self._measured = (changes, {})
-        known = self._measured[1]
-        name = measure_of.__name__
-        if name not in known:
-            known[name] = measure_of(self.vertices())
-        return known[name]
 
     @property
     def area(self) -> float:
@@ -272,8 +148,7 @@ class GeoHull:
         Raises:
             ValueError: `max_segment` is not positive, or leads to more than 10,000,000 places.
         """
-        vertices = self.vertices()
-        return _flat_map.dense(vertices, max_segment, closed=len(vertices) > 2)
+        return _flat_map.boundary(self.vertices(), max_segment)
 
     def geojson(self, max_segment: float | None = None) -> dict[str, Any]:
         """The hull as a GeoJSON geometry by RFC 7946, with longitudes from -180 to 180.
@@ -285,26 +160,69 @@ class GeoHull:
         Args:
             max_segment: as for `boundary`.
         """
-        return _flat_map.geometry(self.vertices(), max_segment)
+        return _flat_map.geojson(self.vertices(), max_segment)
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
         """The hull as a GeoJSON geometry of its vertices: `geojson()`."""
         return self.geojson()
 
+
+class GeoHull(Multiset, Globe):
+    """The convex hull of a multiset of places on the globe, under inserts and deletes. Edges are great circles.
+
+    Args:
+        lonlat: (n, 2) array-like of longitudes from -360 to 360 and latitudes from -90 to 90, in degrees; by default
+            the hull starts empty. O(n log n).
+        center: (longitude, latitude) in degrees. By default the first points choose it: the direction of their mean
+            vector. After that it stays, until `recenter`.
+
+    All points are within 85 degrees of the centre: a hull on the globe needs a hemisphere. The antimeridian and the
+    poles are places like others. A point is the pair of numbers that was given, and is returned as given; (180, 0) and
+    (-180, 0) are two points at one place.
+
+    The hull is that of the points' gnomonic projections about the centre, doubles that are at most 2 nanometres away
+    from the points; all decisions about these are exact.
+
+    Methods raise ValueError or TypeError for bad points, and for points to insert beyond 85 degrees. The message names
+    the first bad row, and nothing changes. Points may come in all forms that `DynamicHull` takes.
+
+    Measures are those of WGS84, in metres, and need pyproj: `pip install 'dynhull[geo]'`.
+
+    >>> fiji = GeoHull([(177.4, -17.8), (178.4, -18.1), (-179.9, -16.8), (179.4, -16.4)])
+    >>> fiji.vertices().tolist()
+    [[-179.9, -16.8], [179.4, -16.4], [177.4, -17.8], [178.4, -18.1]]
+    >>> fiji.contains([(179, -17), (0, 0)]).tolist()
+    [True, False]
+    """
+
+    __slots__ = ()
+    _tree_type: ClassVar[type[GlobeTree | _kernel.GlobeTree]] = GlobeTree if kernel is None else kernel.GlobeTree
+
+    def __init__(self, lonlat: npt.ArrayLike | None = None, center: tuple[float, float] | None = None) -> None:
+        self._tree = self._tree_type(None if center is None else as_center(center))
+        self._measured = (0, {})
+        if lonlat is not None:
+            self._tree.apply(+1, lonlat, False)
+            self._tree.changes = 0
+
+    def insert(self, lon: float, lat: float) -> bool:
+        """Add a point. Returns whether the hull changed. O(log² n)."""
+        return super().insert(lon, lat)
+
+    def delete(self, lon: float, lat: float) -> bool:
+        """Remove one copy of a point. Returns whether the hull changed. O(log² n).
+
+        Raises:
+            MissingPointError: the hull does not hold the point.
+        """
+        return super().delete(lon, lat)
+
+    def count(self, lon: float, lat: float) -> int:
+        """The number of copies of the point. O(1)."""
+        return super().count(lon, lat)
+
     # As a value
-
-    def copy(self) -> Self:
-        """An independent hull of the same points about the same centre. O(n)."""
-        new = type(self).__new__(type(self))
-        new._tree = self._tree.copy()
-        new._measured = (0, {})
-        return new
-
-    __copy__ = copy
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return self.copy()
 
     def __getstate__(self) -> tuple[Points, tuple[float, float] | None, int]:
         return self.points(), self.center, self.changes
@@ -316,15 +234,136 @@ class GeoHull:
         self._tree.changes = changes
         self._measured = (changes, {})
 
-    def __eq__(self, other: object) -> bool:
-        """Whether the other hull holds the same points, as often, about the same centre. O(n log n)."""
-        if not isinstance(other, GeoHull):
-            return NotImplemented
-        return self.center == other.center and np.array_equal(self.points(), other.points())
 
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {len(self)} points, {len(self.vertices())} vertices>"
+class GeoKeyedHull(Keyed, Globe):
+    """The convex hull of entities on the globe, each a place with a key and perhaps a time. Edges are great circles.
 
-    def check(self) -> None:
-        """Raise AssertionError if an invariant is broken, for tests and bug reports. O(n log n)."""
-        self._tree.check()
+    Args:
+        key_type: as for `KeyedHull`.
+        ordered: as for `KeyedHull`.
+        center: as for `GeoHull`; the first batch that puts points chooses it.
+
+    Keys, times and batches are those of `KeyedHull`, places, vertices and measures those of `GeoHull`. An entity has
+    the pair of numbers that was given last. `vertex_keys` names, for each vertex, the least key with this pair.
+
+    >>> fleet = GeoKeyedHull()
+    >>> fleet.put_many(["Suva", "Taveuni", "Nadi"], [(178.6, -18), (-179.9, -16.7), (177.4, -17.8)])
+    3
+    >>> fleet.vertex_keys()
+    ['Taveuni', 'Nadi', 'Suva']
+    >>> fleet.put("Taveuni", 180.1, -16.7)  # the same place: another way to write it
+    True
+    >>> fleet.position("Taveuni")
+    (180.1, -16.7)
+    """
+
+    __slots__ = ()
+    _tree_type: ClassVar[type[GlobeEntities | _kernel.GlobeEntities]] = (
+        GlobeEntities if kernel is None else kernel.GlobeEntities
+    )
+
+    def __init__(
+        self, key_type: KeyType = "str", *, ordered: bool = False, center: tuple[float, float] | None = None
+    ) -> None:
+        self._tree = self._tree_type(known_kind(key_type), bool(ordered), None if center is None else as_center(center))
+        self._measured = (0, {})
+
+    @classmethod
+    def from_entities(
+        cls,
+        keys: Any,
+        lonlat: npt.ArrayLike,
+        times: npt.ArrayLike | None = None,
+        key_type: KeyType = "str",
+        *,
+        ordered: bool = False,
+        center: tuple[float, float] | None = None,
+    ) -> GeoKeyedHull:
+        """A hull of n entities, as `entities` returns them: a time that is NaN means none. O(n log n).
+
+        Raises:
+            DuplicateKeyError: a key comes twice.
+        """
+        hull = cls(key_type, ordered=ordered, center=center)
+        hull._tree.load(keys, lonlat, times)
+        return hull
+
+    def put(
+        self, key: str | int, lon: float, lat: float, time: float | None = None, *, only: Only | None = None
+    ) -> bool:
+        """Insert an entity or move it. Returns whether the hull changed. O(log² n).
+
+        Args:
+            key: the entity's key.
+            lon: the longitude of the new place.
+            lat: the latitude.
+            time: replaces the entity's time; None leaves it without one.
+            only: "absent" to insert and never move, "present" to move and never insert.
+        """
+        return super().put(key, lon, lat, time, only=only)
+
+    # As a value
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        return self.key_type, self.ordered, self.center, self.entities(), self.changes
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        key_type, ordered, center, entities, changes = state
+        self._tree = self._tree_type(key_type, ordered, center)
+        self._tree.load(*entities)
+        self._tree.changes = changes
+        self._measured = (changes, {})
+
+
+class GeoWindowHull(Windowed, Globe):
+    """The convex hull of recent places on the globe. Edges are great circles.
+
+    Args:
+        max_age: as for `WindowHull`.
+        max_points: as for `WindowHull`.
+        center: as for `GeoHull`; the first batch with points chooses it, those that are late included.
+
+    Times and limits are those of `WindowHull`, places, vertices and measures those of `GeoHull`.
+
+    >>> window = GeoWindowHull(max_age=60.0)
+    >>> window.add([(179, 0), (-179, 0), (180, 2)], times=[0.0, 10.0, 20.0])
+    3
+    >>> window.advance(60.0)
+    1
+    >>> window.vertices().tolist()
+    [[-179.0, 0.0], [180.0, 2.0]]
+    """
+
+    __slots__ = ()
+    _tree_type: ClassVar[type[GlobeWindowTree | _kernel.GlobeWindowTree]] = (
+        GlobeWindowTree if kernel is None else kernel.GlobeWindowTree
+    )
+
+    def __init__(
+        self,
+        max_age: float | None = None,
+        max_points: int | None = None,
+        center: tuple[float, float] | None = None,
+    ) -> None:
+        limits = checked_limits(max_age, max_points)
+        self._tree = self._tree_type(*limits, None if center is None else as_center(center))
+        self._measured = (0, {})
+
+    def delete(self, lon: float, lat: float) -> bool:
+        """Remove the oldest copy of a point. Returns whether the hull changed. O(log² n).
+
+        Raises:
+            MissingPointError: the window does not hold the point.
+        """
+        return super().delete(lon, lat)
+
+    # As a value
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        return self.max_age, self.max_points, self.center, self._tree.state()
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        max_age, max_points, center, contents = state
+        self._tree = self._tree_type(max_age, max_points, center)
+        self._tree.restore(*contents)
+        self._measured = (0, {})

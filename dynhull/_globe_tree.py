@@ -1,44 +1,46 @@
-"""GlobeTree: a multiset of places on the globe and its convex hull.
+"""Trees of places on the globe: the readable reference.
 
 A tree holds the places in the gnomonic projection about a centre, where great circles are straight lines and the hull
-of the projected places is the hull on the globe. `Given` has, for each projected place, the pairs of numbers that were
-given for it.
+of the projected places is the hull on the globe. It is asked and answers in pairs of degrees, those that were given. A
+place has several pairs if it can be written in several ways: 180 and -180 degrees, any longitude at a pole.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Self
+from collections import Counter
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from ._given import Given
-from ._globe import REACH, Gnomonic, as_lonlat, as_place
-from ._implementation import kernel
+from ._entities import Entities
+from ._expiry import WindowTree
+from ._globe import CHOSEN, Gnomonic, as_lonlat, as_place
 from ._tree import HullTree
+from .arrays import Points, as_tuples
 
 if TYPE_CHECKING:
-    from . import _kernel
+    from collections.abc import Iterator, Sequence
+
     from ._predicates import Point
-    from .arrays import Points
+    from .keys import KeyType
 
 
-class GlobeTree:
+class GlobeTree(HullTree):
     """A multiset of pairs (longitude, latitude) in degrees, and its hull; edges are great circles.
 
-    Single coordinates are checked, and so are arrays. O(log² n) an update, O(log n) a query, O(n) space.
+    O(log² n) an update, O(log n) a query, O(n) space.
 
     Args:
-        center: checked by `as_center`; None to choose it when the first points come.
+        center: of the projection; None if the first batch of points is to choose it.
     """
 
-    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
-    _given_type: ClassVar[type[Given | _kernel.Given]] = Given if kernel is None else kernel.Given
-
-    def __init__(self, center: Point | None) -> None:
+    def __init__(self, center: Point | None = None) -> None:
+        super().__init__()
         self._frame = None if center is None else Gnomonic(center)
-        self._tree: HullTree | _kernel.HullTree = self._tree_type()
-        self._given: Given | _kernel.Given = self._given_type()
+        self._pairs: dict[Point, tuple[Point, ...]] = {}  # the different pairs at each projected place, in order
+        self._copies_of: dict[Point, int] = {}  # the number of copies of each pair
 
     @property
     def center(self) -> Point | None:
@@ -46,161 +48,170 @@ class GlobeTree:
         return None if self._frame is None else self._frame.center
 
     @property
-    def changes(self) -> int:
-        """The number of updates that changed the vertices."""
-        return self._tree.changes
-
-    @changes.setter
-    def changes(self, changes: int) -> None:
-        self._tree.changes = changes
-
-    def __len__(self) -> int:
-        return len(self._tree)
-
-    @property
     def distinct(self) -> int:
         """The number of different pairs."""
-        return self._given.distinct
+        return len(self._copies_of)
 
-    def count(self, lon: float, lat: float) -> int:
-        """The number of copies of the pair. O(1)."""
-        return int(self.count_many(as_place(lon, lat))[0])
+    @staticmethod
+    def _as_points(xy: npt.ArrayLike) -> Points:
+        return as_lonlat(xy)
 
-    def count_many(self, lonlat: Points) -> npt.NDArray[np.int64]:
-        """The number of copies of each row. O(1) a row."""
-        places, _ = self._project(lonlat)
-        return self._given.counts(lonlat, places)
+    @staticmethod
+    def _as_point(x: float, y: float) -> Point:
+        ((lon, lat),) = as_place(x, y).tolist()
+        return lon, lat
 
-    def _project(self, lonlat: Points) -> tuple[Points, npt.NDArray[np.bool_]]:
+    @contextmanager
+    def _in_frame(
+        self, points: Sequence[Point], name: str = "points row {}", inserted: npt.NDArray[np.bool_] | bool = True
+    ) -> Iterator[None]:
+        """ValueError if a point is too far from the centre. A centre that the points choose stays if the batch does."""
+        before, rows = self._frame, np.array(points, dtype=np.float64).reshape(-1, 2)
+        wanted = np.broadcast_to(inserted, len(rows))
+        try:
+            if before is None and wanted.any():
+                self._frame = Gnomonic.about(rows[wanted])
+            if self._frame is not None:
+                near = self._frame.project(rows)[1]
+                self._frame.require(rows, near | ~wanted, name, CHOSEN if before is None else "")
+            yield
+        except BaseException:
+            self._frame = before
+            raise
+
+    def _projected(self, pairs: Points) -> tuple[Points, npt.NDArray[np.bool_]]:
         """The projections, NaN beyond REACH, and which rows have one: without a centre, none."""
         if self._frame is None:
-            return np.full(lonlat.shape, np.nan), np.zeros(len(lonlat), dtype=bool)
-        return self._frame.project(lonlat)
+            return np.full(pairs.shape, np.nan), np.zeros(len(pairs), dtype=bool)
+        return self._frame.project(pairs)
 
-    # Updates
-
-    def insert(self, lon: float, lat: float) -> bool:
-        """Add a pair. True if the hull changed. O(log² n)."""
-        changes = self.changes
-        self._apply(np.array([1], np.int8), as_place(lon, lat), "the point", ignore_missing=False)
-        return self.changes > changes
-
-    def delete(self, lon: float, lat: float) -> bool:
-        """Remove one copy of a pair. True if the hull changed; KeyError if the pair is missing. O(log² n)."""
-        changes = self.changes
-        self._apply(np.array([-1], np.int8), as_place(lon, lat), "the point", ignore_missing=False)
-        return self.changes > changes
-
-    def apply(self, ops: int | npt.NDArray[np.int8], lonlat: npt.ArrayLike, ignore_missing: bool) -> int:
-        """Insert the rows with +1 and delete those with -1, as a set: the order of rows does not matter.
-
-        Returns:
-            The number of rows applied.
-
-        Raises:
-            KeyError: longitude, latitude and row of the first delete of a missing pair; nothing has been applied.
-            ValueError: a row to insert is beyond REACH.
-        """
-        pairs = as_lonlat(lonlat)
-        return self._apply(np.full(len(pairs), ops, np.int8), pairs, "points row {}", ignore_missing=ignore_missing)
+    def _count(self, p: Point) -> int:
+        return self._copies_of.get(p, 0)
 
     def clear(self) -> None:
         """Remove every pair. The centre stays."""
-        self._tree.clear()
-        self._given.clear()
+        super().clear()
+        self._pairs, self._copies_of = {}, {}
 
-    def recenter(self, center: Point | None) -> None:
-        """Build the tree anew about another centre, by default the mean direction of the pairs. O(n log n)."""
-        pairs = self.points()
-        if center is None and not len(pairs):
-            raise ValueError("center is None, and there are no points to choose it from")
-        new = type(self)(center)
-        new.apply(+1, pairs, ignore_missing=False)
-        new.changes = self.changes + (not np.array_equal(new.vertices(), self.vertices()))
-        vars(self).update(vars(new))
+    def copy(self) -> Self:
+        """An independent tree of the same pairs. O(n)."""
+        new = super().copy()
+        new._frame, new._pairs, new._copies_of = self._frame, self._pairs.copy(), self._copies_of.copy()
+        return new
 
-    def _apply(self, ops: npt.NDArray[np.int8], pairs: Points, name: str, *, ignore_missing: bool) -> int:
-        added = ops > 0
-        frame, chosen = self._frame, ""
-        if frame is None and added.any():
-            frame, chosen = (
-                Gnomonic.about(pairs[added]),
-                ", the mean direction of the first points (`center` gives another)",
-            )
-        if frame is None:
-            places, near = self._project(pairs)
-        else:
-            places, near = frame.project(pairs)
-            far = np.flatnonzero(added & ~near)
-            if far.size:
-                _refuse_far(frame, pairs, int(far[0]), name, chosen)
-        kept, renamed = self._given.apply(ops, pairs, places, ignore_missing)
-        if not kept.all():
-            ops, pairs, places = ops[kept], pairs[kept], places[kept]
-        before = self._tree.changes
-        try:
-            self._tree.apply(ops, places, False)
-        except BaseException:  # no memory, say
-            self._given.apply(-ops, pairs, places, False)
-            raise
-        self._frame = frame
-        if len(renamed) and before == self._tree.changes:
-            self._tree.changes += bool((self._tree.vertices()[:, None] == renamed).all(axis=-1).any())
-        return len(ops)
+    # Updates
+
+    def insert(self, x: float, y: float) -> bool:
+        """Add a pair. True if the hull changed. O(log² n)."""
+        pair, before = self._as_point(x, y), self.changes
+        with self._in_frame([pair], "the point"):
+            self._apply_net(Counter([pair]))
+        return self.changes > before
+
+    def delete(self, x: float, y: float) -> bool:
+        """Remove one copy of a pair. True if the hull changed; KeyError if the pair is missing. O(log² n)."""
+        pair, before = self._as_point(x, y), self.changes
+        if not self._count(pair):
+            raise KeyError(*pair)
+        self._apply_net(Counter({pair: -1}))
+        return self.changes > before
+
+    def _apply_net(self, net: Counter[Point]) -> None:
+        pairs = [pair for pair, change in net.items() if change]
+        place_of = dict(zip(pairs, as_tuples(self._projected(np.array(pairs).reshape(-1, 2))[0]), strict=True))
+        net_of_places: Counter[Point] = Counter()
+        for pair in pairs:
+            net_of_places[place_of[pair]] += net[pair]
+        before, names = self.changes, {place: self._pairs.get(place) for place in net_of_places}
+        super()._apply_net(net_of_places)
+        for pair in pairs:
+            self._rename(place_of[pair], pair, net[pair])
+        if self.changes == before:
+            renamed = (p for p, old in names.items() if old and p in self._pairs and old[0] != self._pairs[p][0])
+            self.changes += not set(self._vertices()).isdisjoint(renamed)
+
+    def _rename(self, place: Point, pair: Point, change: int) -> None:
+        """Change the number of copies of a pair."""
+        copies = self._copies_of.pop(pair, 0) + change
+        names = tuple(name for name in self._pairs.pop(place, ()) if name != pair)
+        if copies:
+            self._copies_of[pair] = copies
+            names = tuple(sorted((*names, pair)))
+        if names:
+            self._pairs[place] = names
+
+    def recenter(self, center: Point) -> None:
+        """Project all pairs about another centre. ValueError if one is too far; nothing has changed. O(n log n)."""
+        frame, pairs, before = Gnomonic(center), self.points(), self.vertices()
+        places = as_tuples(frame.project_all(pairs))
+        self._frame, self._pairs = frame, {}
+        for pair, place in dict(zip(as_tuples(pairs), places, strict=True)).items():
+            self._pairs[place] = *self._pairs.get(place, ()), pair
+        self._build(Counter(places))
+        self.changes += not np.array_equal(self.vertices(), before)
 
     # The hull
 
     def points(self) -> Points:
         """All pairs in lexicographic order, with multiplicity. O(n log n)."""
-        return self._given.points()
+        pairs = [pair for pair in sorted(self._copies_of) for _ in range(self._copies_of[pair])]
+        return np.array(pairs, dtype=np.float64).reshape(-1, 2)
 
     def vertices(self) -> Points:
-        """The hull's vertices, counter-clockwise from the lexicographically smallest pair. O(h log n)."""
-        pairs = self._given.at(self._tree.vertices())
-        start = int(np.lexsort(pairs.T[::-1])[0]) if len(pairs) else 0
-        return np.concatenate([pairs[start:], pairs[:start]])
+        """The hull's vertices, counter-clockwise from the least pair; of several pairs at one place, the least."""
+        pairs = [self._pairs[place][0] for place in self._vertices()]
+        start = pairs.index(min(pairs)) if pairs else 0
+        return np.array(pairs[start:] + pairs[:start], dtype=np.float64).reshape(-1, 2)
 
-    def locate(self, lonlat: Points) -> npt.NDArray[np.int8]:
+    def locate(self, xy: Points) -> npt.NDArray[np.int8]:
         """+1 inside, 0 on the boundary, -1 outside, for each row. O(log n) a row."""
-        places, near = self._project(lonlat)
+        places, near = self._projected(xy)
         signs = np.full(len(places), -1, dtype=np.int8)
-        signs[near] = self._tree.locate(places[near])
+        signs[near] = super().locate(places[near])
         return signs
 
-    def tangents(self, lonlat: Points) -> npt.NDArray[np.float64]:
+    def tangents(self, xy: Points) -> npt.NDArray[np.float64]:
         """The left and the right tangent point seen from each row, NaN unless the row is outside. O(log n) a row."""
-        places, near = self._project(lonlat)
-        if self._frame is not None and not near.all():
-            _refuse_far(self._frame, lonlat, int(np.flatnonzero(~near)[0]), "points row {}", "")
-        result = np.full((len(places), 2, 2), np.nan)
-        result[near] = self._tree.tangents(places[near])
-        outside = np.flatnonzero(~np.isnan(result[:, 0, 0]))
-        result[outside] = self._given.at(result[outside].reshape(-1, 2)).reshape(-1, 2, 2)
+        result = np.full((len(xy), 2, 2), np.nan)
+        if self._frame is not None:
+            found = super().tangents(self._frame.project_all(xy))
+            for row in np.flatnonzero(~np.isnan(found[:, 0, 0])):
+                result[row] = [self._pairs[place][0] for place in as_tuples(found[row])]
         return result
-
-    # As a value
-
-    def copy(self) -> Self:
-        """An independent tree of the same pairs. O(n)."""
-        new = type(self)(None)
-        new._frame, new._tree, new._given = self._frame, self._tree.copy(), self._given.copy()
-        return new
 
     def check(self) -> None:
         """Raise AssertionError if an invariant is broken. O(n log n)."""
-        self._tree.check()
-        pairs = self._given.points()
-        places, near = self._project(pairs)
-        assert near.all()
-        assert np.array_equal(places[np.lexsort(places.T[::-1])], self._tree.points())
-        distinct, copies = np.unique(pairs, axis=0, return_counts=True)
-        assert len(distinct) == self.distinct
-        assert np.array_equal(self.count_many(distinct), copies)
+        super().check()
+        pairs = self.points()
+        places, near = self._projected(pairs)
+        if not near.all() or Counter(as_tuples(places)) != Counter(
+            {p: self._copies.get(p, 1) for p in self._all_points()}
+        ):
+            raise AssertionError("the tree does not hold the places of the pairs")
+        names: dict[Point, tuple[Point, ...]] = {}
+        for pair, place in sorted(set(zip(as_tuples(pairs), as_tuples(places), strict=True))):
+            names[place] = *names.get(place, ()), pair
+        if names != self._pairs:
+            raise AssertionError("a place with other pairs than its own")
 
 
-def _refuse_far(frame: Gnomonic, pairs: Points, row: int, name: str, chosen: str) -> None:
-    pair = (pairs[row, 0].item(), pairs[row, 1].item())
-    raise ValueError(
-        f"{name.format(row)} is {pair}: {frame.angle(pair):.6f} degrees from the centre {frame.center}{chosen}; "
-        f"a hull reaches {REACH:g} degrees"
-    )
+class GlobeEntities(Entities, GlobeTree):
+    """Entities on the globe: their points are pairs of degrees."""
+
+    def __init__(self, key_type: KeyType = "str", ordered: bool = False, center: Point | None = None) -> None:
+        super().__init__(key_type, ordered)
+        self._frame = None if center is None else Gnomonic(center)
+
+
+class GlobeWindowTree(WindowTree, GlobeTree):
+    """A window on the globe: its points are pairs of degrees."""
+
+    def __init__(self, max_age: float | None, max_points: int | None, center: Point | None = None) -> None:
+        super().__init__(max_age, max_points)
+        self._frame = None if center is None else Gnomonic(center)
+
+    def copy(self) -> Self:
+        """An independent tree of the same points and times. O(n log n)."""
+        new = type(self)(self._max_age, self._max_points, self.center)
+        new.restore(*self.state())
+        return new

@@ -1,4 +1,4 @@
-"""DynamicHull: a hull whose points are named by their coordinates."""
+"""Hulls whose points are named by their coordinates: DynamicHull in the plane."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from ._base import Hull
+from ._base import Hull, Live
 from ._implementation import kernel
 from ._tree import HullTree
-from .arrays import Points, as_coordinate, as_operations, as_pairs
+from .arrays import Points, as_operations, as_pairs
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -35,39 +35,11 @@ class MissingPointError(KeyError):
         return f"{where}point {self.point} is missing and cannot be deleted; nothing was changed"
 
 
-class DynamicHull(Hull):
-    """The convex hull of a multiset of points in the plane, under inserts and deletes. Exact for every finite double.
-
-    Args:
-        points: (n, 2) array-like of finite numbers; by default the hull starts empty. O(n log n).
-
-    Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
-    numeric, or not exactly representable as doubles. The message names the first bad row, and nothing changes.
-
-    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
-    query.
-
-    Points may also come as geometries (shapely, geopandas, GeoJSON), which give every vertex once, and as frames
-    (pandas, polars, pyarrow) with columns such as x and y, or lon and lat.
-
-    >>> from dynhull import DynamicHull
-    >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
-    >>> hull.insert(5, 2)
-    True
-    >>> hull.delete(2, 1)
-    False
-    >>> hull.vertices().tolist()
-    [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]
-    """
+class Multiset(Live):
+    """A live hull of a multiset of points."""
 
     __slots__ = ()
-    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
-
     _tree: HullTree | _kernel.HullTree
-
-    def __init__(self, points: npt.ArrayLike | None = None) -> None:
-        self._tree = self._tree_type(points)
-        self._measured = (0, {})
 
     # Updates
 
@@ -84,7 +56,7 @@ class DynamicHull(Hull):
         try:
             return self._tree.delete(x, y)
         except KeyError:
-            raise MissingPointError((as_coordinate(x, "x"), as_coordinate(y, "y"))) from None
+            raise MissingPointError(self._as_point(x, y)) from None
 
     def insert_many(self, xy: npt.ArrayLike) -> int:
         """Add k points as one batch. Returns k. O(log² n) each, O((n + k) log k) for k >= n."""
@@ -131,6 +103,47 @@ class DynamicHull(Hull):
 
     # As a value
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the other hull holds the same points with the same multiplicities. O(n), on the globe O(n log n)."""
+        if not isinstance(other, Multiset):
+            return NotImplemented
+        return self._same_frame(other) and len(self) == len(other) and np.array_equal(self.points(), other.points())
+
+
+class DynamicHull(Multiset, Hull):
+    """The convex hull of a multiset of points in the plane, under inserts and deletes. Exact for every finite double.
+
+    Args:
+        points: (n, 2) array-like of finite numbers; by default the hull starts empty. O(n log n).
+
+    Every method that takes points raises ValueError or TypeError for input that is not finite, not of shape (n, 2), not
+    numeric, or not exactly representable as doubles. The message names the first bad row, and nothing changes.
+
+    Overmars and van Leeuwen, "Maintenance of configurations in the plane" (1981): O(log² n) an update, O(log n) a
+    query.
+
+    Points may also come as geometries (shapely, geopandas, GeoJSON), which give every vertex once, and as frames
+    (pandas, polars, pyarrow) with columns such as x and y, or lon and lat.
+
+    >>> from dynhull import DynamicHull
+    >>> hull = DynamicHull([[0, 0], [4, 0], [4, 4], [0, 4], [2, 1]])
+    >>> hull.insert(5, 2)
+    True
+    >>> hull.delete(2, 1)
+    False
+    >>> hull.vertices().tolist()
+    [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]
+    """
+
+    __slots__ = ()
+    _tree_type: ClassVar[type[HullTree | _kernel.HullTree]] = HullTree if kernel is None else kernel.HullTree
+
+    def __init__(self, points: npt.ArrayLike | None = None) -> None:
+        self._tree = self._tree_type(points)
+        self._measured = (0, {})
+
+    # As a value
+
     def __getstate__(self) -> tuple[Points, int]:
         return self.points(), self.changes
 
@@ -139,9 +152,3 @@ class DynamicHull(Hull):
         self._tree = self._tree_type(points)
         self._tree.changes = changes
         self._measured = (changes, {})
-
-    def __eq__(self, other: object) -> bool:
-        """Whether the other hull holds the same points with the same multiplicities. O(n)."""
-        if not isinstance(other, DynamicHull):
-            return NotImplemented
-        return len(self) == len(other) and np.array_equal(self.points(), other.points())

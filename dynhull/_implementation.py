@@ -4,7 +4,7 @@ The environment variable DYNHULL_KERNEL, read at import, forces one of them: "py
 """
 
 import os
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,16 +21,17 @@ class _Kernel(Protocol):
     Entities: "type[_kernel.Entities]"
     Fences: "type[_kernel.Fences]"
     WindowTree: "type[_kernel.WindowTree]"
-    Given: "type[_kernel.Given]"
+    GlobeTree: "type[_kernel.GlobeTree]"
+    GlobeEntities: "type[_kernel.GlobeEntities]"
+    GlobeWindowTree: "type[_kernel.GlobeWindowTree]"
 
     def plain_points(self, xy: object) -> "Points | None": ...
     def packed_points(self, packed: bytes) -> "Points | None": ...
-    def gnomonic(
-        self, lonlat: "Points", lon: float, lat: float, sine: float, cosine: float
-    ) -> "tuple[Points, npt.NDArray[np.bool_]]": ...
+    def gnomonic(self, lonlat: "Points", parameters: Any) -> "tuple[Points, npt.NDArray[np.bool_]]": ...
     def convex_hull(self, xy: "Points") -> "Points | None": ...
     def chan(self, xy: "Points") -> "tuple[Points, list[tuple[int, int, int, bool]]]": ...
     def orientations(self, a: "Points", b: "Points", c: "Points") -> "npt.NDArray[np.int8]": ...
+    def turning_if_simple(self, ring: "Points") -> int: ...
 
 
 def _load() -> _Kernel | None:

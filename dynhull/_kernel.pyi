@@ -3,6 +3,7 @@
 from typing import Annotated, Any, overload
 
 import numpy
+import numpy.typing
 from numpy.typing import NDArray
 
 import dynhull.arrays
@@ -68,6 +69,21 @@ class HullTree:
     def intersect_lines(self, p: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], q: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2, 2))]:
         """
         Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. O(log n) a row.
+        """
+
+    def layers(self, count: int) -> list[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]]:
+        """
+        The vertices of the outermost convex layers, each counter-clockwise from the least. O(log² n) a vertex.
+        """
+
+    def influence(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        For each vertex the area that goes with it, rounded once. O(log² n) a vertex.
+        """
+
+    def sketch(self, most: int) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))], Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]]:
+        """
+        At most that many vertices, at least 4; and three rows for each edge of theirs beyond which the hull has others: its ends and the farthest of those. O(most log n).
         """
 
     def copy(self) -> HullTree:
@@ -155,6 +171,21 @@ class Entities:
     def intersect_lines(self, p: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], q: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2, 2))]:
         """
         Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. O(log n) a row.
+        """
+
+    def layers(self, count: int) -> list[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]]:
+        """
+        The vertices of the outermost convex layers, each counter-clockwise from the least. O(log² n) a vertex.
+        """
+
+    def influence(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        For each vertex the area that goes with it, rounded once. O(log² n) a vertex.
+        """
+
+    def sketch(self, most: int) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))], Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]]:
+        """
+        At most that many vertices, at least 4; and three rows for each edge of theirs beyond which the hull has others: its ends and the farthest of those. O(most log n).
         """
 
     def copy(self) -> Entities:
@@ -355,43 +386,61 @@ class WindowTree(HullTree):
         Raise AssertionError if an invariant of the tree or of the window is broken. O(n log n).
         """
 
-def gnomonic(lonlat: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], lon: float, lat: float, sine: float, cosine: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, 2))], Annotated[NDArray[numpy.bool_], dict(shape=(None,))]]:
+def gnomonic(lonlat: dynhull.arrays.Points, parameters: Any) -> tuple[dynhull.arrays.Points, numpy.typing.NDArray[numpy.bool_]]:
     """
-    The projections of places about a centre, given with the sine and the cosine of its latitude, NaN where there is none; and where there is one.
+    The projections of places, NaN where there is none, and where there is one. The parameters are the centre, and the sine and the cosine of its latitude as sums of two doubles.
     """
 
-class Given:
-    """The pairs of numbers given for places: see dynhull's class in Python."""
+class GlobeTree(HullTree):
+    """Places on the globe and their hull: see dynhull's class."""
 
-    def __init__(self) -> None: ...
+    def __init__(self, center: tuple[float, float] | None = None) -> None: ...
 
     @property
-    def distinct(self) -> int:
-        """The number of different pairs."""
+    def center(self) -> tuple[float, float] | None:
+        """The centre of the projection; None before the first points."""
 
-    def apply(self, ops: Annotated[NDArray[numpy.int8], dict(shape=(None,), order='C', device='cpu', writable=False)], pairs: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], places: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], ignore_missing: bool) -> tuple[Annotated[NDArray[numpy.bool_], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]]:
+    def recenter(self, center: tuple[float, float]) -> None:
         """
-        Add the rows with +1 and take those with -1, as a set. Returns which rows have an effect, and the places whose least pair is another now.
+        Project all places about another centre. ValueError if one is too far; nothing has changed. O(n log n).
         """
 
-    def counts(self, pairs: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], places: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
-        """The number of copies of each row. O(1) a row."""
+    def copy(self) -> GlobeTree:
+        """An independent tree of the same places about the same centre."""
 
-    def at(self, places: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
-        """The least pair at each place. O(1) a row."""
+class GlobeEntities(Entities):
+    """Entities on the globe: see dynhull's class in Python."""
 
-    def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
-        """All pairs in order, with multiplicity. O(n log n)."""
-
-    def clear(self) -> None:
-        """Forget every pair."""
-
-    def copy(self) -> Given:
-        """An independent copy. O(n)."""
+    def __init__(self, key_type: dynhull.keys.KeyType = 'str', ordered: bool = False, center: tuple[float, float] | None = None) -> None: ...
 
     @property
-    def memory(self) -> int:
-        """The bytes that are reserved."""
+    def center(self) -> tuple[float, float] | None:
+        """The centre of the projection; None before the first points."""
+
+    def recenter(self, center: tuple[float, float]) -> None:
+        """
+        Project all places about another centre. ValueError if one is too far; nothing has changed. O(n log n).
+        """
+
+    def copy(self) -> GlobeEntities:
+        """An independent tree of the same places about the same centre."""
+
+class GlobeWindowTree(WindowTree):
+    """A window on the globe: see dynhull's class in Python."""
+
+    def __init__(self, max_age: float | None, max_points: int | None, center: tuple[float, float] | None = None) -> None: ...
+
+    @property
+    def center(self) -> tuple[float, float] | None:
+        """The centre of the projection; None before the first points."""
+
+    def recenter(self, center: tuple[float, float]) -> None:
+        """
+        Project all places about another centre. ValueError if one is too far; nothing has changed. O(n log n).
+        """
+
+    def copy(self) -> GlobeWindowTree:
+        """An independent tree of the same places about the same centre."""
 
 def orientation(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> int:
     """
@@ -409,6 +458,11 @@ def crossing(a: tuple[float, float], b: tuple[float, float], c: tuple[float, flo
 def orientations(a: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], c: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
     """`orientation` of each row of three arrays."""
 
+def turning_if_simple(ring: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> int:
+    """
+    +1 for a ring of corners whose edges meet only at the ends of neighbours, and that has its inside on the left; -1 if on the right; 0 for any other ring.
+    """
+
 def plain_difference_of_products(a: float, b: float, c: float, d: float) -> float:
     """
     a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.
@@ -416,7 +470,7 @@ def plain_difference_of_products(a: float, b: float, c: float, d: float) -> floa
 
 def plain_points(xy: object) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))] | None:
     """
-    A copy of an (n, 2) array of finite doubles without negative zeros; None for any other argument.
+    A copy, without negative zeros, of an (n, 2) array of finite doubles or of a list of pairs of plain numbers; None for any other argument.
     """
 
 def packed_points(packed: bytes) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))] | None:

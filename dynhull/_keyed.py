@@ -1,4 +1,4 @@
-"""KeyedHull: a hull whose points are named by a key."""
+"""Hulls whose points are named by a key: KeyedHull in the plane."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ._base import Hull
+from ._base import Hull, Live
 from ._entities import Entities
 from ._implementation import kernel
 
@@ -38,65 +38,11 @@ class Put(NamedTuple):
     skipped: int
 
 
-class KeyedHull(Hull):
-    """The convex hull of entities, each a point with a key and perhaps a time. Exact for every finite double.
-
-    `put` inserts an entity or moves it, so that a caller need not remember where it was.
-
-    Args:
-        key_type: "str" for strings of 1 to 255 bytes in UTF-8, "int" for integers from 0 to 2**64 - 1.
-        ordered: whether a put that is older than the entity's stored time changes nothing. Every put needs a time then.
-
-    Times are finite numbers in a unit of the caller's choice. Keys are ordered bytewise or by number. A batch is a set:
-    a key comes once, and the order of the rows does not matter. A batch that is refused, whatever the reason, changes
-    nothing. Methods that take keys, points or times raise ValueError or TypeError for bad ones; the message names the
-    first bad row.
-
-    `points`, `locate`, `distance`, `area` and all other reading methods are those of `DynamicHull`, with entities at
-    the same place as copies of one point; only `in` asks for a key.
-
-    >>> fleet = KeyedHull()
-    >>> fleet.put_many(["LH400", "UA17", "AF84"], [[0, 0], [4, 0], [0, 4]])
-    3
-    >>> fleet.put("UA17", 5, 1)
-    True
-    >>> fleet.vertex_keys()
-    ['LH400', 'UA17', 'AF84']
-    >>> fleet.position("UA17")
-    (5.0, 1.0)
-    >>> "UA17" in fleet, len(fleet)
-    (True, 3)
-    """
+class Keyed(Live):
+    """A live hull of entities, each a point with a key and perhaps a time."""
 
     __slots__ = ()
-    _tree_type: ClassVar[type[Entities | _kernel.Entities]] = Entities if kernel is None else kernel.Entities
-
     _tree: Entities | _kernel.Entities
-
-    def __init__(self, key_type: KeyType = "str", *, ordered: bool = False) -> None:
-        if key_type not in ("str", "int"):
-            raise ValueError(f'key_type must be "str" or "int", got {key_type!r}')
-        self._tree = self._tree_type(key_type, bool(ordered))
-        self._measured = (0, {})
-
-    @classmethod
-    def from_entities(
-        cls,
-        keys: Any,
-        xy: npt.ArrayLike,
-        times: npt.ArrayLike | None = None,
-        key_type: KeyType = "str",
-        *,
-        ordered: bool = False,
-    ) -> KeyedHull:
-        """A hull of n entities, as `entities` returns them: a time that is NaN means none. O(n log n).
-
-        Raises:
-            DuplicateKeyError: a key comes twice.
-        """
-        hull = cls(key_type, ordered=ordered)
-        hull._tree.load(keys, xy, times)
-        return hull
 
     @property
     def key_type(self) -> KeyType:
@@ -115,8 +61,8 @@ class KeyedHull(Hull):
 
         Args:
             key: the entity's key.
-            x: the new place.
-            y: the new place.
+            x: the first coordinate of the new place.
+            y: the second.
             time: replaces the entity's time; None leaves it without one.
             only: "absent" to insert and never move, "present" to move and never insert.
         """
@@ -250,6 +196,75 @@ class KeyedHull(Hull):
 
     # As a value
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the other hull holds the same keys at the same places with the same times. O(n log n)."""
+        if not isinstance(other, Keyed):
+            return NotImplemented
+        if not self._same_frame(other) or len(self) != len(other) or self.key_type != other.key_type:
+            return False
+        (keys, xy, times), (other_keys, other_xy, other_times) = self.entities(), other.entities()
+        same_keys = keys == other_keys if self.key_type == "str" else np.array_equal(keys, other_keys)
+        return bool(same_keys) and np.array_equal(xy, other_xy) and np.array_equal(times, other_times, equal_nan=True)
+
+
+class KeyedHull(Keyed, Hull):
+    """The convex hull of entities, each a point with a key and perhaps a time. Exact for every finite double.
+
+    `put` inserts an entity or moves it, so that a caller need not remember where it was.
+
+    Args:
+        key_type: "str" for strings of 1 to 255 bytes in UTF-8, "int" for integers from 0 to 2**64 - 1.
+        ordered: whether a put that is older than the entity's stored time changes nothing. Every put needs a time then.
+
+    Times are finite numbers in a unit of the caller's choice. Keys are ordered bytewise or by number. A batch is a set:
+    a key comes once, and the order of the rows does not matter. A batch that is refused, whatever the reason, changes
+    nothing. Methods that take keys, points or times raise ValueError or TypeError for bad ones; the message names the
+    first bad row.
+
+    `points`, `locate`, `distance`, `area` and all other reading methods are those of `DynamicHull`, with entities at
+    the same place as copies of one point; only `in` asks for a key.
+
+    >>> fleet = KeyedHull()
+    >>> fleet.put_many(["LH400", "UA17", "AF84"], [[0, 0], [4, 0], [0, 4]])
+    3
+    >>> fleet.put("UA17", 5, 1)
+    True
+    >>> fleet.vertex_keys()
+    ['LH400', 'UA17', 'AF84']
+    >>> fleet.position("UA17")
+    (5.0, 1.0)
+    >>> "UA17" in fleet, len(fleet)
+    (True, 3)
+    """
+
+    __slots__ = ()
+    _tree_type: ClassVar[type[Entities | _kernel.Entities]] = Entities if kernel is None else kernel.Entities
+
+    def __init__(self, key_type: KeyType = "str", *, ordered: bool = False) -> None:
+        self._tree = self._tree_type(known_kind(key_type), bool(ordered))
+        self._measured = (0, {})
+
+    @classmethod
+    def from_entities(
+        cls,
+        keys: Any,
+        xy: npt.ArrayLike,
+        times: npt.ArrayLike | None = None,
+        key_type: KeyType = "str",
+        *,
+        ordered: bool = False,
+    ) -> KeyedHull:
+        """A hull of n entities, as `entities` returns them: a time that is NaN means none. O(n log n).
+
+        Raises:
+            DuplicateKeyError: a key comes twice.
+        """
+        hull = cls(key_type, ordered=ordered)
+        hull._tree.load(keys, xy, times)
+        return hull
+
+    # As a value
+
     def __getstate__(self) -> tuple[KeyType, bool, tuple[Keys, Points, npt.NDArray[np.float64]], int]:
         return self.key_type, self.ordered, self.entities(), self.changes
 
@@ -260,18 +275,15 @@ class KeyedHull(Hull):
         self._tree.changes = changes
         self._measured = (changes, {})
 
-    def __eq__(self, other: object) -> bool:
-        """Whether the other hull holds the same keys at the same places with the same times. O(n log n)."""
-        if not isinstance(other, KeyedHull):
-            return NotImplemented
-        if len(self) != len(other) or self.key_type != other.key_type:
-            return False
-        (keys, xy, times), (other_keys, other_xy, other_times) = self.entities(), other.entities()
-        same_keys = keys == other_keys if self.key_type == "str" else np.array_equal(keys, other_keys)
-        return bool(same_keys) and np.array_equal(xy, other_xy) and np.array_equal(times, other_times, equal_nan=True)
-
 
 def _known(only: Only | None) -> Only | None:
     if only not in (None, "absent", "present"):
         raise ValueError(f'only must be None, "absent" or "present", got {only!r}')
     return only
+
+
+def known_kind(key_type: KeyType) -> KeyType:
+    """The kind of keys, checked."""
+    if key_type not in ("str", "int"):
+        raise ValueError(f'key_type must be "str" or "int", got {key_type!r}')
+    return key_type

@@ -147,10 +147,10 @@ class Cursor:
         self.b = self._chain[middle + 1] if middle < self._last else self.a
 
 
-def chain_of(tree: Tree, side: int) -> list[Point]:
-    """The chain of a subtree from left to right. O(log n) a vertex."""
+def chain_of(tree: Tree, side: int, lowest: Point = LOWEST, highest: Point = HIGHEST) -> list[Point]:
+    """The chain of a subtree from left to right, or the part between two of its vertices. O(log n) a vertex."""
     chain: list[Point] = []
-    stack = [(tree, LOWEST, HIGHEST)]
+    stack = [(tree, lowest, highest)]
     while stack:
         node, lowest, highest = stack.pop()
         if isinstance(node, Node):
@@ -163,6 +163,11 @@ def chain_of(tree: Tree, side: int) -> list[Point]:
             part = node.chains[side]
             chain += part[bisect_left(part, lowest) : bisect_right(part, highest)]
     return chain
+
+
+def ring_of(tree: Tree) -> list[Point]:
+    """The vertices of a subtree, counter-clockwise from the least. O(log n) a vertex."""
+    return chain_of(tree, LOWER) + chain_of(tree, UPPER)[-2:0:-1]
 
 
 def bridge(left: Tree, right: Tree, side: int, probes: list[tuple[Edge, Edge]] | None = None) -> Edge:
@@ -263,3 +268,10 @@ def first_point(tree: Tree) -> Point:
     while isinstance(tree, Node):
         tree = tree.left
     return tree.points[0]
+
+
+def last_point(tree: Tree) -> Point:
+    """The greatest point of a subtree. O(log n)."""
+    while isinstance(tree, Node):
+        tree = tree.right
+    return tree.points[-1]

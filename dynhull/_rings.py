@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ._exact import exact
+from ._implementation import kernel
 from ._predicates import Point, orient2d
 from .arrays import as_points, as_tuples, repr_of
 
@@ -65,7 +66,15 @@ def _sequence(values: Any, name: str) -> Iterable[Any]:
 
 
 def _as_polygon(polygon: Any, name: str) -> list[Points]:
-    rings = [_as_ring(ring, f"{name} ring {number}") for number, ring in enumerate(_sequence(polygon, name))]
+    given = list(_sequence(polygon, name))
+    if kernel is not None and len(given) == 1:
+        given = [ring := as_points(given[0], f"{name} ring 0")]
+        if len(ring) > CORNERS_OF_A_RING and tuple(ring[0]) == tuple(ring[-1]):
+            ring = ring[1:]
+        turning = kernel.turning_if_simple(ring)
+        if turning:
+            return [ring if turning > 0 else np.ascontiguousarray(ring[::-1])]
+    rings = [_as_ring(ring, f"{name} ring {number}") for number, ring in enumerate(given)]
     if not rings:
         raise ValueError(f"{name} has no ring: the first one is its exterior")
     _refuse_meeting_edges(rings, name)

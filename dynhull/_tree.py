@@ -9,13 +9,15 @@ updates, early.
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from contextlib import AbstractContextManager, nullcontext
+from itertools import islice, pairwise
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from . import measure
+from ._layers import influence, layers
 from ._nodes import (
     LOWER,
     SIDES,
@@ -30,11 +32,13 @@ from ._nodes import (
     bridge,
     chain_of,
     first_point,
+    ring_of,
     rotate,
     tangent_to_left,
     tangent_to_right,
 )
 from ._predicates import Point, direction_sign, orientation
+from ._sketch import sketch
 from .arrays import Points, as_coordinate, as_points
 
 
@@ -59,6 +63,27 @@ class HullTree:
         if xy is not None:
             self._build(Counter(_tuples(as_points(xy))))
 
+    # What a tree of places on the globe does in its own way: see `_globe_tree`.
+
+    @staticmethod
+    def _as_points(xy: npt.ArrayLike) -> Points:
+        """Points of an argument, checked."""
+        return as_points(xy)
+
+    @staticmethod
+    def _as_point(x: float, y: float) -> Point:
+        """A point of two arguments, checked."""
+        return as_coordinate(x, "x"), as_coordinate(y, "y")
+
+    def _in_frame(
+        self,
+        points: Sequence[Point],  # noqa: ARG002
+        name: str = "points row {}",  # noqa: ARG002
+        inserted: npt.NDArray[np.bool_] | bool = True,  # noqa: ARG002
+    ) -> AbstractContextManager[None]:
+        """A context for a batch that inserts points. ValueError if one of them has no place in the tree."""
+        return nullcontext()
+
     def __len__(self) -> int:
         return self._size
 
@@ -75,7 +100,7 @@ class HullTree:
 
     def count(self, x: float, y: float) -> int:
         """The number of copies of the point. O(log n)."""
-        return self._count(_point(x, y))
+        return self._count(self._as_point(x, y))
 
     def count_many(self, xy: Points) -> npt.NDArray[np.int64]:
         """The number of copies of each row. O(log n) a row."""
@@ -103,13 +128,13 @@ class HullTree:
 
     def insert(self, x: float, y: float) -> bool:
         """Add a point. True if the hull changed. O(log² n)."""
-        changed = self._insert(_point(x, y), 1)
+        changed = self._insert(self._as_point(x, y), 1)
         self.changes += changed
         return changed
 
     def delete(self, x: float, y: float) -> bool:
         """Remove one copy of a point. True if the hull changed; KeyError if the point is missing. O(log² n)."""
-        changed = self._delete(_point(x, y), 1)
+        changed = self._delete(self._as_point(x, y), 1)
         self.changes += changed
         return changed
 
@@ -127,8 +152,12 @@ class HullTree:
         Raises:
             KeyError: x, y and row of the first delete of a missing point; nothing has been applied.
         """
-        points = _tuples(as_points(xy))
+        points = _tuples(self._as_points(xy))
         ops = np.broadcast_to(ops, len(points))
+        with self._in_frame(points, inserted=ops > 0):
+            return self._apply(ops, points, ignore_missing)
+
+    def _apply(self, ops: npt.NDArray[np.int8], points: list[Point], ignore_missing: bool) -> int:
         net = Counter(p for p, op in zip(points, ops.tolist(), strict=True) if op > 0)
         applied = len(points)
         for row in np.flatnonzero(ops < 0).tolist():
@@ -359,7 +388,7 @@ class HullTree:
                 yield from node.points
 
     def _vertices(self) -> list[Point]:
-        return self._chain(LOWER) + self._chain(UPPER)[-2:0:-1]
+        return [] if self._root is None else ring_of(self._root)
 
     def _chain(self, side: int) -> list[Point]:
         return [] if self._root is None else chain_of(self._root, side)
@@ -443,6 +472,27 @@ class HullTree:
         upper, lower = (tangent_to_left(Cursor(root, side), p, SIGNS[side]) for side in SIDES)
         return lower, upper
 
+    # Robust shapes
+
+    def layers(self, count: int) -> list[Points]:
+        """The vertices of the outermost convex layers, each counter-clockwise from the least. O(log² n) a vertex."""
+        return list(map(_array, islice(layers(self._root), count)))
+
+    def influence(self) -> npt.NDArray[np.float64]:
+        """For each vertex the area that goes with it, rounded once. O(log² n) a vertex."""
+        return np.zeros(0) if self._root is None else influence(self._root)
+
+    def sketch(self, most: int) -> tuple[Points, Points]:
+        """At most that many vertices, at least 4, and what is beyond their edges. O(most log n).
+
+        Three rows for each edge beyond which the hull has vertices: the edge's ends, and the farthest of those.
+        """
+        if self._root is None:
+            return _array([]), _array([])
+        ends = self._support((0.0, 1.0)), self._support((0.0, -1.0))
+        vertices, beyond = sketch(self._root, ends, most)
+        return _array(vertices), _array(beyond)
+
     # Verification
 
     def check(self) -> None:
@@ -490,10 +540,6 @@ def _require(condition: bool, what: str) -> None:
     """Assert, also under python -O."""
     if not condition:
         raise AssertionError(what)
-
-
-def _point(x: float, y: float) -> Point:
-    return as_coordinate(x, "x"), as_coordinate(y, "y")
 
 
 def _tuples(xy: Points) -> list[Point]:

@@ -1,63 +1,28 @@
-"""WindowHull: a hull whose points have times, and whose oldest points leave."""
+"""Hulls whose points have times, and whose oldest points leave: WindowHull in the plane."""
 
 from __future__ import annotations
 
-import operator
-import sys
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from ._base import Hull
+from ._base import Hull, Live
 from ._expiry import WindowTree
 from ._hull import MissingPointError
 from ._implementation import kernel
-from .arrays import as_coordinate, as_time
+from .arrays import as_count, as_time
 
 if TYPE_CHECKING:
     from . import _kernel
     from .arrays import Points
 
 
-class WindowHull(Hull):
-    """The convex hull of recent points: those younger than `max_age`, the `max_points` youngest, or both.
-
-    Args:
-        max_age: a finite positive number in the unit of the times. At time t, no point of time t - max_age or before is
-            in the window; the comparison is exact.
-        max_points: an integer, at least 1. The oldest points leave until this many are left; of equally old points, the
-            one that arrived first.
-
-    At least one of the two is required.
-
-    The window has a clock of its own, `now`, the greatest time that it has seen; it never goes back. A real-time window
-    is moved with `advance`.
-
-    Every method raises ValueError or TypeError for bad input, which names the first bad row, and nothing changes. The
-    queries and measures are those of DynamicHull.
-
-    >>> window = WindowHull(max_age=60.0)
-    >>> window.add([[0, 0], [4, 0], [0, 3]], times=[0.0, 10.0, 20.0])
-    3
-    >>> window.area
-    6.0
-    >>> window.advance(60.0)
-    1
-    >>> window.points().tolist(), window.times().tolist()
-    ([[0.0, 3.0], [4.0, 0.0]], [20.0, 10.0])
-    """
+class Windowed(Live):
+    """A live hull of recent points."""
 
     __slots__ = ()
-    _tree_type: ClassVar[type[WindowTree | _kernel.WindowTree]] = WindowTree if kernel is None else kernel.WindowTree
-
     _tree: WindowTree | _kernel.WindowTree
-
-    def __init__(self, max_age: float | None = None, max_points: int | None = None) -> None:
-        if max_age is None and max_points is None:
-            raise ValueError("max_age and max_points are both None: a window needs at least one of them")
-        self._tree = self._tree_type(_as_age(max_age), _as_limit(max_points))
-        self._measured = (0, {})
 
     # Time
 
@@ -155,7 +120,7 @@ class WindowHull(Hull):
         try:
             return self._tree.delete(x, y)
         except KeyError:
-            raise MissingPointError((as_coordinate(x, "x"), as_coordinate(y, "y"))) from None
+            raise MissingPointError(self._as_point(x, y)) from None
 
     def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
         """Remove the oldest copies of points as one batch. Returns the number of points removed. O(log² n) each.
@@ -181,6 +146,56 @@ class WindowHull(Hull):
 
     # As a value
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the other window holds the same points with the same times, limits and present time. O(n log n)."""
+        if not isinstance(other, Windowed):
+            return NotImplemented
+        mine, others = ((w.max_age, w.max_points, w.now, len(w)) for w in (self, other))
+        return (
+            self._same_frame(other)
+            and mine == others
+            and np.array_equal(self.points(), other.points())
+            and np.array_equal(self.times(), other.times())
+        )
+
+
+class WindowHull(Windowed, Hull):
+    """The convex hull of recent points: those younger than `max_age`, the `max_points` youngest, or both.
+
+    Args:
+        max_age: a finite positive number in the unit of the times. At time t, no point of time t - max_age or before is
+            in the window; the comparison is exact.
+        max_points: an integer, at least 1. The oldest points leave until this many are left; of equally old points, the
+            one that arrived first.
+
+    At least one of the two is required.
+
+    The window has a clock of its own, `now`, the greatest time that it has seen; it never goes back. A real-time window
+    is moved with `advance`.
+
+    Every method raises ValueError or TypeError for bad input, which names the first bad row, and nothing changes. The
+    queries and measures are those of DynamicHull.
+
+    >>> window = WindowHull(max_age=60.0)
+    >>> window.add([[0, 0], [4, 0], [0, 3]], times=[0.0, 10.0, 20.0])
+    3
+    >>> window.area
+    6.0
+    >>> window.advance(60.0)
+    1
+    >>> window.points().tolist(), window.times().tolist()
+    ([[0.0, 3.0], [4.0, 0.0]], [20.0, 10.0])
+    """
+
+    __slots__ = ()
+    _tree_type: ClassVar[type[WindowTree | _kernel.WindowTree]] = WindowTree if kernel is None else kernel.WindowTree
+
+    def __init__(self, max_age: float | None = None, max_points: int | None = None) -> None:
+        self._tree = self._tree_type(*checked_limits(max_age, max_points))
+        self._measured = (0, {})
+
+    # As a value
+
     def __getstate__(self) -> tuple[Any, ...]:
         return self.max_age, self.max_points, self._tree.state()
 
@@ -190,16 +205,12 @@ class WindowHull(Hull):
         self._tree.restore(*contents)
         self._measured = (0, {})
 
-    def __eq__(self, other: object) -> bool:
-        """Whether the other window holds the same points with the same times, limits and present time. O(n log n)."""
-        if not isinstance(other, WindowHull):
-            return NotImplemented
-        mine, others = ((w.max_age, w.max_points, w.now, len(w)) for w in (self, other))
-        return (
-            mine == others
-            and np.array_equal(self.points(), other.points())
-            and np.array_equal(self.times(), other.times())
-        )
+
+def checked_limits(max_age: float | None, max_points: int | None) -> tuple[float | None, int | None]:
+    """The limits of a window, checked."""
+    if max_age is None and max_points is None:
+        raise ValueError("max_age and max_points are both None: a window needs at least one of them")
+    return _as_age(max_age), None if max_points is None else as_count(max_points, "max_points", least=1)
 
 
 def _as_age(max_age: float | None) -> float | None:
@@ -209,15 +220,3 @@ def _as_age(max_age: float | None) -> float | None:
     if age <= 0:
         raise ValueError(f"max_age is {age!r}: must be positive")
     return age
-
-
-def _as_limit(max_points: int | None) -> int | None:
-    if max_points is None:
-        return None
-    try:
-        limit = operator.index(max_points)
-    except TypeError:
-        raise TypeError(f"max_points must be an integer, got {max_points!r}") from None
-    if limit < 1:
-        raise ValueError(f"max_points is {limit}: must be at least 1")
-    return min(limit, sys.maxsize)

@@ -1,6 +1,7 @@
 """Input arrays: converted to float64 if that is exact, otherwise refused with an error that names the first bad row."""
 
 import math
+import operator
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -47,6 +48,10 @@ class Checked:
         return np.array(self.points, dtype=dtype, copy=copy)
 
 
+# What `plain_points` may know; not their subclasses, some rows of which may be missing.
+PLAIN_TYPES = frozenset((np.ndarray, list))
+
+
 def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     """Return `xy` as a C-contiguous float64 array of shape (n, 2) with finite entries and no negative zeros.
 
@@ -59,7 +64,7 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
     """
     if type(xy) is Checked:
         return xy.points
-    if type(xy) is np.ndarray and (points := plain_points(xy)) is not None:
+    if type(xy) in PLAIN_TYPES and (points := plain_points(xy)) is not None:
         return points
     return _finite(_as_pairs(xy, name), name)
 
@@ -159,6 +164,22 @@ def as_coordinate(value: Any, name: str) -> float:
     if not math.isfinite(double):
         raise ValueError(f"{name} is {double!r}: coordinates must be finite")
     return double + 0.0
+
+
+def as_count(value: Any, name: str, least: int = 0) -> int:
+    """Return an integer as an int, the largest possible one for a larger one.
+
+    Raises:
+        ValueError: it is less than `least`.
+        TypeError: it is not an integer.
+    """
+    try:
+        count = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {value!r}") from None
+    if count < least:
+        raise ValueError(f"{name} is {count}: must be at least {least}")
+    return min(count, sys.maxsize)
 
 
 def as_operations(ops: npt.ArrayLike, rows: int) -> npt.NDArray[np.int8]:
@@ -313,11 +334,14 @@ def _as_double_scalar(value: Any, name: str, kind: str = "coordinates") -> float
     return double
 
 
-def plain_points(xy: npt.NDArray[Any]) -> Points | None:
-    """The copy that `as_points` returns for an (n, 2) array of finite doubles; None for any other array."""
+def plain_points(xy: Any) -> Points | None:
+    """The copy that `as_points` returns for an (n, 2) array of finite doubles; None for any other array.
+
+    With the kernel, also for a list of pairs of numbers; perhaps None for any list.
+    """
     if kernel is not None:
         return kernel.plain_points(xy)
-    if xy.dtype != np.float64 or xy.ndim != 2 or xy.shape[1] != 2:
+    if isinstance(xy, list) or xy.dtype != np.float64 or xy.ndim != 2 or xy.shape[1] != 2:
         return None
     copy = _copy(xy)
     return copy if np.isfinite(copy).all() else None

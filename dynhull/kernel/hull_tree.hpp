@@ -2,8 +2,9 @@
 // algorithm.
 //
 // Reading order: predicates/ (exact signs), tree/ (leaves, bridges, single updates), batch/ (many updates at once),
-// this file, query/. keyed/ names points by keys, fence/ compares them with areas, window/ has the order in which
-// points expire. sort/ and memory/ serve them, static/ has the hulls of fixed points, python/ the bindings.
+// this file, query/. globe/ takes places on the globe to the plane, keyed/ names points by keys, fence/ compares them
+// with areas, window/ has the order in which points expire. sort/ and memory/ serve them, static/ has the hulls of
+// fixed points, python/ the bindings.
 #pragma once
 
 #include <optional>
@@ -116,6 +117,14 @@ class HullTree {
     return {groups.rows_applied, groups.first_missing};
   }
 
+  // Takes over the points of another tree.
+  void become(HullTree other) {
+    other.changes = changes;
+    other.version_ = version_;
+    other.changed();
+    *this = std::move(other);
+  }
+
   // Calls `work` while a point that is there once is away.
   template <class Work>
   void without(Point p, Work work) {
@@ -140,7 +149,7 @@ class HullTree {
   // The vertices of one side, left to right. O(h log n).
   std::vector<Point> chain(Side side) const {
     std::vector<Point> points;
-    collect(nodes_.root, side, LOWEST, HIGHEST, points);
+    collect(nodes_, nodes_.root, side, LOWEST, HIGHEST, points);
     return points;
   }
 
@@ -152,11 +161,7 @@ class HullTree {
   Applied fill(const Point* points, std::size_t count) {
     const Distinct distinct(points, count);
     if (!distinct.finite()) throw NotFinite();
-    HullTree full(distinct);
-    full.changes = changes;
-    full.version_ = version_;
-    full.changed();
-    *this = std::move(full);
+    become(HullTree(distinct));
     return {static_cast<std::int64_t>(count), -1};
   }
 
@@ -264,38 +269,18 @@ class HullTree {
       visit(leaf[i], leaf.repeated & bit(i) ? copies_.find(leaf[i])->second : std::uint64_t{1});
   }
 
-  void collect(Ref tree, Side side, Point lowest, Point highest, std::vector<Point>& points) const {
-    collect(nodes_, tree, side, lowest, highest, points);
-  }
-  static void collect(const Nodes& nodes, Ref tree, Side side, Point lowest, Point highest,
-                      std::vector<Point>& points) {
-    if (tree == NONE) return;
-    if (!is_leaf(tree)) {
-      const Edge& edge = nodes.bridge(tree, side);
-      const Node& node = nodes.node(tree);
-      if (edge.a >= lowest) collect(nodes, node.child[0], side, lowest, std::min(edge.a, highest), points);
-      if (edge.b <= highest) collect(nodes, node.child[1], side, std::max(edge.b, lowest), highest, points);
-      return;
-    }
-    const Leaf& leaf = nodes.leaf(tree);
-    for (Mask mask = leaf.chain[side]; mask; mask &= mask - 1) {
-      const Point p = leaf[dynhull::lowest(mask)];
-      if (p >= lowest && p <= highest) points.push_back(p);
-    }
-  }
-
   Nodes nodes_;
   Copies copies_;
   std::size_t size_ = 0, distinct_ = 0;
   std::uint64_t version_ = 0;
 };
 
-// Counter-clockwise from the least.
-inline std::vector<Point> vertices_of(const HullTree& tree) {
-  std::vector<Point> vertices = tree.chain(LOWER);
-  const std::vector<Point> upper = tree.chain(UPPER);
-  if (upper.size() > 2) vertices.insert(vertices.end(), upper.rbegin() + 1, upper.rend() - 1);
-  return vertices;
+// Both chains as one ring, counter-clockwise from the least.
+inline std::vector<Point> ring_of(std::vector<Point> lower, const std::vector<Point>& upper) {
+  if (upper.size() > 2) lower.insert(lower.end(), upper.rbegin() + 1, upper.rend() - 1);
+  return lower;
 }
+
+inline std::vector<Point> vertices_of(const HullTree& tree) { return ring_of(tree.chain(LOWER), tree.chain(UPPER)); }
 
 }  // namespace dynhull

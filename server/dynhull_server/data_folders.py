@@ -54,7 +54,7 @@ def export_hull(data: Path, name: str, file: Path) -> None:
             typer.echo(note, err=True)
         contents = replayed(kept, row.settings).stored()
         with progress_bar("points") as progress:
-            WRITERS[file.suffix](file, contents, progress)
+            WRITERS[file.suffix](file, contents, progress, geographic=row.settings.geographic)
     typer.echo(f"{file}: {len(contents):,} points of {name} at revision {kept.last_revision}")
 
 

@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dynhull.arrays import Points
 from dynhull.keys import PackedKeys, key_list
 
 from .state.records import FOREVER, NO_TIME, Contents, Times
 from .storage.port import Progress
 
 ROWS_A_STEP = 100_000
+HALF_TURN = 180.0
 LARGEST_JSON_INTEGER = 2**53  # readers with doubles for numbers round larger ones
 
 
-def write_csv(file: Path, contents: Contents, progress: Progress) -> None:
-    """Write columns key, x, y, time and expires, those that the hull has; string keys in quotes."""
+def write_csv(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
+    """Write columns key, x, y (lon, lat), time and expires, those that the hull has; string keys in quotes."""
     with file.open("w", encoding="utf-8", newline="") as out:
-        out.write(",".join(_names(contents)) + "\n")
+        out.write(",".join(_names(contents, geographic=geographic)) + "\n")
         for part in _parts(contents, progress):
             columns: list[list[str]] = []
             if part.keys is not None:
@@ -30,8 +32,10 @@ def write_csv(file: Path, contents: Contents, progress: Progress) -> None:
             out.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
-def write_geojson(file: Path, contents: Contents, progress: Progress) -> None:
+def write_geojson(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
     """Write a feature for each point: its key as the id, its times as the properties time and expires.
+
+    Longitudes of a geographic hull beyond 180 degrees are written as the same place within (RFC 7946).
 
     Integer keys above 2**53 are written as strings, because some readers of JSON would round the numbers.
     """
@@ -39,21 +43,21 @@ def write_geojson(file: Path, contents: Contents, progress: Progress) -> None:
         out.write('{"type": "FeatureCollection", "features": [\n')
         between = ""
         for part in _parts(contents, progress):
-            for feature in _features(part):
+            for feature in _features(part, geographic=geographic):
                 out.write(between + json.dumps(feature))
                 between = ",\n"
         out.write("\n]}\n")
 
 
-def write_parquet(file: Path, contents: Contents, progress: Progress) -> None:
-    """Write columns key (string or uint64), x, y, time and expires (timestamps in UTC), those that the hull has."""
+def write_parquet(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
+    """Write columns key (string or uint64), x, y (lon, lat), time and expires (UTC), those that the hull has."""
     import pyarrow as pa  # slow to load, and only this format needs it
     import pyarrow.parquet as pq
 
     key = pa.string() if isinstance(contents.keys, PackedKeys) else pa.uint64()
-    types = {"key": key, "x": pa.float64(), "y": pa.float64()}
+    types = {"key": key, **dict.fromkeys(_axes(geographic=geographic), pa.float64())}
     time = pa.timestamp("us", tz="UTC")
-    schema = pa.schema([(name, types.get(name, time)) for name in _names(contents)])
+    schema = pa.schema([(name, types.get(name, time)) for name in _names(contents, geographic=geographic)])
     with pq.ParquetWriter(file, schema) as out:
         for part in _parts(contents, progress):
             columns = [] if part.keys is None else [_arrow_keys(part.keys)]
@@ -65,8 +69,13 @@ def write_parquet(file: Path, contents: Contents, progress: Progress) -> None:
 WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".geojson": write_geojson}
 
 
-def _names(contents: Contents) -> list[str]:
-    columns = {"key": contents.keys, "x": True, "y": True, "time": contents.times, "expires": contents.deadlines}
+def _axes(*, geographic: bool) -> tuple[str, str]:
+    return ("lon", "lat") if geographic else ("x", "y")
+
+
+def _names(contents: Contents, *, geographic: bool) -> list[str]:
+    axes = dict.fromkeys(_axes(geographic=geographic), True)
+    columns = {"key": contents.keys, **axes, "time": contents.times, "expires": contents.deadlines}
     return [name for name, column in columns.items() if column is not None]
 
 
@@ -78,14 +87,22 @@ def _parts(contents: Contents, progress: Progress) -> Iterator[Contents]:
         yield Contents(contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines)
 
 
-def _features(part: Contents) -> Iterator[dict[str, Any]]:
-    points = part.points.tolist()
+def _features(part: Contents, *, geographic: bool) -> Iterator[dict[str, Any]]:
+    points = (_within_180(part.points) if geographic else part.points).tolist()
     ids = [{}] * len(points) if part.keys is None else [{"id": _json_key(key)} for key in key_list(part.keys)]
     times, expires = ([""] * len(points) if each is None else _texts(each) for each in (part.times, part.deadlines))
     for point, of_key, *dates in zip(points, ids, times, expires, strict=True):
         properties = {name: text for name, text in zip(("time", "expires"), dates, strict=True) if text}
         geometry = {"type": "Point", "coordinates": point}
         yield {"type": "Feature", **of_key, "properties": properties, "geometry": geometry}
+
+
+def _within_180(lonlat: Points) -> Points:
+    """The same places with longitudes from -180 to 180. Exact (Sterbenz 1974)."""
+    wrapped = lonlat.copy()
+    wrapped[lonlat[:, 0] > HALF_TURN, 0] -= 2 * HALF_TURN
+    wrapped[lonlat[:, 0] < -HALF_TURN, 0] += 2 * HALF_TURN
+    return wrapped
 
 
 def _quoted(text: str) -> str:

@@ -68,6 +68,13 @@ LOADS = [
         "load {name} points.csv --key x --expires y",
     ),
     ("query loaded vertices --keys", "leave out --keys", "query loaded vertices"),
+    ("load {name} world.csv", "--replace --plane loads", "load {name} world.csv --replace --plane"),
+    (
+        "load {name} world.csv",
+        "`dynhull create NAME --geographic --center LON,LAT` makes",
+        "create {name}-2 --geographic --center 80,40; load {name}-2 half.csv",
+    ),
+    ("create {name} --center 1,2", "--center is given with --geographic", "create {name} --geographic --center 1,2"),
     ("insert {name} 1,2", "`dynhull list`", "list"),
     ("insert {name} 1,2", "`dynhull create`", "create {name}; insert {name} 1,2"),
     ("insert loaded", "as lines of standard input", "insert loaded -1,2"),
@@ -111,6 +118,8 @@ def files(tmp_path, monkeypatch):
         "years.csv": "name,2020,2021\na,1,2\nb,3,4\n",
         "named.csv": "a,b\n1,2\n3,4\n",
         "bad.csv": COMMA + "5,six\n",
+        "half.csv": "lon,lat\n0,40\n160,40\n",
+        "world.csv": "lon,lat\n0,40\n160,40\n20,-50\n",
         "line.ndjson": json.dumps(LINE),
     }.items():
         Path(file).write_text(text)

@@ -109,6 +109,8 @@ class Scene:
     length = 2
     circles: ClassVar = {}
     rivals = None
+    center = None
+    area_scale = 1.0
 
     def frames(self) -> Iterator[Frame]:
         sent = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

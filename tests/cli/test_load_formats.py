@@ -136,6 +136,8 @@ def test_what_may_surprise_is_said(tmp_path, name, content, options, points, sai
         ("a.csv.gz", gzip.compress(b"x,y\n" + bytes(99))[:20] + bytes(99), [], "the compressed data is damaged"),
         ("a.csv", "x,y\n1,2\n", ["--x", "3", "--y", "1"], "has no column '3' (--x); it has x, y"),
         ("a.csv", f"x,y\n1,2\n{'3' * 200_000},4\n", [], "a.csv, line 3: field larger than field limit"),
+        ("a.csv", 'x,y\n1,2\n"3,4\n5,6\n7,8', [], "a.csv, line 3: a quote is opened and not closed before the end"),
+        ("a.csv", '"x,y\n1,2\n', [], "a.csv, line 1: a quote is opened and not closed before the end"),
     ],
     ids=count(),
 )

@@ -146,6 +146,9 @@ def test_a_window_by_event_time(client: HullClient, name: str) -> None:
     there = client.entities(name)
     assert list(there.keys) == ["AF84", "BA2", "LH400"]  # UA17 is ten minutes old
     assert there.times.tolist() == [each.replace(tzinfo=None) for each in (minutes[2], minutes[3], later.clock)]
+    found = client.positions(name, ["nobody", "BA2"])
+    assert found.times is not None
+    assert (found.times[1].item(), np.isnat(found.times[0])) == (minutes[3].replace(tzinfo=None), True)
     assert client.put(name, ["late"], [[9, 9]], [NOON]).late == 1
 
 

@@ -22,6 +22,7 @@ EXPORTED = [
     "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncIngest",
+    "AsyncPipeline",
     "AsyncWatch",
     "AsyncWriter",
     "Batch",
@@ -69,6 +70,7 @@ EXPORTED = [
     "OutcomeUnknownError",
     "PermissionDeniedError",
     "Phases",
+    "Pipeline",
     "PointMissingError",
     "Points",
     "Polygon",
@@ -83,6 +85,7 @@ EXPORTED = [
     "SequenceGapError",
     "Sketch",
     "Snapshot",
+    "StaleCopyError",
     "SubjectsInside",
     "Supported",
     "Tangents",
@@ -158,7 +161,7 @@ def test_answers_are_values(client: HullClient, name: str) -> None:
 def test_answers_print_on_a_line(client: HullClient, name: str, address: str) -> None:
     shown = (
         "Snapshot(revision=1, points=2, vertices=[[0.0, 1.0]], measures=None, uid='u', "
-        "vertex_keys=None, cause='batch', clock=None)"
+        "vertex_keys=None, cause='batch', clock=None, center=None)"
     )
     assert repr(Snapshot(1, 2, np.array([[0.0, 1.0]]), None, "u")) == shown
     client.apply(name, insert=[[i, i * i] for i in range(100)])

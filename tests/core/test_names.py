@@ -16,15 +16,21 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library.md"
 PACKAGES = {
     "dynhull": {
         *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d"),
-        *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings", "GeoHull"),
-        *("arrays", "keys", "measure", "static"),  # imported with it
+        *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings"),
+        *("GeoHull", "GeoKeyedHull", "GeoWindowHull"),
+        *("arrays", "keys", "measure", "robust", "static"),  # imported with it
     },
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
+    "dynhull.globe": {
+        *("REACH", "Gnomonic", "area", "as_center", "as_lonlat", "boundary"),
+        *("diameter", "distance", "geojson", "perimeter"),
+    },
     "dynhull.gjk": {"Contact", "contact", "distance_many", "intersect", "intersect_many"},
     "dynhull.measure": {
         *("area", "bounds", "centroid", "diameter", "distance", "intersect_lines"),
         *("min_box", "min_circle", "min_perimeter_box", "perimeter", "width"),
     },
+    "dynhull.robust": {"depth", "nearest_points"},
     "dynhull.static": {
         *("HullND", "chan", "convex_hull", "graham_scan", "hull_nd", "jarvis_march", "monotone_chain"),
         "trace",

@@ -1,12 +1,14 @@
 """Write a data folder with the installed version: a fixture for the versions after it, which must open it.
 
-    python tests/data/make_folder.py tests/data/format3
+    python tests/data/make_folder.py tests/data/format4
 
 By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
 the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
-of each hull, as that version exports them, with keys and times.
+of each hull, as that version exports them, with keys and times; the JSON files have the events of fences, and who is
+inside.
 """
 
+import json
 import shutil
 import subprocess
 import sys
@@ -17,7 +19,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 
-from dynhull_client import HullClient
+from dynhull_client import Circle, HullClient, Prefix
 from dynhull_proto.v1 import hull_pb2, hull_service_pb2, hull_service_pb2_grpc
 
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
@@ -92,8 +94,30 @@ def fill_keyed(client):
         client.put("tracks", [second, 2**64 - 1], [[second, 0], [0, second]], times=[MOMENT + second * SECOND] * 2)
 
 
+def fill_fences(client):
+    """A fence around each kind of area, with events, and a consumer that has acknowledged some of them."""
+    client.create_fence("gate", area=[(0, 0), (9, 0), (9, 9), (0, 9)], subjects="vans", margin=1, dwell=0.001)
+    client.create_fence("yard", area=Circle(0, 5, 6), subjects="tracks", initial="events", crosses=True)
+    client.create_fence("pack", area="zones/a", subjects=Prefix("va"), initial="none")
+    client.put("vans", ["van é1", "van é3"], [[9.5, 4], [-9, -9]], times=[MOMENT + SECOND] * 2)
+    client.put("vans", ["van é1", "van é5"], [[10.5, 4], [1, 1]], times=[MOMENT + 2 * SECOND] * 2)
+    client.ack_fence("gate", "relay", 2)
+
+
+def export_fences(client, target):
+    found = {
+        fence.name: {
+            "inside": {each.hull: list(map(str, each.keys)) for each in client.fence_inside(fence.name).subjects},
+            "last": fence.last_sequence,
+            "consumers": {each.name: each.acknowledged for each in fence.consumers},
+        }
+        for fence in client.list_fences()
+    }
+    target.with_name(f"{target.name}-fences.json").write_text(json.dumps(found, indent=1, ensure_ascii=False))
+
+
 def take(data, target):
-    target.mkdir(parents=True)
+    target.mkdir(parents=True, exist_ok=True)
     for name in FILES:
         if (data / name).exists():
             shutil.copyfile(data / name, target / name)
@@ -107,15 +131,20 @@ def export(data, target):
 def main():
     target = Path(sys.argv[1])
     data = target / "work"
+    target.mkdir(parents=True, exist_ok=True)
     with served(data) as (_, address, client):
         fill(data, address, client)
+        fill_fences(client)
+        export_fences(client, target / "stopped")
     take(data, target / "stopped")
     export(data, target / "stopped")
     with served(data) as (process, _, client):
         insert_and_delete(client, "bus", 5, 7)
         client.apply("zones/a", insert=[(7, 7)], producer="truck", sequence=2)
         client.put("vans", ["van é0"], [[5, 5]], times=[MOMENT + 2 * SECOND], producer="gate", sequence=2)
+        client.put("vans", ["van é0"], [[-5, 5]], times=[MOMENT + 3 * SECOND])
         export(data, target / "killed")
+        export_fences(client, target / "killed")
         process.kill()
         process.wait()
         take(data, target / "killed")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hulls import KEYED_HULLS
 
-from dynhull import Crossings, FenceIndex
+from dynhull import Crossings, FenceIndex, _rings
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 HOLE = [[1, 1], [2, 1], [2, 2], [1, 2]]
@@ -257,3 +257,28 @@ def test_bad_arguments(make):
         with pytest.raises(error, match=re.escape(message)):
             call()
     assert len(index) == 0
+
+
+@pytest.mark.skipif(_rings.kernel is None, reason="there is no kernel")
+def test_the_kernel_accepts_the_rings_that_the_reference_accepts(monkeypatch):
+    """Rings on a small grid: most of them cross, touch, overlap or repeat corners."""
+    random = np.random.default_rng(3)
+    accepted = 0
+    for _ in range(3000):
+        ring = random.integers(0, 4, (random.integers(2, 7), 2)).astype(float)
+        if random.random() < 0.3:
+            ring = np.vstack([ring, ring[:1]])
+        found = [_outcome(ring)]
+        with monkeypatch.context() as context:
+            context.setattr(_rings, "kernel", None)
+            found.append(_outcome(ring))
+        assert found[0] == found[1], ring
+        accepted += isinstance(found[0], list)
+    assert accepted > 300
+
+
+def _outcome(ring):
+    try:
+        return [each.tolist() for each in _rings.as_polygons([[ring]])[0]]
+    except ValueError as error:
+        return str(error)

@@ -8,7 +8,7 @@ from pyproj import Geod
 from dynhull import DynamicHull, GeoHull
 
 WGS84 = Geod(ellps="WGS84")
-# Below this, the determinant of three directions may have another sign in the projection: places are rounded to 3 nm.
+# Below this, the determinant of three directions may have another sign in the projection: places are rounded to 2 nm.
 DOUBTFUL = 1e-14
 
 AIRPORTS = {

@@ -4,7 +4,7 @@ from math import inf, nextafter
 
 import numpy as np
 import pytest
-from globes import DIGITS, EARTH_RADIUS, around, projection, random_center
+from globes import DIGITS, EARTH_RADIUS, around, directions, projection, random_center
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,7 +31,7 @@ def rounded_off(degrees, center, place):
 
 
 # How far from the centre; what may be rounded off in the plane of the projection, and on the ground: docs/maps.md.
-@pytest.mark.parametrize(("degrees", "plane", "ground"), [(0, 0.001, 0.001), (10, 1, 1), (45, 4, 3), (80, 100, 3)])
+@pytest.mark.parametrize(("degrees", "plane", "ground"), [(0, 0.001, 0.001), (10, 0.5, 0.5), (45, 3, 2), (80, 30, 2)])
 def test_nanometres(degrees, plane, ground):
     rng = np.random.default_rng(degrees)
     for _ in range(400):
@@ -47,15 +47,15 @@ def test_nanometres(degrees, plane, ground):
 
 @given(ANGLES)
 def test_sines_and_cosines(angle):
-    """Within 0.6 units in the last place, beside the rounding of fifty digits."""
-    sine, cosine = (float(value[0]) for value in sin_cos(np.array([angle])))
+    """Within 0.7 units in the last place, beside the rounding of fifty digits."""
+    sine, cosine = (float(value[0]) for value, _ in sin_cos(np.array([angle])))
     for found, exact in ((sine, DIGITS.sin), (cosine, DIGITS.cos)):
         value = exact(DIGITS.radians(DIGITS.mpf(angle)))
-        assert abs(found - value) <= 0.6 * (nextafter(abs(found), inf) - abs(found)) + 1e-45
+        assert abs(found - value) <= 0.7 * (nextafter(abs(found), inf) - abs(found)) + 1e-45
 
 
 def test_quarter_turns_are_exact():
-    sine, cosine = sin_cos(np.array([-180.0, -90, 0, 90, 180]))
+    (sine, _), (cosine, _) = sin_cos(np.array([-180.0, -90, 0, 90, 180]))
     assert (sine + 0.0).tolist() == [0, -1, 0, 1, 0]
     assert (cosine + 0.0).tolist() == [-1, 0, 1, 0, -1]
 
@@ -96,3 +96,23 @@ def test_the_meridian_of_the_centre_and_its_equator_are_straight(lon, steps):
 def test_the_centre_of_a_set_does_not_depend_on_its_order(places, random):
     shuffled = random.sample(places, len(places))
     assert Gnomonic.about(np.array(places)).center == Gnomonic.about(np.array(shuffled)).center
+
+
+@given(st.tuples(ANGLES, latitudes), st.integers(0, 2**32))
+def test_there_and_back(center, seed):
+    frame = Gnomonic(center)
+    places = around(np.random.default_rng(seed), center, 84, 20)
+    back = frame.unproject(frame.project_all(places))
+    assert np.abs(directions(back) - directions(places)).max() < 1e-15 * 4
+    assert (np.abs(back[:, 0]) <= 180).all()
+
+
+def test_places_that_have_no_projection_are_named():
+    frame = Gnomonic((190.0, 10.0))
+    assert frame.center == (-170.0, 10.0)
+    with pytest.raises(
+        ValueError, match=r"corners row 1 is \(0\.0, 0\.0\): 165\.\d+ degrees from the centre \(-170\.0"
+    ):
+        frame.project_all(np.array([(180.0, 0.0), (0.0, 0.0)]), "corners")
+    with pytest.raises(ValueError, match="a latitude must be"):
+        Gnomonic((0.0, 91.0))

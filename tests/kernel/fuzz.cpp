@@ -11,26 +11,10 @@
 #include <random>
 
 #include "../../dynhull/kernel/check.hpp"
+#include "../../dynhull/kernel/query/layers.hpp"
 #include "../../dynhull/kernel/query/queries.hpp"
+#include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
-
-namespace {
-
-long allocations_left = -1;  // until one fails; negative: none does
-bool fails() { return allocations_left >= 0 && allocations_left-- == 0; }
-
-}  // namespace
-
-bool dynhull::allocation_fails() { return fails(); }
-
-void* operator new(std::size_t size) {
-  void* memory = fails() ? nullptr : std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return fails() ? nullptr : std::malloc(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 
@@ -274,6 +258,45 @@ class Life {
       if (sign > 0 || (sign == 0 && edge.a < best)) best = edge.a;
     }
     require(support(tree_.nodes(), p) == best, "support is wrong");
+    if (below(8) == 0) peel();
+  }
+
+  static std::vector<Point> ring_of(const Model& model) {
+    std::vector<Point> ring = chain_of(model, LOWER);
+    const std::vector<Point> upper = chain_of(model, UPPER);
+    if (upper.size() > 2) ring.insert(ring.end(), upper.rbegin() + 1, upper.rend() - 1);
+    return ring;
+  }
+  static void add_area(ExactSum<2>& doubled, int sign, const std::vector<Point>& ring) {
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const Point p = ring[i], q = ring[(i + 1) % ring.size()];
+      doubled.add(sign, {p.x, q.y});
+      doubled.add(-sign, {p.y, q.x});
+    }
+  }
+
+  void peel() {
+    const std::size_t most = 1 + below(8);
+    std::vector<std::vector<Point>> layers;
+    std::vector<double> areas;
+    with_failures([&] { layers = layers_of(tree_, most); });
+    with_failures([&] { areas = influence_of(tree_); });
+    Model rest = model_;
+    for (const std::vector<Point>& layer : layers) {
+      require(layer == ring_of(rest), "a layer is wrong");
+      for (Point p : layer) rest.erase(p);
+    }
+    require(layers.size() == most || rest.empty(), "a layer is missing");
+    const std::vector<Point> ring = ring_of(model_);
+    require(areas.size() == ring.size(), "a vertex has no influence");
+    if (ring.empty()) return;
+    const std::size_t i = below(ring.size());
+    Model without = model_;
+    without.erase(ring[i]);
+    ExactSum<2> doubled;
+    add_area(doubled, +1, ring);
+    add_area(doubled, -1, ring_of(without));
+    require(areas[i] == half_of(doubled), "an influence is wrong");
   }
 
   void ask_about_point(Point p, const std::vector<Edge>& around) {

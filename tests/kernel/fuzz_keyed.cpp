@@ -12,25 +12,8 @@
 
 #include "../../dynhull/kernel/check.hpp"
 #include "../../dynhull/kernel/keyed/entities.hpp"
+#include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
-
-namespace {
-
-long allocations_left = -1;  // until one fails; negative: none does
-bool fails() { return allocations_left >= 0 && allocations_left-- == 0; }
-
-}  // namespace
-
-bool dynhull::allocation_fails() { return fails(); }
-
-void* operator new(std::size_t size) {
-  void* memory = fails() ? nullptr : std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return fails() ? nullptr : std::malloc(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 
@@ -160,7 +143,7 @@ class Life {
   template <class Update>
   void with_failures(Update update) {
     if (below(3) == 0) {
-      const std::uint64_t changes = tree_.changes;
+      const std::uint64_t changes = tree_.changes();
       allocations_left = static_cast<long>(below(20));
       bool failed = false;
       try {
@@ -173,7 +156,7 @@ class Life {
       }
       allocations_left = -1;
       if (!failed) return;
-      require(tree_.changes == changes, "a failed allocation changed the hull");
+      require(tree_.changes() == changes, "a failed allocation changed the hull");
       check();
     }
     update();
@@ -207,7 +190,7 @@ class Life {
     }
     try {
       with_keys(rows, [&](const auto& keys) {
-        Puts puts(places.data(), timed ? times.data() : nullptr, false, rows.size());
+        Puts puts(tree_.frame(), places.data(), timed ? times.data() : nullptr, false, rows.size());
         const Counts counts = entities_->put(tree_, keys, puts, only);
         require(counts.fresh == expected.fresh && counts.moved == expected.moved &&
                     counts.unmoved == expected.unmoved && counts.stale == expected.stale &&
@@ -286,7 +269,7 @@ class Life {
 
   // Names of the vertices, and of any places.
   void name() {
-    std::vector<Point> places = tree_.chain(UPPER), lower = tree_.chain(LOWER);
+    std::vector<Point> places = tree_.plane().chain(UPPER), lower = tree_.plane().chain(LOWER);
     places.insert(places.end(), lower.begin(), lower.end());
     for (std::uint64_t i = below(2) * below(5); i > 0; --i) places.push_back(point());
     if (!entities_->named(tree_, places)) with_failures([&] { entities_->name(tree_); });
@@ -310,7 +293,7 @@ class Life {
   }
 
   void check() {
-    const Check checked(tree_);
+    tree_.check();
     entities_->check(tree_);
     require(entities_->size() == model_.size(), "an entity too many or too few");
     auto entry = model_.begin();
@@ -332,7 +315,7 @@ class Life {
   std::uint64_t kind_, times_;
   bool always_timed_;
   std::uint64_t keys_;
-  HullTree tree_;
+  FramedTree tree_;
   std::unique_ptr<Entities> entities_;
   Model model_;
   std::uint64_t now_ = 0;

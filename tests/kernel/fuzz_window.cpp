@@ -9,25 +9,8 @@
 
 #include "../../dynhull/kernel/check.hpp"
 #include "../../dynhull/kernel/window/expiry.hpp"
+#include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
-
-namespace {
-
-long allocations_left = -1;  // until one fails; negative: none does
-bool fails() { return allocations_left >= 0 && allocations_left-- == 0; }
-
-}  // namespace
-
-bool dynhull::allocation_fails() { return fails(); }
-
-void* operator new(std::size_t size) {
-  void* memory = fails() ? nullptr : std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return fails() ? nullptr : std::malloc(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 
@@ -95,7 +78,7 @@ class WindowLife {
   template <class Update>
   void with_failures(Update update) {
     if (random_.below(3) == 0) {
-      const std::uint64_t changes = tree_.changes;
+      const std::uint64_t changes = tree_.changes();
       allocations_left = static_cast<long>(random_.below(14));
       bool failed = false;
       try {
@@ -105,7 +88,7 @@ class WindowLife {
       }
       allocations_left = -1;
       if (!failed) return;
-      require(tree_.changes == changes, "a failed allocation changed the hull");
+      require(tree_.changes() == changes, "a failed allocation changed the hull");
       check();
     }
     update();
@@ -207,7 +190,7 @@ class WindowLife {
     Expiry other = expiry_;
     if (random_.below(2) == 0)
       with_failures([&] {
-        HullTree empty;
+        FramedTree empty;
         other = Expiry(max_age_, max_points_);
         other.restore(empty, points.data(), times.data(), points.size(), now_);
       });
@@ -218,7 +201,7 @@ class WindowLife {
   }
 
   void check() {
-    const Check checked(tree_);
+    tree_.check();
     expiry_.check(tree_);
     std::vector<Dated> expected = model_;
     std::sort(expected.begin(), expected.end());
@@ -239,7 +222,7 @@ class WindowLife {
   std::size_t max_points_;
   std::uint64_t clock_ = 0, arrivals_ = 0, expired_ = 0, evicted_ = 0, late_ = 0;
   double now_ = Expiry::NEVER;
-  HullTree tree_;
+  FramedTree tree_;
   Expiry expiry_;
   std::vector<Dated> model_;
 };

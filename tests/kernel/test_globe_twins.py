@@ -1,13 +1,13 @@
-"""Projections and given pairs on the kernel and in the reference: the same to the last bit."""
+"""Projections and trees on the globe, on the kernel and in the reference: the same to the last bit, errors and all."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from globes import around
+from hypothesis import given
 from hypothesis import strategies as st
 
-from dynhull import _kernel
-from dynhull._given import Given
-from dynhull._globe import Gnomonic
+from dynhull import _globe_tree, _kernel
+from dynhull._globe import Gnomonic, parameters
 
 longitudes = st.one_of(st.sampled_from([-360.0, -180.0, 0.0, 5e-324, 45.0, 90.0, 180.0, 360.0]), st.floats(-360, 360))
 latitudes = st.one_of(st.sampled_from([-90.0, 0.0, 45.0, 90.0, 1e-300]), st.floats(-90, 90))
@@ -16,7 +16,7 @@ latitudes = st.one_of(st.sampled_from([-90.0, 0.0, 45.0, 90.0, 1e-300]), st.floa
 def assert_same_projection(center, places):
     frame = Gnomonic(center)
     expected, expected_near = frame._project(places)
-    found, near = _kernel.gnomonic(places, *center, frame._sin, frame._cos)
+    found, near = _kernel.gnomonic(places, parameters(center))
     assert near.tolist() == expected_near.tolist()
     assert found[near].tobytes() == expected[near].tobytes()
     assert np.isnan(found[~near]).all()
@@ -34,55 +34,180 @@ def test_many_projections():
         assert_same_projection((float(rng.uniform(-180, 180)), float(rng.uniform(-90, 90))), places)
 
 
-def outcome(function, *arguments):
+class Both:
+    """Two trees of one kind that are asked the same."""
+
+    def __init__(self, kind, *arguments):
+        self.reference, self.kernel = getattr(_globe_tree, kind)(*arguments), getattr(_kernel, kind)(*arguments)
+
+    def __call__(self, method, *arguments):
+        expected, answer = (outcome(getattr(each, method), *arguments) for each in (self.reference, self.kernel))
+        if isinstance(expected, tuple):
+            for one, other in zip(expected, answer, strict=True):
+                np.testing.assert_equal(other, one)
+        else:
+            np.testing.assert_equal(answer, expected)
+        assert type(answer) is type(expected)
+        return answer
+
+    def agree(self):
+        for name in ("distinct", "changes", "center"):
+            assert getattr(self.kernel, name) == getattr(self.reference, name), name
+        assert len(self.kernel) == len(self.reference)
+        points = self("points")
+        self("vertices")
+        asked = np.concatenate([points[::3], PAIRS[::5], np.minimum(points[::7] + np.array([0, 0.5]), [360, 90])])
+        self("locate", asked)
+        self("count_many", asked)
+        self("count", *PAIRS[7].tolist())
+        self("tangents", asked)
+        self.kernel.check()
+
+
+def outcome(action, *arguments):
     try:
-        kept, renamed = function(*arguments)
-    except KeyError as error:
-        return error.args
-    return kept.tolist(), {tuple(place) for place in renamed.tolist()}
+        return action(*arguments)
+    except (ValueError, TypeError, KeyError) as error:
+        return type(error), str(error), error.args
 
 
-# Pairs 0 to 2 share a place, and so do 3 and 4.
-NUMBERS = [(1.0, 2.0), (0.0, 2.0), (3.0, -1.0), (7.0, 7.0), (6.0, 9.0), (5.0, 5.0)]
-PLACES = [(0.5, 0.5)] * 3 + [(0.25, 1.0)] * 2 + [(2.0, 2.0)]
-batches = st.lists(
-    st.tuples(st.lists(st.tuples(st.sampled_from([1, -1]), st.integers(0, 5)), max_size=12), st.booleans()), max_size=12
+# Around the north pole: many places under several names, and some that are too far from some centres.
+PAIRS = np.array(
+    [(lon, lat) for lat in (90.0, 85.0, 80.0, 70.0, 55.0, 5.0) for lon in (-180, -90, 0, 45, 180, 270, 360)]
 )
+CENTERS = [(0.0, 90.0), (180.0, 80.0), (10.0, 40.0)]
+BAD = [[(0.0, 95.0)], [(400.0, 0.0)], [(np.nan, 0.0)], [(0.0, -80.0), (0.0, 91.0)], [1.0, 2.0], [("1", 2)]]
 
 
-@settings(max_examples=300)
-@given(batches)
-def test_given_pairs_live_the_same_lives(lives):
-    reference, kernel = Given(), _kernel.Given()
-    pairs, places = np.array(NUMBERS), np.array(PLACES)
-    for rows, ignore_missing in lives:
-        which = np.array([row for _, row in rows], dtype=int)
-        arguments = np.array([op for op, _ in rows], np.int8), pairs[which], places[which], ignore_missing
-        assert outcome(kernel.apply, *arguments) == outcome(reference.apply, *arguments)
-        assert kernel.distinct == reference.distinct
-        assert kernel.counts(pairs, places).tolist() == reference.counts(pairs, places).tolist()
-        assert kernel.counts(pairs[::-1].copy(), places).tolist() == reference.counts(pairs[::-1], places).tolist()
-        assert kernel.points().tolist() == reference.points().tolist()
-        there = places[reference.counts(pairs, places) > 0]
-        assert kernel.at(there).tolist() == reference.at(there).tolist()
-        kernel = kernel.copy()
-    kernel.clear()
-    assert (kernel.distinct, kernel.points().tolist()) == (0, [])
+def batch(rng, most):
+    pairs = PAIRS[rng.integers(0, len(PAIRS), rng.integers(0, most))]
+    return np.where(rng.random(pairs.shape) < 0.9, pairs, pairs - rng.integers(0, 9, pairs.shape))
 
 
-def test_many_given_pairs():
-    rng = np.random.default_rng(1)
-    reference, kernel = Given(), _kernel.Given()
-    pairs = np.column_stack([rng.integers(0, 300, 5000), rng.integers(0, 9, 5000)]).astype(float)
-    places = np.floor(pairs / 2)
-    for start in range(0, 5000, 250):
-        rows = rng.integers(0, start + 250, 500)
-        ops = np.where(rng.random(500) < 0.55, 1, -1).astype(np.int8)
-        arguments = ops, pairs[rows], places[rows], True
-        assert outcome(kernel.apply, *arguments) == outcome(reference.apply, *arguments)
-        assert kernel.points().tobytes() == reference.points().tobytes()
-    assert kernel.memory > 0
-    with pytest.raises(KeyError):
-        kernel.at(np.array([[0.5, 0.5]]))
-    with pytest.raises(ValueError, match="must have the same length"):
-        kernel.apply(np.ones(2, np.int8), pairs[:3], places[:3], True)
+def bad(rng):
+    return BAD[rng.integers(0, len(BAD))]
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("center", [None, (0.0, 90.0)])
+def test_trees(seed, center):
+    rng = np.random.default_rng(seed)
+    both = Both("GlobeTree", center)
+    for step in range(60):
+        both.agree()
+        pairs = batch(rng, 40)
+        match rng.integers(0, 9):
+            case 0:
+                both("insert", *PAIRS[rng.integers(0, len(PAIRS))].tolist())
+            case 1:
+                both("delete", *PAIRS[rng.integers(0, len(PAIRS))].tolist())
+            case 2 | 3:
+                both("apply", 1, pairs, False)
+            case 4:
+                both("apply", -1, pairs, bool(step % 2))
+            case 5 | 6:
+                both("apply", rng.choice([1, -1], len(pairs)).astype(np.int8), pairs, bool(rng.integers(0, 4)))
+            case 7:
+                both("recenter", CENTERS[rng.integers(0, 3)])
+            case 8:
+                both("apply", rng.choice([1, -1]).item(), bad(rng), True)
+                both("insert", -361.0, 0.0)
+                both("insert", 0.0, "1")
+                both.kernel, both.reference = both.kernel.copy(), both.reference.copy()
+                if rng.random() < 0.3:
+                    both("clear")
+    both.agree()
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("ordered", [False, True])
+@pytest.mark.parametrize("key_type", ["str", "int"])
+def test_entities(seed, ordered, key_type):
+    rng = np.random.default_rng(seed)
+    both = Both("GlobeEntities", key_type, ordered, None if seed % 2 else (0.0, 90.0))
+    names = [f"key {i}" if key_type == "str" else i for i in range(60)]
+    for _ in range(60):
+        both.agree()
+        both("vertex_keys")
+        both("keys_at", PAIRS)
+        both("positions", names)
+        both("times", names)
+        pairs = batch(rng, 30)
+        keys = [names[i] for i in rng.choice(60, len(pairs), replace=False)]
+        times = rng.integers(0, 20, len(pairs)).astype(float)
+        only = [None, None, "absent", "present"][rng.integers(0, 4)]
+        match rng.integers(0, 8):
+            case 0 | 1 | 2:
+                both("update", keys, pairs, times, only)
+            case 3:
+                both("put", names[0], *PAIRS[rng.integers(0, len(PAIRS))].tolist(), 9.0, only)
+            case 4:
+                both("remove_many", keys, True)
+                both("remove", names[1])
+            case 5:
+                both("expire", float(rng.integers(-3, 12)))
+                both("evict", 2)
+            case 6:
+                both("recenter", CENTERS[rng.integers(0, 3)])
+            case 7:
+                both("update", names[:2], bad(rng), [1.0, 2.0], only)
+                both("update", [names[0], names[0]], PAIRS[-2:], [1.0, 2.0], only)
+                both("put", names[0], 0.0, 91.0, 9.0, only)
+                both("put", names[0], None, 91.0, 9.0, only)
+                both.kernel, both.reference = both.kernel.copy(), both.reference.copy()
+    keys, points, times = both.reference.entities()
+    same_keys, same_points, same_times = both.kernel.entities()
+    assert list(keys) == list(same_keys)
+    np.testing.assert_equal((same_points, same_times), (points, times))
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_windows(seed):
+    rng = np.random.default_rng(seed)
+    limits = (6.0, None) if seed % 3 == 0 else (None, 25) if seed % 3 == 1 else (8.0, 40)
+    both = Both("GlobeWindowTree", *limits, None if seed % 2 else (0.0, 90.0))
+    now = 0.0
+    for _ in range(60):
+        both.agree()
+        both("times")
+        points, times, latest, totals = both("state")
+        pairs = batch(rng, 30)
+        match rng.integers(0, 7):
+            case 0 | 1 | 2:
+                both("add", pairs, now + rng.integers(-9, 3, len(pairs)))
+                now += 1.0
+            case 3:
+                both("advance", now)
+                both("expire", now - 5.0)
+            case 4:
+                both("delete_many", pairs, bool(rng.integers(0, 4)))
+                both("delete", *PAIRS[rng.integers(0, len(PAIRS))].tolist())
+            case 5:
+                both("recenter", CENTERS[rng.integers(0, 3)])
+            case 6:
+                both("add", bad(rng), [now] * 2)
+                both("add", pairs, [np.nan] * len(pairs))
+                if both.reference.center is not None:
+                    new = Both("GlobeWindowTree", *limits, both.reference.center)
+                    new("restore", points, times, latest, totals)
+                    both = new
+                both.kernel, both.reference = both.kernel.copy(), both.reference.copy()
+
+
+def test_many_places():
+    rng = np.random.default_rng(5)
+    places = around(rng, (179.0, 60.0), 60, 30_000)
+    places[::50] = (170.0, 90.0)
+    both = Both("GlobeTree", (179.0, 60.0))
+    for start in range(0, 20_000, 2_500):
+        ops = np.repeat(np.array([1, -1], np.int8), [2_500, 1_000 if start else 0])
+        both(
+            "apply",
+            ops,
+            np.concatenate([places[start : start + 2_500], places[start - 2_500 : start - 2_500 + len(ops) - 2_500]]),
+            False,
+        )
+    both.agree()
+    both("locate", around(rng, (179.0, 60.0), 88, 20_000))
+    both("recenter", (170.0, 70.0))
+    both.agree()

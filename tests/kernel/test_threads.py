@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from inputs import cloud
 
-from dynhull import DynamicHull, _kernel
+from dynhull import DynamicHull, FenceIndex, KeyedHull, _kernel
 
 ROWS = 4000
 
@@ -71,6 +71,48 @@ def test_writers_and_readers():
     tree.check()
     expected = [before] + [np.random.default_rng(n).random((ROWS, 2))[:100] + n for n in range(1, 5)]
     np.testing.assert_array_equal(tree.points(), _kernel.HullTree(np.concatenate(expected)).points())
+
+
+@pytest.mark.usefixtures("impatient")
+def test_fences_of_several_threads():
+    """Writers move subjects of their own, others set, drop and read fences, and one takes: no crossing gets lost."""
+    hull = KeyedHull(key_type="int")
+    index = FenceIndex(hull)
+    index.set_polygons(0, [[[[0, 0], [1, 0], [1, 1], [0, 1]]]])
+    moving = 4
+    changes = {key: [] for key in range(moving * 50)}
+
+    def move(number):
+        random = np.random.default_rng(number)
+        keys = np.arange(50, dtype=np.uint64) + 50 * number
+        for _ in range(100):
+            hull.put_many(keys, 2 * random.random((50, 2)))
+
+    def redraw(number):
+        for step in range(100):
+            index.set_circle(number, 0.5, 0.5, 0.1 + step / 200)
+            assert index.count(number) <= len(index.inside(number)) + moving * 50
+            assert len(index.drop(number)) <= moving * 50
+
+    def note(found):
+        rows = found.fences == 0
+        for key, change in zip(found.keys[rows].tolist(), found.changes[rows].tolist(), strict=True):
+            changes[key].append(change)
+
+    with ThreadPoolExecutor(moving + 2) as pool:
+        jobs = [pool.submit(move, n) for n in range(moving)] + [pool.submit(redraw, n) for n in (1, 2)]
+        while not all(job.done() for job in jobs):
+            note(index.take())
+        for job in jobs:
+            job.result()
+    note(index.take())
+    keys = np.array(hull.keys(), np.uint64)
+    inside = sorted(keys[(hull.positions(keys) <= 1).all(axis=1)].tolist())
+    assert index.inside(0).tolist() == inside
+    assert len(index) == 1
+    for key, each in changes.items():
+        assert all(change == (-1 if number % 2 else 1) for number, change in enumerate(each))
+        assert (len(each) % 2 == 1) == (key in inside)
 
 
 @pytest.mark.usefixtures("impatient")

@@ -3,6 +3,7 @@ from collections.abc import Iterator
 import grpc
 import pytest
 
+from dynhull_client import HullClient
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -16,6 +17,12 @@ def channel(address: str) -> Iterator[grpc.Channel]:
 @pytest.fixture
 def stub(channel: grpc.Channel) -> HullServiceStub:
     return HullServiceStub(channel)
+
+
+@pytest.fixture
+def client(address: str) -> Iterator[HullClient]:
+    with HullClient(address) as client:
+        yield client
 
 
 @pytest.fixture

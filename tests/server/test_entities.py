@@ -327,6 +327,7 @@ def test_settings_come_back(stub: HullServiceStub, name: str) -> None:
             1.5, max_points=7, clock=hull_pb2.CLOCK_DATA, max_skew=Duration(), ahead=hull_pb2.AHEAD_POLICY_CLAMP
         ),
         ordering=hull_pb2.ORDERING_EVENT_TIME,
+        frame=hull_pb2.FRAME_PLANE,
     )
     assert stub.CreateHull(pb.CreateHullRequest(name=name, config=config)).hull.config == config
     (listed,) = stub.ListHulls(pb.ListHullsRequest(prefix=name)).hulls

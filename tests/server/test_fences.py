@@ -23,7 +23,7 @@ from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from server_process import server_process
 
-from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import batch_pb2, fence_pb2
 from dynhull_proto.v1 import fence_service_pb2 as fs
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
@@ -412,6 +412,44 @@ def test_old_events_are_dropped_and_consumers_hear_of_it(tmp_path: Path, name: s
         assert (response.lost.first_sequence, response.lost.last_sequence) == (3, 4)
         assert [event.sequence for event in response.events] == [5, 6, 7]
         assert inside(fences, fence) == []
+
+
+def test_a_watch_says_that_all_events_were_dropped(name: str) -> None:
+    with server_process() as server, grpc.insecure_channel(server.address) as channel:
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name=name, config={"identity": "IDENTITY_STRING_KEYS"}))
+        create(fences, name, circle_area={"radius": 5}, subject_hull=name, max_event_age={"nanos": 1000})
+        put(stub, name, a=(1, 0))
+        wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=name)).fence.first_sequence == 3)
+        watch = fences.WatchFence(fs.WatchFenceRequest(name=name, after_sequence=0), timeout=PATIENCE)
+        assert next(watch).sequence == 0
+        response = next(watch)
+        watch.cancel()
+    assert (response.sequence, response.lost.first_sequence, response.lost.last_sequence) == (2, 1, 2)
+
+
+def test_batches_to_fenced_hulls_use_up_no_hulls(name: str) -> None:
+    with server_process("--max-hulls", "2") as server, grpc.insecure_channel(server.address) as channel:
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name=name, config={"identity": "IDENTITY_STRING_KEYS"}))
+        create(fences, name, circle_area={"radius": 5}, subject_hull=name)
+        put(stub, name, a=(1, 0))
+        stub.CreateHull(pb.CreateHullRequest(name=f"{name}/second"))
+        assert refused_by(stub.CreateHull, pb.CreateHullRequest(name=f"{name}/third")).metadata["limit"] == "max_hulls"
+
+
+def test_events_that_have_become_too_old_are_dropped_without_a_new_one(name: str) -> None:
+    with server_process() as server, grpc.insecure_channel(server.address) as channel:
+        stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+        stub.CreateHull(pb.CreateHullRequest(name=name, config={"identity": "IDENTITY_STRING_KEYS"}))
+        settings = {"circle_area": {"radius": 5}, "subject_hull": name, "initial": fence_pb2.FENCE_INITIAL_NONE}
+        create(fences, name, **settings)
+        put(stub, name, a=(1, 0))
+        replaced = fence_pb2.FenceConfig(**settings, max_event_age={"seconds": 1})
+        fences.ReplaceFence(fs.ReplaceFenceRequest(name=name, config=replaced))
+        wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=name)).fence.first_sequence == 2)
+        put(stub, name, b=(1, 0))
+        wait_until(lambda: fences.GetFence(fs.GetFenceRequest(name=name)).fence.first_sequence == 3)
 
 
 def test_metrics_of_fences(name: str) -> None:

@@ -1,4 +1,4 @@
-"""Fences that wait: who has been inside for a time makes an event, over kills and restarts."""
+"""Fences that wait, over kills and restarts: `dwell`, and events delayed by `confirmations` and `min_dwell`."""
 
 import sys
 import time
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import grpc
 import pytest
-from fence_calls import create, delete, events, insert, polygon, put, refused_by, remove, told
+from fence_calls import create, delete, events, insert, inside, polygon, put, refused_by, remove, told
 from patience import PATIENCE, wait_until
 from server_process import server_process
 
@@ -287,21 +287,197 @@ def test_a_commit_that_fails_makes_no_second_event(tmp_path: Path, name: str, fa
         assert dwells(events(fences, name, after=2)) == ["a", "b"]
 
 
+def test_the_dwell_of_who_is_inside_of_the_others(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    """With `without_self` the distance is that from the hull of the others."""
+    put(stub, fleet, a=(0, 0), b=(8, 0), c=(8, 8), d=(0, 8), e=(4, 4))
+    area = {"name": fleet, "without_self": True}
+    create(fences, name, hull_area=area, subject_hull=fleet, margin=3, dwell=span(0.5), initial="FENCE_INITIAL_NONE")
+    put(stub, fleet, e=(4, -2), f=(8, 8))
+    found = waited(fences, name, 5)
+    assert words(found[:2]) == ["ENTER c AREA_MOVED", "ENTER f AREA_MOVED SUBJECT_APPEARED"]
+    assert {each.string_key: each.distance for each in found[2:]} == {"c": 0, "e": 2, "f": 0}
+    assert words(found[2:]) == [f"DWELL {each} TIME_PASSED" for each in (each.string_key for each in found[2:])]
+    assert inside(fences, name) == ["c", "e", "f"]
+
+
+# Events that are delayed
+
+
+def delayed(found: list[fence_pb2.FenceEvent]) -> list[tuple[str, int]]:
+    """Events in words, and the microseconds by which they were delayed."""
+    return [(told(each), stayed(each) if each.HasField("first_time") else 0) for each in found]
+
+
+def words(found: list[fence_pb2.FenceEvent]) -> list[str]:
+    return [told(each) for each in found]
+
+
+def test_reports_that_agree_confirm_a_change(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    put(stub, fleet, a=(9, 0), b=(1, 0))
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", confirmations=3)
+    put(stub, fleet, a=(1, 0))
+    put(stub, fleet, a=(2, 0), b=(9, 0))
+    assert events(fences, name) == []
+    assert inside(fences, name) == ["b"]
+    revision = put(stub, fleet, a=(2, 0))  # a position that stays is a report, too
+    (entered,) = events(fences, name)
+    assert told(entered) == "ENTER a SUBJECT_MOVED"
+    assert (entered.subject_revision, entered.position.x, entered.distance) == (revision, 2, 0)
+    assert not entered.HasField("previous_position")
+    assert 0 < entered.first_time.ToMicroseconds() <= entered.time.ToMicroseconds()
+    put(stub, fleet, b=(9, 0))
+    put(stub, fleet, b=(4, 0), c=(0, 0))
+    put(stub, fleet, b=(9, 0))
+    put(stub, fleet, c=(0, 0), b=(8, 0))
+    assert inside(fences, name) == ["a", "b"]
+    put(stub, fleet, b=(7, 0), c=(0, 1))
+    assert words(events(fences, name, after=1)) == ["EXIT b SUBJECT_MOVED", "ENTER c SUBJECT_APPEARED"]
+    assert events(fences, name, after=1)[0].distance == 2
+    assert inside(fences, name) == ["a", "c"]
+
+
+def test_an_area_that_moves_is_no_report(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    zone = f"{name}/zone"
+    stub.CreateHull(pb.CreateHullRequest(name=zone))
+    insert(stub, zone, 0, 0, 10, 0, 0, 10)
+    put(stub, fleet, a=(6, 6))
+    create(fences, name, hull_area={"name": zone}, subject_hull=fleet, initial="FENCE_INITIAL_NONE", confirmations=2)
+    insert(stub, zone, 10, 10)
+    put(stub, fleet, a=(6, 6))
+    insert(stub, zone, 11, 11)
+    assert events(fences, name) == []
+    put(stub, fleet, a=(7, 6))
+    assert words(events(fences, name)) == ["ENTER a AREA_MOVED"]
+
+
+def test_time_confirms_a_change(stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str) -> None:
+    put(stub, fleet, a=(9, 0), b=(1, 0), c=(1, 1))
+    create(
+        fences,
+        name,
+        circle_area=CIRCLE,
+        subject_hull=fleet,
+        initial="FENCE_INITIAL_NONE",
+        min_dwell=span(0.4),
+        dwell=span(0.2),
+        margin=1,
+    )
+    put(stub, fleet, a=(1, 0), b=(9, 0), c=(9, 9))
+    put(stub, fleet, c=(5, 0))
+    revision = put(stub, fleet, a=(5, 1))
+    found = waited(fences, name, 5)
+    assert sorted(words(found)) == [
+        "DWELL a TIME_PASSED",
+        "DWELL b TIME_PASSED",
+        "DWELL c TIME_PASSED",
+        "ENTER a SUBJECT_MOVED TIME_PASSED",
+        "EXIT b SUBJECT_MOVED TIME_PASSED",
+    ]
+    entered = next(each for each in found if told(each).startswith("ENTER"))
+    assert (entered.subject_revision, stayed(entered) >= 0.4 * SECOND) == (revision, True)
+    assert 0 < entered.distance < 1
+    assert found[-1].string_key == "a"
+    assert found[-1].first_time == entered.time
+
+
+def test_with_both_rules_both_must_hold(stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str) -> None:
+    put(stub, fleet, z=(9, 9))
+    config = {"circle_area": CIRCLE, "subject_hull": fleet, "initial": "FENCE_INITIAL_NONE"}
+    create(fences, name, **config, confirmations=2, min_dwell=span(0.5))
+    put(stub, fleet, a=(0, 0), b=(1, 1))
+    put(stub, fleet, a=(0, 0))
+    assert events(fences, name) == []
+    (first,) = waited(fences, name, 1)
+    assert (told(first), stayed(first) >= 0.5 * SECOND) == ("ENTER a SUBJECT_APPEARED TIME_PASSED", True)
+    put(stub, fleet, b=(1, 1))
+    (second,) = events(fences, name, after=1)
+    assert told(second) == "ENTER b SUBJECT_APPEARED"
+    assert stayed(second) >= 0.5 * SECOND
+
+
+def test_who_is_gone_needs_no_confirmation(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    put(stub, fleet, a=(1, 0), b=(9, 0), c=(1, 1))
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", confirmations=2)
+    put(stub, fleet, a=(9, 0), b=(1, 0))
+    remove(stub, fleet, "a", "b", "c")
+    found = events(fences, name)
+    assert words(found) == ["EXIT a SUBJECT_REMOVED", "EXIT c SUBJECT_REMOVED"]
+    assert [each.HasField("previous_position") for each in found] == [False, True]
+    put(stub, fleet, a=(1, 0))
+    assert inside(fences, name) == []
+
+
+def test_a_fence_replaced_by_one_with_fewer_rules_ends_what_waits(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    put(stub, fleet, a=(1, 0), b=(9, 0), c=(6, 0), d=(1, 1))
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", confirmations=3)
+    put(stub, fleet, a=(9, 0), b=(1, 0), d=(6, 0))
+    put(stub, fleet, a=(9, 0))
+
+    def replace(radius: float, confirmations: int) -> list[str]:
+        config = {"circle_area": {"radius": radius}, "subject_hull": fleet, "confirmations": confirmations}
+        last = fences.ReplaceFence(fs.ReplaceFenceRequest(name=name, config=config)).fence.last_sequence
+        return words(events(fences, name)[-last:] if last else [])
+
+    assert replace(5, 2) == ["EXIT a SUBJECT_MOVED FENCE_CHANGED"]
+    assert replace(7, 0)[1:] == ["ENTER c FENCE_CHANGED", "ENTER b SUBJECT_MOVED FENCE_CHANGED"]
+    assert inside(fences, name) == ["b", "c", "d"]
+
+
+def test_what_waits_survives_kills(tmp_path: Path, name: str) -> None:
+    """Reports are counted, and time passes, over two lives of the server and while it is down."""
+    config = {"circle_area": CIRCLE, "subject_hull": name, "initial": "FENCE_INITIAL_NONE"}
+    with server_process("--data", str(tmp_path), killed=True) as server:
+        with grpc.insecure_channel(server.address) as channel:
+            stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+            put(stub, keyed(stub, name), a=(9, 0), b=(1, 0), c=(1, 1))
+            create(fences, "counts", **config, confirmations=3)
+            create(fences, "times", **config, min_dwell=span(2))
+            begun = time.time_ns() // 1000
+            put(stub, name, a=(1, 0), b=(9, 0), c=(9, 1))
+            put(stub, name, a=(2, 0), c=(2, 2))
+        server.process.kill()
+    with server_process("--data", str(tmp_path), killed=True) as server:
+        with grpc.insecure_channel(server.address) as channel:
+            stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
+            assert [inside(fences, fence) for fence in ("counts", "times")] == [["b", "c"]] * 2
+            put(stub, name, a=(3, 0))
+            assert words(events(fences, "counts")) == ["ENTER a SUBJECT_MOVED"]
+            found = waited(fences, "times", 2)
+            expected = ["ENTER a SUBJECT_MOVED TIME_PASSED", "EXIT b SUBJECT_MOVED TIME_PASSED"]
+            assert words(found) == expected
+            assert all(2 * SECOND <= each.time.ToMicroseconds() - begun < 20 * SECOND for each in found)
+            assert all(abs(each.first_time.ToMicroseconds() - begun) < SECOND for each in found)
+        server.process.kill()
+    with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
+        fences = FenceServiceStub(channel)
+        assert [inside(fences, fence) for fence in ("counts", "times")] == [["a", "b", "c"], ["a", "c"]]
+        put(HullServiceStub(channel), name, b=(9, 0))
+        put(HullServiceStub(channel), name, b=(9, 0))
+        assert words(events(fences, "counts", after=1)) == ["EXIT b SUBJECT_MOVED"]
+        assert len(events(fences, "times")) == len(expected)
+
+
 @pytest.mark.parametrize(
     ("config", "field", "problem"),
     [
-        ({"confirmations": 2}, "config.confirmations", "does not support"),
-        ({"min_dwell": {"seconds": 1}}, "config.min_dwell", "does not support"),
+        ({"min_dwell": {"seconds": -1}}, "config.min_dwell", "least"),
         ({"dwell": {"seconds": -1}}, "config.dwell", "least"),
-        ({"dwell": {"seconds": 1}, "margin": 1, "circle_area": None}, "config.dwell", "without_self"),
     ],
 )
 def test_rules_that_are_refused(
     fences: FenceServiceStub, name: str, fleet: str, config: dict[str, object], field: str, problem: str
 ) -> None:
     config = {"circle_area": CIRCLE, "subject_hull": fleet} | config
-    if config["circle_area"] is None:
-        config["hull_area"] = {"name": fleet, "without_self": True}
     refused = refused_by(fences.CreateFence, fs.CreateFenceRequest(name=name, config=config))
     assert (refused.code, refused.metadata["field"]) == (grpc.StatusCode.INVALID_ARGUMENT, field)
     assert problem in refused.metadata.get("problem", problem)

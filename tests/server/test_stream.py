@@ -1,6 +1,8 @@
 """Many batches in one call, acknowledged in order; numbered ones applied exactly once."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import repeat
+from pathlib import Path
 from queue import SimpleQueue
 
 import grpc
@@ -11,7 +13,7 @@ from refusal import refusal
 from server_process import server_process
 
 from dynhull import DynamicHull
-from dynhull_client import HullClient, HullNotFoundError, PointMissingError, SequenceGapError
+from dynhull_client import Batch, HullClient, HullNotFoundError, PointMissingError, SequenceGapError
 from dynhull_proto.v1 import batch_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -75,6 +77,101 @@ def test_a_refused_batch_ends_the_stream_after_the_acknowledgements_before_it(st
     assert (after.revision, after.point_count) == (2, 1001)
 
 
+def several(*batches: batch_pb2.Batch, sequences: Iterable[int] = repeat(0)) -> pb.StreamRequest:
+    numbered = [pb.NumberedBatch(batch=each, sequence=number) for each, number in zip(batches, sequences, strict=False)]
+    return pb.StreamRequest(batches=numbered)
+
+
+def test_a_message_has_several_batches_and_a_response_several_results(stub: HullServiceStub, hull: str) -> None:
+    """Small and large batches in any mixture of messages; each is a revision of its own, in order."""
+    sizes = [1, 5000, 1, 1, 3000, 2, 64, 65, 1] * 5
+    random = np.random.default_rng(3)
+    batches = [random.normal(size=(size, 2)) for size in sizes]
+    requests = [pb.StreamRequest(name=hull, accept_results=True)]
+    at = 0
+    while at < len(batches):
+        of_message = batches[at : at + int(random.integers(1, 12))]
+        single = len(of_message) == 1
+        requests.append(pb.StreamRequest(batch=insert(of_message[0])) if single else several(*map(insert, of_message)))
+        at += len(of_message)
+    first, *responses = stub.Stream(iter(requests))
+    assert (first.max_batches, first.max_message_bytes) == (256, 64 * 2**20)
+    assert not first.results
+    assert not first.HasField("result")
+    assert not any(each.HasField("result") or each.max_batches for each in responses)
+    acknowledged = [each.result for response in responses for each in response.results]
+    assert [each.revision for each in acknowledged] == list(range(1, len(sizes) + 1))
+    assert [each.inserted for each in acknowledged] == sizes
+    assert [each.point_count for each in acknowledged] == np.cumsum(sizes).tolist()
+    vertices = np.frombuffer(stub.GetHull(pb.GetHullRequest(name=hull)).vertices.packed).reshape(-1, 2)
+    assert vertices.tolist() == DynamicHull(np.concatenate(batches)).vertices().tolist()
+
+
+def test_many_batches_share_responses(stub: HullServiceStub, hull: str) -> None:
+    requests = [pb.StreamRequest(name=hull, producer="p", accept_results=True)]
+    requests.append(several(*[insert([[i, i * i]]) for i in range(200)], sequences=range(1, 201)))
+    _, *responses = stub.Stream(iter(requests))
+    assert [each.sequence for response in responses for each in response.results] == list(range(1, 201))
+    assert len(responses) == 1  # they have arrived together, and are committed together
+
+
+@pytest.mark.parametrize("refused", [0, 2, 4])
+def test_a_refused_batch_of_a_message_ends_the_stream_after_those_before_it(
+    stub: HullServiceStub, hull: str, refused: int
+) -> None:
+    batches = [insert([[i, i * i]]) for i in range(5)]
+    batches[refused] = delete([[8, 8]])
+    requests = [pb.StreamRequest(name=hull, producer="p", accept_results=True)]
+    requests += [several(*batches, sequences=range(1, 6)), several(insert([[9, 9]]), sequences=[6])]
+    acknowledged: list[int] = []
+
+    def take() -> None:
+        for response in stub.Stream(iter(requests)):
+            acknowledged.extend(each.sequence for each in response.results)
+
+    code, info, _ = refusal(take)
+    assert (code, info.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "POINT_MISSING")
+    assert info.metadata["batch"] == str(refused)
+    assert acknowledged == list(range(1, refused + 1))
+    after = stub.GetHull(pb.GetHullRequest(name=hull)).hull
+    assert (after.revision, after.point_count) == (refused, refused)
+    assert stub.GetProducer(pb.GetProducerRequest(name=hull, producer="p")).last_sequence == refused
+
+
+def test_batches_before_an_invalid_one_of_a_message_are_applied(stub: HullServiceStub, hull: str) -> None:
+    requests = [pb.StreamRequest(name=hull, producer="p", accept_results=True)]
+    requests.append(several(*[insert([[i, i * i]]) for i in range(4)], sequences=[1, 2, 0, 3]))
+    acknowledged: list[int] = []
+
+    def take() -> None:
+        for response in stub.Stream(iter(requests)):
+            acknowledged.extend(each.sequence for each in response.results)
+
+    _, info, _ = refusal(take)
+    assert dict(info.metadata) == {"field": "sequence", "value": "0", "batch": "2"}
+    assert acknowledged == [1, 2]
+    assert stub.GetHull(pb.GetHullRequest(name=hull)).hull.revision == 2
+
+
+def test_messages_with_several_batches_that_are_refused(stub: HullServiceStub, hull: str) -> None:
+    def fields(*requests: pb.StreamRequest) -> tuple[str, str]:
+        _, info, _ = refusal(lambda: list(stub.Stream(iter(requests))))
+        assert info.reason == "INVALID_FIELD"
+        return info.metadata["field"], info.metadata["value"]
+
+    one, first = insert([[1, 2]]), pb.StreamRequest(name=hull, accept_results=True)
+    both = several(one, one)
+    both.batch.CopyFrom(one)
+    assert fields(pb.StreamRequest(name=hull), several(one)) == ("batches", "1 batches")
+    assert fields(first, several(*[one] * 257)) == ("batches", "257 batches")
+    assert fields(first, both) == ("batches", "2 batches")
+    assert fields(first, several(one, sequences=[1])) == ("sequence", "1")
+    assert fields(pb.StreamRequest(name=hull, may_skip=True)) == ("may_skip", "True")
+    numbered = pb.StreamRequest(name=hull, producer="p")
+    assert fields(numbered, pb.StreamRequest(batch=one, sequence=5, may_skip=True)) == ("may_skip", "True")
+    assert stub.GetHull(pb.GetHullRequest(name=hull)).hull.revision == 0
+
+
 def test_one_call_writes_to_one_hull_for_one_producer(stub: HullServiceStub, hull: str) -> None:
     def fields(*requests: pb.StreamRequest) -> tuple[str, str]:
         _, info, _ = refusal(lambda: list(stub.Stream(iter(requests))))
@@ -116,6 +213,67 @@ def test_a_gap_is_refused_with_the_number_expected(address: str, hull: str) -> N
             client.apply(hull, insert=[[0, 0]], producer="p", sequence=3)
         assert caught.value.expected == 2
         assert client.apply(hull, insert=[[1, 1]], producer="p", sequence=2).revision == 2
+
+
+def test_numbers_that_may_skip(address: str, hull: str) -> None:
+    """As the offsets of a log: any greater number is new, any other one a duplicate, whatever way it takes."""
+    with HullClient(address) as client, grpc.insecure_channel(address) as channel:
+        stub = HullServiceStub(channel)
+
+        def apply(sequence: int) -> tuple[int, bool]:
+            applied = client.apply(hull, insert=[[sequence, 0]], producer="t/0", sequence=sequence, may_skip=True)
+            return applied.revision, applied.duplicate
+
+        assert [apply(number) for number in (7, 7, 3, 8, 100)] == [
+            (1, False), (1, True), (1, True), (2, False), (3, False),
+        ]  # fmt: skip
+        requests = [
+            pb.StreamRequest(name=hull, producer="t/0", accept_results=True, may_skip=True),
+            several(*[insert([[number, 0]]) for number in (99, 101, 105)], sequences=(99, 101, 105)),
+        ]
+        results = [each for response in stub.Stream(iter(requests)) for each in response.results]
+        assert [(each.sequence, each.result.duplicate) for each in results] == [(99, True), (101, False), (105, False)]
+        ingested = [(110, 0), (109, 1), (111, 2)]
+        summary = stub.Ingest(
+            pb.IngestRequest(
+                name=hull, producer="t/0", sequence=number, batch=insert([[number, 0]]), may_skip=not place
+            )
+            for number, place in ingested
+        )
+        assert (summary.batches, summary.duplicates) == (2, 1)
+        assert client.last_sequence(hull, "t/0") == 111
+        with pytest.raises(SequenceGapError) as caught:  # only where a request says so
+            client.apply(hull, insert=[[0, 0]], producer="t/0", sequence=113)
+        assert caught.value.expected == 112
+        assert client.get_hull(hull).revision == 7
+
+
+def test_numbers_that_may_skip_are_counted_in_each_of_several_hulls(address: str, hull: str) -> None:
+    with HullClient(address) as client:
+        other = f"{hull}-other"
+        client.create_hull(other)
+
+        def transfer(sequence: int) -> list[bool]:
+            batches = {name: Batch(insert=[[sequence, 0]]) for name in (hull, other)}
+            applied = client.transfer(batches, producer="t/0", sequence=sequence, may_skip=True)
+            return [each.duplicate for each in applied.values()]
+
+        assert [transfer(number) for number in (5, 5, 4, 9)] == [[False] * 2, [True] * 2, [True] * 2, [False] * 2]
+        assert (client.last_sequence(hull, "t/0"), client.last_sequence(other, "t/0")) == (9, 9)
+
+
+@pytest.mark.parametrize("durability", ["sync", "none"])
+def test_numbers_that_may_skip_outlive_the_server(tmp_path: Path, durability: str) -> None:
+    """From the journal and from a snapshot."""
+    data = ("--data", str(tmp_path), "--durability", durability, "--snapshot-points", "10")
+    for life in range(3):
+        with server_process(*data) as server, HullClient(server.address) as client:
+            client.create_hull("a", exist_ok=True)
+            assert client.last_sequence("a", "t/0") == 1000 * life
+            for number in (1000 * life, 1000 * life + 7, 1000 * life + 1000):
+                if number:
+                    client.apply("a", insert=np.ones((20, 2)), producer="t/0", sequence=number, may_skip=True)
+            assert client.get_hull("a").revision == 2 * (life + 1)
 
 
 def test_an_ingest_counts_duplicates(stub: HullServiceStub, hull: str) -> None:

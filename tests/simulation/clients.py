@@ -15,32 +15,47 @@ from dynhull import KeyedHull
 from dynhull.arrays import Points
 from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
+from dynhull_server.engine.watch_fence import Sent
 from dynhull_server.state.batch import Applied, Batch, KeyedBatch
 from dynhull_server.state.errors import (
+    ConsumerNotFoundError,
+    FenceExistsError,
+    FenceNotFoundError,
+    FenceReplacedError,
     HullExistsError,
+    HullFencedError,
     HullNotFoundError,
     HullReplacedError,
+    HullUnsuitableError,
     InvalidBatchError,
+    InvalidFenceError,
     KeyMissingError,
     LimitExceededError,
     NotStoredError,
     OutcomeUnknownError,
     PointMissingError,
     RevisionForgottenError,
+    SequenceAheadError,
     SequenceGapError,
     StoppingError,
 )
 from dynhull_server.state.events import WriteBatch, WriteTogether
+from dynhull_server.state.fences.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.fence import Fence
+from dynhull_server.state.fences.records import Consumer, Inside
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import HullSettings, Identity, Times, Window
 
 from .entities import Key
-from .model import Asked, Content, Model, tag
+from .fence_model import PREFIX
+from .model import SKIPS, Asked, Content, Model, tag
 from .plan import TIMED, Operation
 
 NO_POINTS = np.empty((0, 2))
 # The points of one batch have an x of their own each, in eighths.
 EIGHT = 8
+# The strips of a fence end there; above and below there are no points.
+LAST_STRIP, LOWEST, HIGHEST = 40, -1_000, 10**7
 
 
 class Server(Protocol):
@@ -78,6 +93,30 @@ class Server(Protocol):
 
     async def last(self, name: str, producer: str) -> int:
         """The last number of a producer."""
+
+    def fence(self, name: str) -> Fence:
+        """A fence, or raise FenceNotFoundError."""
+
+    async def create_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
+        """Make a fence."""
+
+    async def replace_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
+        """Give a fence other settings."""
+
+    async def delete_fence(self, name: str) -> None:
+        """Remove a fence."""
+
+    async def acknowledge(self, name: str, consumer: str, sequence: int | None, uid: str) -> Consumer:
+        """Make a consumer, or acknowledge events; of the fence with a uid, or of any."""
+
+    async def drop_consumer(self, name: str, consumer: str) -> None:
+        """Remove a consumer."""
+
+    async def who_is_inside(self, name: str, rows: int) -> tuple[Fence, Inside]:
+        """Who is inside of a fence."""
+
+    async def follow(self, client: "Client", op: Operation, after: int) -> None:
+        """Read the events of a fence after a sequence."""
 
     async def special(self, client: "Client", op: Operation) -> None:
         """What one layer has and the other has not."""
@@ -120,6 +159,7 @@ class Client:
         producer: its name as a writer that numbers its batches.
         calm: whether nothing may be refused but for a limit.
         seen: what it has read of each hull.
+        fences: the uid of each fence that it follows, and the last event that it has.
     """
 
     def __init__(self, number: int, server: Server, model: Model) -> None:
@@ -128,6 +168,7 @@ class Client:
         self.model = model
         self.calm = False
         self.seen: dict[str, list[tuple[str, int, Content]]] = {}
+        self.fences: dict[str, tuple[str, int]] = {}
         self._next: dict[str, int] = {}
 
     async def do(self, op: Operation) -> None:
@@ -152,6 +193,8 @@ class Client:
                 await self.recall(op)
             case "last":
                 await self.last(op["name"])
+            case "fence" | "refence" | "unfence" | "follow" | "ack" | "unack" | "inside":
+                await self.of_fence(op)
             case _:
                 await self.server.special(self, op)
 
@@ -171,7 +214,7 @@ class Client:
         try:
             await self.server.delete(name)
         except Exception as error:
-            self.refused(asked, error, (HullNotFoundError,))
+            self.refused(asked, error, (HullNotFoundError, HullFencedError))
         else:
             self.model.deleted(asked)
 
@@ -179,7 +222,7 @@ class Client:
 
     async def write(self, op: Operation) -> None:
         name, producer = op["name"], self._producer(op)
-        sequence = self._next.get(name + producer, 1) if producer else 0
+        sequence = self._numbers(op, producer)[0]
         attempt, write = self._batch(op, producer, sequence)
         asked = self.model.ask(name, makes=op["create"])
         try:
@@ -232,14 +275,16 @@ class Client:
         except HullNotFoundError:
             self.model.not_found(opened)
             return
-        first = self._next.get(name + producer, 1) if producer else 0
+        numbers, message = self._numbers(op, producer), op.get("message", 1)
         under_way: deque[tuple[Asked, int, int]] = deque()
         try:
-            for i in range(op["batches"]):
-                sequence = first + i if producer else 0
-                attempt, write = self._batch(op, producer, sequence)
-                under_way.append((self.model.ask(name, makes=op["create"]), attempt, sequence))
-                stream.write(write)
+            for first in range(0, len(numbers), message):
+                writes = []
+                for sequence in numbers[first : first + message]:
+                    attempt, write = self._batch(op, producer, sequence)
+                    under_way.append((self.model.ask(name, makes=op["create"]), attempt, sequence))
+                    writes.append(write)
+                stream.write(writes)
                 while len(under_way) >= op["window"] and self._take(op, opened, stream, under_way, producer):
                     await self.server.news(stream)
                 if stream.refusal is not None and len(under_way) >= op["window"]:
@@ -278,7 +323,21 @@ class Client:
     def _producer(self, op: Operation) -> str:
         if not op["numbered"]:
             return ""
+        if "skips" in op:
+            return f"{self.producer}{SKIPS}"
         return "shared" if op.get("shared") else self.producer
+
+    def _numbers(self, op: Operation, producer: str) -> list[int]:
+        """The numbers of the batches of an operation: one after the other, or with gaps and earlier ones again."""
+        batches: int = op.get("batches", 1)
+        if not producer:
+            return [0] * batches
+        first = self._next.get(op["name"] + producer, 1)
+        numbers = []
+        for skip in op.get("skips", [0] * batches):
+            numbers.append(max(1, first + skip))
+            first = numbers[-1] + 1
+        return numbers
 
     def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, WriteBatch]:
         attempt = self.model.attempt()
@@ -293,7 +352,8 @@ class Client:
         if "torn" in op and isinstance(batch, Batch):
             self.model.faulty = True
             batch = TornBatch(batch, op["torn"])
-        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer)
+        may_skip = producer.endswith(SKIPS)
+        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer, may_skip)
 
     def _points(self, op: Operation, attempt: int) -> Batch:
         deletes = NO_POINTS
@@ -322,12 +382,13 @@ class Client:
     def _puts(self, op: Operation, attempt: int, kind: str) -> KeyedBatch:
         """A batch of keys; those that it puts are not among those that it removes."""
         x, times = self._new(op, attempt)
+        lift = op.get("lift", 0)
         named = (str, int)[kind == "int"]
         removes = [tag(attempt, kind), *(named(key) for key in op["removes"] if key not in op["keys"])]
         return KeyedBatch(
             cast("Any", kind),
             as_keys(list(map(named, op["keys"])), kind),
-            np.column_stack((x, x * x)),
+            np.column_stack((x, x * x + lift)),
             as_keys(removes, kind),
             times,
             op.get("only"),
@@ -398,6 +459,71 @@ class Client:
             self.model.last(asked, self.producer, sequence)
             self._next[name + self.producer] = sequence + 1
 
+    # Fences
+
+    async def of_fence(self, op: Operation) -> None:
+        """A request about a fence."""
+        name, do = op["name"], op["do"]
+        asked = self.model.ask(PREFIX + name, makes=do == "fence", removes=do == "unfence")
+        try:
+            await self._ask_of_fence(op, asked)
+        except Exception as error:
+            self.fence_refused(op, asked, error)
+
+    async def _ask_of_fence(self, op: Operation, asked: Asked) -> None:
+        server, name = self.server, op["name"]
+        known = self.fences.get(name)
+        fence: Fence | None = None
+        match op["do"]:
+            case "fence":
+                fence = await server.create_fence(name, config_of(op), op["rows"])
+            case "refence":
+                fence = await server.replace_fence(name, config_of(op), op["rows"])
+            case "unfence":
+                await server.delete_fence(name)
+                self.model.removed_fence(asked)
+            case "follow":
+                fence = server.fence(name)
+                after = known[1] - op["back"] if known is not None and known[0] == fence.row.uid else 0
+                await server.follow(self, op, max(after, 0))
+            case "ack":
+                fence = server.fence(name)
+                sequence = None if op["back"] is None else max(0, fence.last - op["back"])
+                consumer = await server.acknowledge(name, op["consumer"], sequence, fence.row.uid)
+                self.model.fences.acked(fence.number, consumer, sequence)
+            case "unack":
+                await server.drop_consumer(name, op["consumer"])
+            case "inside":
+                fence, inside = await server.who_is_inside(name, op["rows"])
+                self.model.fences.held(fence.number, inside.sequence, inside.members)
+        if fence is not None:
+            self.model.answered_fence(asked, fence.number, fence.last)
+
+    def followed(self, asked: Asked, fence: Fence, after: int, sent: Sent, *, complete: bool) -> None:
+        """Events of a fence were sent; with `complete` all that there were."""
+        self.model.fences.seen(fence.number, fence.row.uid, after, sent)
+        self.fences[fence.name] = fence.row.uid, sent.sequence
+        if complete:
+            self.model.answered_fence(asked, fence.number, sent.sequence)
+
+    def fence_refused(self, op: Operation, asked: Asked, error: Exception) -> None:
+        """A request about a fence failed: there must be a reason."""
+        reasons: list[type[Exception]] = []
+        match op["do"]:
+            case "fence":
+                reasons = [FenceExistsError, HullNotFoundError, LimitExceededError, HullUnsuitableError]
+            case "refence":
+                reasons = [FenceNotFoundError, HullNotFoundError, InvalidFenceError]
+            case "ack":
+                reasons = [FenceNotFoundError, FenceReplacedError, LimitExceededError]
+            case "unack":
+                reasons = [FenceNotFoundError, ConsumerNotFoundError]
+            case _:
+                reasons = [FenceNotFoundError]
+        if isinstance(error, SequenceAheadError):
+            raise self.model.finds(f"{asked.name} has fewer events than it had: {error}") from error
+        self.refused(asked, error, tuple(reasons))
+
     # Refusals
 
     def refused(
@@ -415,10 +541,14 @@ class Client:
                 pass
             case StoppingError() if self.model.stopping:
                 pass
-            case HullNotFoundError() if HullNotFoundError in reasons:
+            case HullNotFoundError() if HullNotFoundError in reasons and asked.name.startswith(PREFIX):
+                self.model.unsure(error.name, asked)
+            case HullNotFoundError() | FenceNotFoundError() if type(error) in reasons:
                 self.model.not_found(asked)
-            case HullExistsError() if HullExistsError in reasons:
+            case HullExistsError() | FenceExistsError() if type(error) in reasons:
                 self.model.exists(asked)
+            case HullFencedError() if HullFencedError in reasons:
+                self.model.fenced(asked)
             case _ if isinstance(error, reasons):
                 pass
             case _:
@@ -435,7 +565,7 @@ def _reasons(op: Operation) -> list[type[Exception]]:
         reasons.append(KeyMissingError)
     if "keys" in op:
         reasons.append(InvalidBatchError)
-    if op["numbered"]:
+    if op["numbered"] and "skips" not in op:
         reasons.append(SequenceGapError)
     if "torn" in op:
         reasons.append(MemoryError)
@@ -455,6 +585,32 @@ def _settings(op: Operation) -> HullSettings:
     return HullSettings(identity, op.get("max_points", 0), window, op.get("by_event_time", False))
 
 
+def config_of(op: Operation) -> FenceConfig:
+    """The settings of a fence. All points are on a parabola or above it: so strips hold those of some batches."""
+    config = op["config"]
+    area: Area
+    match config["area"]:
+        case {"hull": name, **more}:
+            area = HullArea(name, more.get("without_self", False))
+        case {"strips": width, "holes": holes}:
+            area = _strips(width, holes=holes)
+        case {"circle": x, "radius": radius}:
+            area = CircleArea(float(x), float(x * x), float(radius))
+    return FenceConfig(area, **{key: value for key, value in config.items() if key != "area"})
+
+
+def _strips(width: int, *, holes: bool) -> PolygonArea:
+    """Strips that hold every other range of x, up to a limit; or one area with these strips as its holes."""
+    rings = [_ring(x, x + width, LOWEST, HIGHEST) for x in range(width, LAST_STRIP, 2 * width)]
+    if holes:
+        return PolygonArea(((_ring(0, LAST_STRIP + width, LOWEST - 1, HIGHEST + 1), *rings),))
+    return PolygonArea(tuple((ring,) for ring in rings))
+
+
+def _ring(left: int, right: int, low: int, high: int) -> bytes:
+    return np.array([[left, low], [right, low], [right, high], [left, high]], "<f8").tobytes()
+
+
 async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
     """After all faults everything works: read, write, and perhaps remove the hull and make it again."""
     client = Client(0, server, model)
@@ -469,8 +625,30 @@ async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
     if name not in model.alive:
         return  # there may be no more hulls
     await client.read(name)
-    if anew:
+    if anew and model.fences.needed(name):
+        client.calm = False
+        await client.delete(name)
+        client.calm = True
+        if name not in model.alive:
+            raise model.finds(f"{name} was deleted, and a fence depends on it")
+    elif anew:
         await client.delete(name)
         await client.create(name, _settings(write))
         await client.write(write | {"numbered": True})
         await client.read(name)
+
+
+async def probe_fence(server: Server, model: Model, name: str, *, anew: bool) -> None:
+    """After all faults a fence works: its events can be read and acknowledged; perhaps it is made anew."""
+    client = Client(0, server, model)
+    client.calm = True
+    consumer = next(iter(model.fences.alive[name].consumers), "probe")
+    of_fence: Operation = {"name": name, "rows": 1, "back": 0, "most": 1_000, "consumer": consumer}
+    for do in ("inside", "follow", "ack", *(("unack",) if consumer == "probe" else ())):
+        await client.of_fence(of_fence | {"do": do})
+    if anew:
+        config = server.fence(name).row.config
+        await client.of_fence(of_fence | {"do": "unfence"})
+        asked = model.ask(PREFIX + name, makes=True)
+        fence = await server.create_fence(name, config, 1)
+        model.answered_fence(asked, fence.number, fence.last)

@@ -6,19 +6,28 @@ and what they have done is news, which the core hears of one event at a time.
 
 from asyncio import CancelledError
 from collections import deque
-from collections.abc import Callable, Coroutine, Generator
+from collections.abc import Callable, Coroutine, Generator, Sequence
 from functools import partial
 from typing import Any
 
 from dynhull.arrays import Points
+from dynhull.keys import key_list
 from dynhull_server.engine.batch_stream import BatchStream
+from dynhull_server.engine.fences import who_waits
 from dynhull_server.engine.group_commit import GroupCommit
 from dynhull_server.engine.server_time import ServerTime
 from dynhull_server.engine.threads import Clock
+from dynhull_server.engine.watch_fence import Sent, following
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
-from dynhull_server.state.core import Core
-from dynhull_server.state.errors import HullNotFoundError, HullReplacedError, RefusedError, StoppingError
+from dynhull_server.state.core import LOOK_AGAIN, Core
+from dynhull_server.state.errors import (
+    HullNotFoundError,
+    HullReplacedError,
+    NotStoredError,
+    RefusedError,
+    StoppingError,
+)
 from dynhull_server.state.events import (
     Birth,
     Commit,
@@ -39,24 +48,39 @@ from dynhull_server.state.events import (
     Request,
     Retried,
     Retry,
+    Stir,
     Stopping,
     Tick,
     WriteBatch,
     WriteTogether,
 )
+from dynhull_server.state.fences.config import FenceConfig
+from dynhull_server.state.fences.fence import Fence
+from dynhull_server.state.fences.records import Consumer, FenceEvent, Inside
+from dynhull_server.state.fences.requests import (
+    CreateFence,
+    DeleteFence,
+    DropConsumer,
+    DropEvents,
+    PutConsumer,
+    ReadFence,
+    ReplaceFence,
+)
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import HullSettings
+from dynhull_server.state.records import NO_TIME, HullSettings
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
 from .clients import Client, Outline, content, outline
 from .entities import loaded
-from .model import Model, Truth
+from .fence_model import PREFIX
+from .model import SKIPS, Model, Truth
 from .plan import Operation
 from .schedule import Schedule
 
 DAY = 90_000.0
+MICROSECOND = 1e-6
 # Seconds within which everything leaves that has to.
 MOMENT = 0.5
 EPOCH = 1e9
@@ -138,6 +162,8 @@ class CoreServer:
         for row in contents.hulls:
             kept = storage.read(row.number)
             self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
+        fences = [storage.read_fence(row.number) for row in contents.fences]
+        self.core.restore_fences([each for each in fences if each is not None])
         threads: Any = NoThreads()
         self._commits = GroupCommit(storage, threads, Clock(), lambda _: None, lambda _: None)
         self._events: deque[Event] = deque()
@@ -182,6 +208,9 @@ class CoreServer:
                 self._computing.append(effect.ticket)
             case Examine():
                 self._settle(effect)
+            case Stir():
+                for fence, events in effect.stirred:
+                    self.schedule.note((fence.row.uid, [event[:5] for event in events]))
             case Retry():
                 self._pauses.append(effect.ticket)
 
@@ -218,7 +247,9 @@ class CoreServer:
             for number, load in effect.hulls:
                 row = self._storage.row(number)
                 states.append(load(self._storage.read(number)) if row else None)
-            event = Examined(effect.ticket, states)
+            fences = [self._storage.read_fence(number) for number in effect.fences]
+            restored = None if effect.restore is None else effect.restore(states, fences)
+            event = Examined(effect.ticket, states, fences, restored)
         except Exception as error:
             event = NotExamined(effect.ticket, error)
         self._news.append(partial(self.dispatch, event))
@@ -248,10 +279,10 @@ class CoreServer:
         return uid
 
     async def delete(self, name: str) -> None:
-        await self._ask(DeleteHull(Answer(), name))
+        await self._ask(DeleteHull(Answer(), name, self.time()))
 
     async def delete_at_once(self, name: str, times: int) -> None:
-        requests = [DeleteHull(Answer(), name) for _ in range(times)]
+        requests = [DeleteHull(Answer(), name, self.time()) for _ in range(times)]
         for request in requests:
             self.dispatch(request)
         await Wait(lambda: all(request.to.answered for request in requests))
@@ -296,8 +327,81 @@ class CoreServer:
         _, last = await self._ask(ReadHull(Answer(), hull, lambda state: state.last_sequence(producer)))
         return int(last)
 
+    # What clients ask of fences
+
+    def fence(self, name: str) -> Fence:
+        return self.core.fence(name)
+
+    async def create_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
+        found: Fence = await self._ask(CreateFence(Answer(), name, self.time(), config, self._birth(), rows=rows))
+        return found
+
+    async def replace_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
+        found: Fence = await self._ask(ReplaceFence(Answer(), name, self.time(), config, rows=rows))
+        return found
+
+    async def delete_fence(self, name: str) -> None:
+        await self._ask(DeleteFence(Answer(), name, self.time()))
+
+    async def acknowledge(self, name: str, consumer: str, sequence: int | None, uid: str) -> Consumer:
+        found: Consumer = await self._ask(PutConsumer(Answer(), name, self.time(), consumer, sequence, uid))
+        return found
+
+    async def drop_consumer(self, name: str, consumer: str) -> None:
+        await self._ask(DropConsumer(Answer(), name, self.time(), consumer))
+
+    async def who_is_inside(self, name: str, rows: int) -> tuple[Fence, Inside]:
+        def read(fence: Fence, events: Sequence[FenceEvent]) -> tuple[Fence, Inside]:
+            return fence, who_waits(fence, events)
+
+        found: tuple[Fence, Inside] = await self._ask(ReadFence(Answer(), name, self.time(), read, rows=rows))
+        return found
+
+    async def follow(self, client: Client, op: Operation, after: int) -> None:
+        """Read events as a watch does."""
+        fence = self.core.fence(op["name"])
+        asked = self.model.ask(PREFIX + op["name"])
+        events = fence.recent(after, op["most"])
+        if events is None:
+            try:
+                events = self._storage.read_events(fence.number, after, op["most"])
+            except KeyError:  # deleted meanwhile
+                events = fence.recent(fence.oldest_recent - 1, op["most"]) or []
+            except (OSError, MemoryError) as error:
+                raise NotStoredError(str(error)) from error
+        sent = following(after, events, fence.first)
+        truth = self.model.fences.ever[fence.number]
+        # What the storage has dropped may be about to be published; until then there is no answer.
+        known = truth.deleted is None and truth.first == fence.first
+        complete = len(events) < op["most"] and (known or sent is not None or after >= fence.last)
+        client.followed(asked, fence, after, sent or Sent(after), complete=complete)
+
+    async def _keep_fence(self, client: Client, op: Operation) -> None:
+        """Store who is inside, and drop old events, as the engine does."""
+        asked = self.model.ask(PREFIX + op["name"])
+        try:
+            fence, inside = await self.who_is_inside(op["name"], op["rows"])
+            for step in self._storage.inside(fence.number, inside):
+                failed: list[Exception | None] = []
+                self._commits.submit([step], partial(_remember, failed))
+                await Wait(partial(len, failed))
+                if failed[0] is not None:
+                    return
+            fence.unsaved = max(fence.last - inside.sequence, 0)
+            first = self._storage.boundary(fence.number, max(1, fence.last + 1 - op["back"]))
+            self.model.fences.permit(fence.number, first)
+            await self._ask(DropEvents(Answer(), op["name"], self.time(), fence, first))
+        except (KeyError, OSError, MemoryError) as error:  # deleted meanwhile, or the storage fails
+            if not isinstance(error, KeyError) and not self.model.faulty:
+                raise self.model.finds(f"without a reason: {error!r}") from error
+        except Exception as error:
+            client.fence_refused(op, asked, error)
+
     async def special(self, client: Client, op: Operation) -> None:
         """A snapshot, as housekeeping takes it, or time that passes."""
+        if op["do"] == "keep":
+            await self._keep_fence(client, op)
+            return
         if op["do"] in ("day", "tick"):
             self.model.days |= op["do"] == "day"
             self._pass(DAY if op["do"] == "day" else op["seconds"])
@@ -362,6 +466,11 @@ class CoreServer:
         """Time passes, and whoever should leave does."""
         self._pass(MOMENT)
         self.rest()
+        if self.model.fences.overdue(self.time() - TICK):  # a request that was refused is repeated after a second
+            self._pass(MICROSECOND * LOOK_AGAIN)
+            self.rest()
+        if late := self.model.fences.overdue(self.time() - TICK):
+            raise self.model.finds(f"{late} have been inside for long, and have made no event")
         if overdue := self.model.overdue(self.time() - TICK):
             raise self.model.finds(f"{overdue} have not lost what should have left")
 
@@ -383,6 +492,7 @@ def compare(core: Core, model: Model) -> None:
         raise model.finds("a name is busy or its state unknown at rest")
     if list(core.hulls) != sorted(model.alive):
         raise model.finds(f"in memory there are the hulls {list(core.hulls)}, kept are {sorted(model.alive)}")
+    compare_fences(core, model)
     for name, hull in core.hulls.items():
         truth, state = model.alive[name], hull.state
         if hull.row != truth.row:
@@ -392,8 +502,39 @@ def compare(core: Core, model: Model) -> None:
             raise model.finds(f"{name} is {held} in memory, kept is {truth.revision, truth.contents[-1]}")
         if truth.timed:
             _compare_entities(name, state, truth, model)
-        if not model.days and state.kept().producers != truth.producers:
-            raise model.finds(f"producers in memory: {state.kept().producers}, kept: {truth.producers}")
+        known = {name: last for name, last in truth.producers.items() if not model.days or name.endswith(SKIPS)}
+        held_producers = state.kept().producers
+        if not known.items() <= held_producers.items() <= truth.producers.items():
+            raise model.finds(f"producers in memory: {held_producers}, kept: {truth.producers}")
+
+
+def compare_fences(core: Core, model: Model) -> None:
+    """Compare the fences that a core holds with the truth."""
+    if list(core.fences) != sorted(model.fences.alive):
+        raise model.finds(f"in memory are the fences {list(core.fences)}, kept are {sorted(model.fences.alive)}")
+    for name, fence in core.fences.items():
+        truth = model.fences.alive[name]
+        if (fence.row, fence.last, fence.first, fence.consumers) != (
+            truth.row,
+            truth.last,
+            truth.first,
+            truth.consumers,
+        ):
+            raise model.finds(
+                f"in memory is {fence.row, fence.last, fence.first, fence.consumers}, "
+                f"kept is {truth.row, truth.last, truth.first, truth.consumers}"
+            )
+        inside = {
+            (hull, key): None if fence.dwelling is None else fence.dwelling.times(hull, subjects.keys([key])).item()
+            for hull, subjects in fence.subjects.items()
+            for key in key_list(subjects.index.inside(fence.number))
+        }
+        kept = {subject: NO_TIME if since is None else since for subject, since in truth.inside.items()}
+        if fence.dwelling is None:
+            kept = dict.fromkeys(kept)
+        count, near = fence.inside, fence.pair is not None and fence.pair.near
+        if (inside, count, near) != (kept, len(kept) + truth.near, truth.near):
+            raise model.finds(f"inside of {name} are {inside, count, near}, kept is {kept, truth.near}")
 
 
 def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -> None:

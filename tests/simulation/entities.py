@@ -3,8 +3,10 @@
 A point without a key is named by its x: no two have the same.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from dynhull_server.state.fences.records import Cause
 from dynhull_server.state.records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, PointRows
 
 Key = str | float
@@ -15,11 +17,12 @@ Effect = tuple[int, int, int, int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Entity:
-    """One point: its x, its time, and when it leaves."""
+    """One point: its x, its time, when it leaves, and its y."""
 
     x: float
     time: int = NO_TIME
     deadline: int = FOREVER
+    y: float = 0.0
 
 
 class Entities:
@@ -28,6 +31,7 @@ class Entities:
     Attributes:
         held: the points there are.
         clock: the hull's clock.
+        gone: why points have left in the last revision.
     """
 
     def __init__(self, settings: HullSettings) -> None:
@@ -35,6 +39,7 @@ class Entities:
         self._window = settings.window
         self.held: dict[Key, Entity] = {}
         self.clock: int | None = None
+        self.gone: dict[Key, Cause] = {}
 
     @property
     def follows_server(self) -> bool:
@@ -42,22 +47,30 @@ class Entities:
 
     def apply(self, rows: KeyRows) -> Effect:
         """Put and remove keys."""
-        removed = sum(self.held.pop(key, None) is not None for key in _listed(rows.removes))
+        removes = [key for key in _listed(rows.removes) if key in self.held]
+        self._remove(removes, Cause.REMOVED)
         count = {"new": 0, "moved": 0, "stale": 0, "skipped": 0}
         for row, key in enumerate(_listed(rows.keys)):
             time = NO_TIME if rows.times is None else int(rows.times[row])
             deadline = FOREVER if rows.deadlines is None else int(rows.deadlines[row])
-            entity = Entity(float(rows.points[row, 0]), time, deadline)
+            x, y = rows.points[row].tolist()
+            entity = Entity(x, time, deadline, y)
             count[self._put(key, entity, rows.condition)] += 1
-        return count["new"], count["moved"], count["stale"], count["skipped"], removed, self._evict()
+        return count["new"], count["moved"], count["stale"], count["skipped"], len(removes), self._evict()
+
+    def _remove(self, keys: Iterable[Key], why: Cause) -> None:
+        self.gone = dict.fromkeys(keys, why)
+        for key in keys:
+            del self.held[key]
 
     def apply_points(self, rows: PointRows) -> Effect:
         """Insert and delete points."""
         assert rows.times is not None  # there is a window
-        removed = sum(self.held.pop(x, None) is not None for x in rows.deletes[:, 0].tolist())
-        for x, time in zip(rows.inserts[:, 0].tolist(), rows.times.tolist(), strict=True):
-            self.held[x] = Entity(x, time)
-        return len(rows.inserts), 0, 0, 0, removed, self._evict()
+        deletes = [x for x in rows.deletes[:, 0].tolist() if x in self.held]
+        self._remove(deletes, Cause.REMOVED)
+        for (x, y), time in zip(rows.inserts.tolist(), rows.times.tolist(), strict=True):
+            self.held[x] = Entity(x, time, y=y)
+        return len(rows.inserts), 0, 0, 0, len(deletes), self._evict()
 
     def _put(self, key: Key, entity: Entity, condition: str | None) -> str:
         before = self.held.get(key)
@@ -75,13 +88,13 @@ class Entities:
         leaving = oldest[: len(oldest) - most] if most else []
         for key in leaving:
             del self.held[key]
+            self.gone[key] = Cause.EXPIRED
         return len(leaving)
 
     def expire(self, rows: Expiry, clock: int) -> bool:
         """Let those leave that are too old, or whose time has come. Whether they are as many as was said."""
         leaving = self.overdue(clock, rows.until)
-        for key in leaving:
-            del self.held[key]
+        self._remove(leaving, Cause.EXPIRED)
         return len(leaving) == rows.points > 0
 
     def overdue(self, clock: int, until: int | None = None) -> list[Key]:
@@ -97,11 +110,11 @@ class Entities:
 
 def loaded(contents: Contents) -> dict[Key, Entity]:
     """The points of a snapshot."""
-    xs, n = contents.points[:, 0].tolist(), len(contents)
+    xs, ys, n = *contents.points.T.tolist(), len(contents)
     keys = xs if contents.keys is None else _listed(contents.keys)
     times = [NO_TIME] * n if contents.times is None else contents.times.tolist()
     deadlines = [FOREVER] * n if contents.deadlines is None else contents.deadlines.tolist()
-    return dict(zip(keys, map(Entity, xs, times, deadlines), strict=True))
+    return dict(zip(keys, map(Entity, xs, times, deadlines, ys), strict=True))
 
 
 def _listed(keys: object) -> list[Key]:

@@ -8,6 +8,7 @@ its x, and all points of a parabola are vertices: so an answer names the batches
 * No batch is there twice, and no two of one producer have the same number.
 * A read at a revision is the truth at that revision, and so is a recall.
 * No answer to a later request is older than an answer that has been seen.
+* Events of fences follow from the revisions: see `fence_model`.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
@@ -16,16 +17,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from support.sides import Rings, hull
+
 from dynhull_server.state.batch import Applied
+from dynhull_server.state.fences.records import Cause
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, KeyRows, PointRows, Record
 
-from .entities import Effect, Entities, Key
+from .entities import Effect, Entities, Entity, Key
+from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
 
 Content = tuple[float, ...]
 
 # Batches to hulls with keys remove a key of their own, from here on, that nobody puts: it names the batch.
 FIRST_TAG = 1_000
+
+# The end of the names of producers whose numbers may skip.
+SKIPS = "-skips"
 
 DELETED = 2**62
 
@@ -40,6 +48,8 @@ class Truth:
 
     `keys` are the keys at each revision, by their x, and `entities` those that there are; of hulls without keys or
     window none.
+    `attempts` are the batches of the revisions, `held` the entities at each, and `gone` why others left in it;
+    `corners` is for fences. `since` is the number of commits when it was made.
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
     """
 
@@ -49,6 +59,11 @@ class Truth:
     deleted: bool = False
     bonds: deque[tuple[int, list[int]]] = field(default_factory=deque)
     keys: list[dict[float, Key]] = field(default_factory=lambda: [{}])
+    held: list[dict[Key, Entity]] = field(default_factory=lambda: [{}])
+    gone: list[dict[Key, Cause]] = field(default_factory=lambda: [{}])
+    attempts: list[int | None] = field(default_factory=lambda: [None])
+    corners: dict[int, Rings] = field(default_factory=dict)
+    since: int = 0
     entities: Entities = field(init=False)
 
     def __post_init__(self) -> None:
@@ -61,6 +76,20 @@ class Truth:
     @property
     def revision(self) -> int:
         return len(self.contents) - 1
+
+    def entities_at(self, revision: int) -> dict[Key, Entity]:
+        """The points at a revision."""
+        if self.timed:
+            return self.held[revision]
+        return {x: Entity(x, y=x * x) for x in self.contents[revision]}
+
+    def outline(self, revision: int) -> Content:
+        """The vertices at a revision: all points, if they are on the parabola."""
+        entities = self.held[revision].values() if self.timed else ()
+        if all(entity.y == entity.x**2 for entity in entities):
+            return self.contents[revision]
+        places = {(int(UNIT * entity.x), int(UNIT * entity.y)): entity.x for entity in entities}
+        return tuple(sorted(places[corner] for corner in hull(places)))
 
 
 @dataclass(slots=True, eq=False)
@@ -75,6 +104,7 @@ class Asked:
     creates: int
     makes: bool
     removes: bool
+    commits: int
 
 
 class Model:
@@ -88,15 +118,20 @@ class Model:
         faulty: whether anything has failed in this life.
         stopping: whether the server has begun to stop.
         days: whether producers may have been forgotten.
+        fences: the fences.
+        numbers: the numbers of all hulls and fences.
+        commits: how many there have been.
         finding: the first promise that was broken.
     """
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self.alive: dict[str, Truth] = {}
+        self.fences = FenceModel(self)
+        self.numbers: set[int] = set()
+        self.commits = 0
         self.faulty = self.stopping = self.days = False
         self.finding: str | None = None
-        self._numbers: set[int] = set()
         self._hulls: dict[int, Truth] = {}
         self._uids: dict[str, Truth] = {}
         self._places: dict[int, tuple[Truth, int]] = {}
@@ -110,7 +145,9 @@ class Model:
         self._numbered: dict[tuple[str, str, int], list[Truth]] = defaultdict(list)
 
     def full(self, name: str, limit: str) -> bool:
-        """Whether a limit leaves no room for one more hull, or for one more point of this one."""
+        """Whether a limit leaves no room for one more hull or fence, or for one more point or consumer of this one."""
+        if limit in ("max_fences", "max_fence_consumers"):
+            return self.fences.full(name.removeprefix(PREFIX), limit, self._limits.fences)
         if limit == "max_hulls":
             return len(self.alive) >= self._limits.max_hulls
         truth = self.alive.get(name)
@@ -129,23 +166,32 @@ class Model:
         self._open.clear()
         for truth in self._hulls.values():
             self._see(truth.row.name, (truth.row.number, DELETED if truth.deleted else truth.revision))
+        for number, fence in self.fences.ever.items():
+            self._see(PREFIX + fence.row.name, (number, fence.last if fence.deleted is None else DELETED))
 
     # What is kept
 
     def landed(self, changes: Sequence[Any]) -> None:
         """The storage has kept these changes, by one commit."""
+        self.commits += 1
         appended: list[int | None] = []
+        of_fences: list[Any] = []
+        before: dict[str, tuple[Truth, int]] = {}
         for change in changes:
             match change:
                 case Create():
                     self._create(change.row)
                 case Append():
                     truth = self._hulls[change.number]
+                    before[truth.row.name] = truth, truth.revision
                     appended += [self._append(truth, record) for record in change.records]
                 case Delete():
                     truth = self._hulls[change.number]
                     truth.deleted = True
+                    before[truth.row.name] = truth, truth.revision
                     del self.alive[truth.row.name]
+                case _ if isinstance(change, FENCE_CHANGES):
+                    of_fences.append(change)
         for attempt in filter(None, appended):
             together = self._bound.get(attempt, [])
             if not set(together) <= set(appended):
@@ -153,14 +199,17 @@ class Model:
             if together:
                 truth, revision = self._places[attempt]
                 truth.bonds.append((revision, together))
+        if of_fences or self.fences.alive:
+            self.fences.landed(of_fences, before)
 
     def _create(self, row: HullRow) -> None:
-        if row.number in self._numbers:
+        if row.number in self.numbers:
             raise self.finds(f"the number {row.number} is given to a second hull")
         if row.name in self.alive:
             raise self.finds(f"a second hull {row.name} is made beside the first")
-        self._numbers.add(row.number)
+        self.numbers.add(row.number)
         self.alive[row.name] = self._hulls[row.number] = self._uids[row.uid] = Truth(row)
+        self.alive[row.name].since = self.commits
 
     def _append(self, truth: Truth, record: Record) -> int | None:
         """Take a revision into the truth. Returns the number of its batch, None for an expiry."""
@@ -168,6 +217,7 @@ class Model:
             raise self.finds("a batch is kept of a hull that has been deleted")
         if record.revision != truth.revision + 1:
             raise self.finds(f"revision {record.revision} is kept after revision {truth.revision}")
+        truth.attempts.append(None)
         if isinstance(record.rows, Expiry):
             self._revise(truth, record, record.rows)
             return None
@@ -187,11 +237,17 @@ class Model:
                 content.discard(x)
             truth.contents.append(tuple(sorted(content)))
         if record.producer:
-            if record.sequence != truth.producers.get(record.producer, 0) + 1 and not self.days:
+            last = truth.producers.get(record.producer, 0)
+            in_turn = record.sequence == last + 1
+            if record.producer.endswith(SKIPS):
+                in_turn = record.sequence > last
+            forgotten = self.days and not record.producer.endswith(SKIPS)
+            if not in_turn and not forgotten:
                 raise self.finds(f"batch {record.sequence} of {record.producer} is kept out of its turn")
             truth.producers[record.producer] = record.sequence
             self._numbered[truth.row.name, record.producer, record.sequence].append(truth)
         self._places[attempt] = truth, record.revision
+        truth.attempts[-1] = attempt
         return attempt
 
     def _revise(self, truth: Truth, record: Record, rows: KeyRows | PointRows | Expiry) -> None:
@@ -210,6 +266,8 @@ class Model:
         entities.clock = record.clock
         if record.clock is not None and (overdue := entities.overdue(record.clock)):
             raise self.finds(f"{overdue} are in {truth.row.name} at {record.clock}, and should have left")
+        truth.held.append(dict(entities.held))
+        truth.gone.append(entities.gone)
         truth.keys.append({entity.x: key for key, entity in entities.held.items()})
         truth.contents.append(tuple(sorted(truth.keys[-1])))
 
@@ -232,6 +290,10 @@ class Model:
         """These batches are applied together or not at all."""
         self._bound |= dict.fromkeys(attempts, attempts)
 
+    def together(self, attempt: int) -> list[int]:
+        """The batches that are applied together with one, itself among them; none for one that is alone."""
+        return self._bound.get(attempt, [])
+
     def uid(self) -> str:
         """Of a new hull."""
         self._uids_given += 1
@@ -241,12 +303,14 @@ class Model:
         """A client is about to send a request that may make or remove a hull."""
         floor = self._floor.get(name, (0, DELETED))
         alive = floor[1] != DELETED and not self._open[name, "delete"]
-        absent = name not in self.alive and not self._open[name, "create"]
+        there = name in self.alive or (name.startswith(PREFIX) and name.removeprefix(PREFIX) in self.fences.alive)
+        absent = not there and not self._open[name, "create"]
         self._count(name, makes, removes, 1)
         self._asked[name, "create"] += makes
         self._asked[name, "delete"] += removes
         deletes, creates = self._asked[name, "delete"], self._asked[name, "create"]
-        return Asked(name, floor, alive and not removes, absent and not makes, deletes, creates, makes, removes)
+        alive, absent = alive and not removes, absent and not makes
+        return Asked(name, floor, alive, absent, deletes, creates, makes, removes, self.commits)
 
     def _count(self, name: str, makes: bool, removes: bool, by: int) -> None:
         if makes:
@@ -257,6 +321,8 @@ class Model:
     def _see(self, name: str, place: tuple[int, int]) -> None:
         if place > self._floor.get(name, (0, 0)):
             self._floor[name] = place
+        for fence, last in self.fences.told(*place):
+            self._see(PREFIX + fence.row.name, (fence.row.number, last))
         if place[0] not in self._hulls:
             return
         bonds = self._hulls[place[0]].bonds
@@ -290,8 +356,7 @@ class Model:
     def applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:
         """A batch has been acknowledged."""
         if applied.duplicate:
-            hulls = self._numbered.get((asked.name, producer, sequence), [])
-            if attempt in self._places or not hulls:
+            if attempt in self._places or not self._may_be_duplicate(asked.name, producer, sequence):
                 raise self.finds(f"batch {attempt} is called a duplicate")
             self._refused.add(attempt)
             self._answered(asked, asked.floor)
@@ -305,6 +370,13 @@ class Model:
         if (truth.row.number, revision) == asked.floor:
             raise self.finds(f"batch {attempt} was seen before it was sent")
         self._answered(asked, (truth.row.number, revision))
+
+    def _may_be_duplicate(self, name: str, producer: str, sequence: int) -> bool:
+        """Whether a hull of that name has a batch with the number, or with a greater one if numbers may skip."""
+        if producer.endswith(SKIPS):
+            hulls = [each for each in self._hulls.values() if each.row.name == name]
+            return any(each.producers.get(producer, 0) >= sequence for each in hulls)
+        return bool(self._numbered.get((name, producer, sequence)))
 
     def put(self, attempt: int, applied: Applied, puts: int, *, timed: bool) -> None:
         """A batch of keys has been acknowledged: what it is said to have done must be what it did.
@@ -320,6 +392,20 @@ class Model:
         if (said, applied.late) != (effect, puts - rows):
             raise self.finds(f"batch {attempt} is said to have done {applied}, and did {effect} of {rows} rows")
 
+    def answered_fence(self, asked: Asked, number: int, last: int) -> None:
+        """An answer about a fence comes from after the event `last`."""
+        self._answered(asked, (number, last))
+
+    def removed_fence(self, asked: Asked) -> None:
+        """A fence has been deleted."""
+        name = asked.name.removeprefix(PREFIX)
+        gone = [
+            number for number, fence in self.fences.ever.items() if fence.row.name == name and fence.deleted is not None
+        ]
+        if not gone:
+            raise self.finds(f"the deletion of {asked.name} was answered before it was kept")
+        self._answered(asked, (max(gone), DELETED))
+
     def refused(self, asked: Asked, attempts: Sequence[int] = ()) -> None:
         """Nothing of a request is done, nor ever will be."""
         for attempt in attempts:
@@ -333,23 +419,34 @@ class Model:
         if asked.alive and self._asked[asked.name, "delete"] == asked.deletes:
             raise self.finds(f"{asked.name} is there, and was not found")
 
+    def unsure(self, name: str, asked: Asked) -> None:
+        """A request about a fence did not find a hull: there must have been a time without it."""
+        truth = self.alive.get(name)
+        if truth is not None and truth.since <= asked.commits and not self._open[name, "delete"]:
+            raise self.finds(f"{name} is there, and was not found for {asked.name}")
+
+    def fenced(self, asked: Asked) -> None:
+        """A hull cannot be deleted, because a fence depends on it."""
+        if not self.fences.fenced(asked.name, asked.commits):
+            raise self.finds(f"no fence depends on {asked.name}, and it is called fenced")
+
     def exists(self, asked: Asked) -> None:
         """There is a hull of that name."""
         if asked.absent and self._asked[asked.name, "create"] == asked.creates:
             raise self.finds(f"{asked.name} was never made, and is called there")
 
-    def content(self, uid: str, revision: int) -> Content:
-        """The truth at a revision of a hull that an answer has named."""
+    def _outline(self, uid: str, revision: int) -> Content:
+        """The vertices at a revision of a hull that an answer has named."""
         truth = self._uids.get(uid)
         if truth is None:
             raise self.finds(f"an answer names a hull that is not kept: {uid}")
         if not 0 <= revision <= truth.revision:
             raise self.finds(f"an answer names revision {revision} of {truth.row.name}, which is not kept")
-        return truth.contents[revision]
+        return truth.outline(revision)
 
     def read(self, asked: Asked, uid: str, revision: int, seen: Content) -> None:
         """A hull was read."""
-        kept = self.content(uid, revision)
+        kept = self._outline(uid, revision)
         if seen != kept:
             raise self.finds(f"revision {revision} of {asked.name} was answered as {seen}, and is kept as {kept}")
         self._answered(asked, (self._uids[uid].row.number, revision))
@@ -362,7 +459,7 @@ class Model:
 
     def recalled(self, uid: str, revision: int, seen: Content) -> None:
         """An earlier revision was read."""
-        kept = self.content(uid, revision)
+        kept = self._outline(uid, revision)
         if seen != kept:
             raise self.finds(f"revision {revision} was recalled as {seen}, and is kept as {kept}")
 

@@ -18,7 +18,7 @@ Operation = dict[str, Any]
 
 NAMES = ("a", "b", "c")
 # Hulls with keys, and of which type these are; and one of points in a window.
-TIMED = {"k": "str", "w": "multiset", "l": "int"}
+TIMED = {"k": "str", "w": "multiset", "l": "int", "kk": "str"}
 
 # What can be asked for, and how often. Each plan has some of it much more often, and some not at all: faults hide where
 # a few operations meet (swarm testing: Groce and others, 2012).
@@ -34,7 +34,7 @@ CORE = {
     "snapshot": 5,
     "last": 4,
     "tick": 12,
-    "day": 1,
+    "day": 3,
 }
 SHELL = {
     "write": 34,
@@ -49,6 +49,22 @@ SHELL = {
     "watch": 6,
     "rest": 8,
 }
+
+# In plans with fences, beside these. Fences have names of their own; each has its kind of subjects.
+FENCES = {
+    "fence": 20,
+    "refence": 10,
+    "unfence": 5,
+    "follow": 10,
+    "ack": 12,
+    "unack": 2,
+    "inside": 4,
+    "keep": 15,
+}
+FENCED = {"f": ("hull", "k"), "g": ("prefix", "k"), "h": ("other", "k"), "i": ("hull", "l")}
+AREAS = ("a", "k", "kk", "l", "w")
+# The share of plans with fences.
+WITH_FENCES = 0.12
 
 SWARM = (0, 1, 1, 5)
 
@@ -72,20 +88,33 @@ ENDS = ("kill", "kill", "stop")
 def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     draw = random.Random(seed)
-    with_times = draw.random() < 0.5
+    with_fences = draw.random() < WITH_FENCES
+    with_times = with_fences or draw.random() < 0.5
     names = NAMES[: draw.randint(1, 1 if with_times else 3)]
-    timed = tuple(draw.sample(tuple(TIMED), draw.randint(1, 3))) if with_times else ()
+    timed = tuple(draw.sample(("k", "w", "l"), draw.randint(1, 3))) if with_times else ()
+    fences = tuple(draw.sample(tuple(FENCED), draw.choice((1, 1, 2, 3)))) if with_fences else ()
+    if with_fences:
+        timed = tuple(dict.fromkeys(("k", *timed, *(("kk",) if draw.random() < 0.4 else ()))))
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
     weights["write"] += 1
+    if with_fences:
+        weights |= {do: often * draw.choice(SWARM) for do, often in FENCES.items()}
+        weights["put"] += 20
+        if layer != "core":  # the engine does it itself
+            weights["keep"] = 0
     if not timed:
         weights |= {"put": 0, "tick": 0}
         weights["together"] *= len(names) > 1
     immediate = layer != "sqlite" and draw.random() < 0.15
-    lives = [_life(draw, names, timed, weights) for _ in range(draw.choice((1, 1, 2, 3)))]
+    lives = [_life(draw, (names, timed, fences), weights) for _ in range(draw.choice((1, 1, 2, 3)))]
     for name in timed:
         if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window
             create = {"do": "create", "name": name, "max_points": 0} | _settings(draw, name)
             lives[0]["clients"][0].insert(0, create)
+    if with_fences:
+        lives[0]["clients"][0][len(timed) :] = [_of_fence(draw, "fence", name) for name in fences] + lives[0][
+            "clients"
+        ][0][len(timed) :]
     plan = {
         "seed": seed,
         "layer": layer,
@@ -96,6 +125,11 @@ def random_plan(seed: int, layer: str) -> Plan:
             "max_producers": draw.choice((1, 10, 10)),
             "max_producers_per_caller": draw.choice((1, 10, 10)),
             "history_bytes": draw.choice((0, 0, 700, 1_000_000)),
+        },
+        "fences": {
+            "max_fences": draw.choice((1, 10, 10)),
+            "max_fence_consumers": draw.choice((1, 10)),
+            "fence_history_bytes": draw.choice((0, 1000, 100_000)),
         },
         "lives": lives,
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
@@ -113,11 +147,14 @@ def _recall_beside_delete(draw: random.Random, name: str) -> list[list[Operation
     return [[write, write, *recalls], [{"do": "rest", "seconds": 0.001}, {"do": "delete", "name": name}]]
 
 
-def _life(
-    draw: random.Random, names: tuple[str, ...], timed: tuple[str, ...], weights: dict[str, int]
-) -> dict[str, Any]:
+# The names of hulls of points, of hulls with keys or a window, and of fences.
+Names = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+
+
+def _life(draw: random.Random, names: Names, weights: dict[str, int]) -> dict[str, Any]:
+    most = 7 if names[2] else 4  # what fences say is seen later than what hulls hold
     clients = [
-        [_operation(draw, names, timed, weights) for _ in range(draw.randint(1, 4))]
+        [_operation(draw, names, weights) for _ in range(draw.randint(1, most))]
         for _ in range(draw.choice((1, 2, 2, 3, 4)))
     ]
     life: dict[str, Any] = {"clients": clients, "end": draw.choice(ENDS)}
@@ -126,10 +163,14 @@ def _life(
     return life
 
 
-def _operation(
-    draw: random.Random, names: tuple[str, ...], timed: tuple[str, ...], weights: dict[str, int]
-) -> Operation:
+def _operation(draw: random.Random, all_names: Names, weights: dict[str, int]) -> Operation:
+    names, timed, fences = all_names
     do = draw.choices(list(weights), list(weights.values()))[0]
+    if do in FENCES:
+        op = _of_fence(draw, do, draw.choice(fences))
+        if draw.random() < 0.2:
+            op["leave"] = int(draw.expovariate(1 / 3))
+        return op
     every = (*names, *timed)
     op: Operation = {"do": do, "name": draw.choice({"write": names, "stream": names, "put": timed}.get(do, every))}
     if do == "put":
@@ -137,6 +178,8 @@ def _operation(
         op["numbered"] = draw.random() < 0.5
         op["rows"] = draw.choice((1, 1, 1, 200))
         op |= _puts(draw)
+        if fences:
+            op["lift"] = draw.choice((0, 0, 2, 30))
     elif do in ("write", "stream"):
         op["create"] = draw.random() < 0.7
         op["numbered"] = draw.random() < 0.5
@@ -148,8 +191,11 @@ def _operation(
         if do == "stream":
             op["batches"] = draw.randint(1, 5)
             op["window"] = draw.randint(1, 5)
+            op["message"] = draw.choice((1, 1, 2, 3, 5))
         elif draw.random() < 0.05:
             op["shared"] = True
+        if op["numbered"] and draw.random() < 0.3:
+            op["skips"] = [draw.choice((0, 0, 1, 3, -1, -2)) for _ in range(op.get("batches", 1))]
     elif do == "together":
         op["names"] = draw.sample(every, draw.randint(2, len(every)))
         op["numbered"] = draw.random() < 0.5
@@ -175,6 +221,53 @@ def _operation(
     if draw.random() < 0.2:
         op["leave"] = int(draw.expovariate(1 / 3))
     return op
+
+
+def _of_fence(draw: random.Random, do: str, name: str) -> Operation:
+    """A request about a fence."""
+    op: Operation = {"do": do, "name": name, "rows": draw.choice((1, 1, 200, 5_000))}
+    if do in ("fence", "refence"):
+        op["config"] = _config(draw, *FENCED[name])
+    elif do in ("ack", "unack"):
+        op["consumer"] = draw.choice(("x", "x", "y"))
+        op["back"] = draw.choice((None, 0, 0, 1, 3))
+    else:
+        op["back"] = draw.choice((0, 0, 1, 5, 50))
+        op["most"] = draw.choice((1, 3, 1_000))
+    return op
+
+
+def _config(draw: random.Random, kind: str, subjects: str) -> dict[str, Any]:
+    """The settings of a fence; times in microseconds."""
+    config: dict[str, Any] = {
+        "kind": kind,
+        "subjects": subjects,
+        "initial": draw.choice(("snapshot", "events", "none")),
+    }
+    hull = draw.choice(("a", "a", "a", *AREAS))
+    if kind == "other":
+        while hull == subjects:
+            hull = draw.choice(AREAS)
+        return config | {"area": {"hull": hull}, "near": draw.choice((0.0, 0.0, 2.0, 50.0))}
+    match draw.choice(("hull", "hull", "strips", "strips", "circle", "others")):
+        case "hull":
+            config["area"] = {"hull": hull}
+        case "strips":
+            config["area"] = {"strips": draw.choice((1, 2, 3)), "holes": draw.random() < 0.3}
+        case "circle":
+            config["area"] = {"circle": draw.randint(3, 15), "radius": draw.choice((0, 5, 20, 200))}
+        case "others":
+            config["area"] = {"hull": "l" if subjects == "l" else "k", "without_self": kind == "hull"}
+    config["margin"] = draw.choice((0.0, 0.0, 1.0, 30.0))
+    if config["area"].get("without_self"):
+        return config | {"margin": draw.choice((0.5, 20.0))}
+    config["closed"] = "hull" in config["area"] or draw.random() < 0.7
+    config["crosses"] = config["closed"] and draw.random() < 0.4
+    if draw.random() < 0.3:
+        config["dwell"] = draw.choice((1, 100_000, 400_000))
+    if draw.random() < 0.3:
+        config[draw.choice(("max_events", "max_event_age"))] = draw.choice((1, 4, 1_000_000))
+    return config
 
 
 def _settings(draw: random.Random, name: str) -> dict[str, Any]:

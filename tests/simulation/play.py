@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import dynhull_server
-from dynhull_server.state.limits import Limits
+from dynhull_server.state.limits import FenceLimits, Limits
 from dynhull_server.storage.memory import MemoryStorage
 
-from .clients import Client, probe
+from .clients import Client, probe, probe_fence
 from .core_life import CoreServer
 from .model import Finding, Model
 from .plan import Plan
@@ -17,6 +17,9 @@ from .schedule import Schedule
 from .shell_life import ShellServer
 from .sqlite_store import SQLiteLives
 from .store import FaultyStorage
+
+# How often a fence is made anew at the end of a life.
+ANEW = 0.3
 
 LAYERS = {"core": CoreServer, "shell": ShellServer, "sqlite": ShellServer}
 
@@ -48,7 +51,7 @@ def play(plan: Plan) -> Outcome:
 
 
 def _play(plan: Plan) -> Outcome:
-    limits = Limits(**plan["limits"])
+    limits = Limits(**plan["limits"], fences=FenceLimits(**plan.get("fences", {})))
     model, schedule = Model(limits), Schedule(plan["seed"])
     storage = _storage(plan, model)
     lives = 0
@@ -110,6 +113,8 @@ def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, st
     anew = schedule.random.choice(names)
     for name in names:
         server.probe(probe(server, model, name, anew=name == anew))
+    for name in sorted(model.fences.alive):
+        server.probe(probe_fence(server, model, name, anew=schedule.random.random() < ANEW))
     server.let_leave()
     server.check()
     storage.calm = False

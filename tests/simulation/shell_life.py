@@ -12,15 +12,20 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import TRANSIENT, Supervisor
 from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.engine.watch import watch
+from dynhull_server.engine.watch_fence import watch_fence
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
 from dynhull_server.state.events import WriteBatch, WriteTogether
+from dynhull_server.state.fences.config import FenceConfig
+from dynhull_server.state.fences.fence import Fence
+from dynhull_server.state.fences.records import Consumer, Inside
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings
 
 from .clients import Client, Outline, outline
 from .core_life import compare
+from .fence_model import PREFIX
 from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
 from .model import Finding, Model
 from .plan import Operation
@@ -147,6 +152,42 @@ class ShellServer:
     async def last(self, name: str, producer: str) -> int:
         return await self._engine.get(name).last_sequence(producer)
 
+    # What clients ask of fences
+
+    def fence(self, name: str) -> Fence:
+        return self._engine.fences.get(name).fence
+
+    async def create_fence(self, name: str, config: FenceConfig, _: int) -> Fence:
+        return (await self._engine.fences.create(name, config)).fence
+
+    async def replace_fence(self, name: str, config: FenceConfig, _: int) -> Fence:
+        return (await self._engine.fences.replace(name, config)).fence
+
+    async def delete_fence(self, name: str) -> None:
+        await self._engine.fences.delete(name)
+
+    async def acknowledge(self, name: str, consumer: str, sequence: int | None, uid: str) -> Consumer:
+        return await self._engine.fences.get(name).acknowledge(consumer, sequence, uid)
+
+    async def drop_consumer(self, name: str, consumer: str) -> None:
+        await self._engine.fences.get(name).drop_consumer(consumer)
+
+    async def who_is_inside(self, name: str, _: int) -> tuple[Fence, Inside]:
+        live = self._engine.fences.get(name)
+        return live.fence, await live.waiting()
+
+    async def follow(self, client: Client, op: Operation, after: int) -> None:
+        """Watch a fence for a few responses."""
+        live = self._engine.fences.get(op["name"])
+        async with aclosing(watch_fence(live, after, progress_interval=1.0)) as responses:
+            async for sent in responses:
+                asked = self.model.ask(PREFIX + op["name"])
+                client.followed(asked, live.fence, after, sent, complete=False)
+                after = sent.sequence
+                op = op | {"most": op["most"] - 1}
+                if not op["most"] or after >= live.fence.last:
+                    return
+
     async def special(self, client: Client, op: Operation) -> None:
         """Let time pass, or watch a hull."""
         if op["do"] == "rest":
@@ -197,9 +238,10 @@ class ShellServer:
         self._drive(probe, "a probe")
 
     def let_leave(self) -> None:
-        """Whoever should have left by now leaves."""
+        """Whoever should have left by now leaves, and who has been inside for long makes an event."""
         time = self.time() - TICK
         self._until(lambda: not self.model.overdue(time), "what should leave")
+        self._until(lambda: not self.model.fences.overdue(time), "who has been inside for long")
 
     def check(self) -> None:
         """Compare what is in memory with the truth, and let background work succeed again."""

@@ -9,7 +9,16 @@ from .play import play
 # Schedules that are tried for each smaller plan.
 SEEDS = 30
 
-SIMPLER = {"rows": 1, "shared": False, "numbered": False, "window": 1, "batches": 1, "back": 0, "max_points": 0}
+SIMPLER = {
+    "rows": 1,
+    "shared": False,
+    "numbered": False,
+    "window": 1,
+    "batches": 1,
+    "message": 1,
+    "back": 0,
+    "max_points": 0,
+}
 
 
 def shrunk(plan: Plan) -> Plan:
@@ -62,7 +71,7 @@ def _smaller(plan: Plan) -> Iterator[Plan]:
 
 
 def _simpler(plan: Plan, path: tuple[str | int, ...], op: dict[str, object]) -> Iterator[Plan]:
-    for key in ("leave", "delete", "torn", "crowd"):
+    for key in ("leave", "delete", "torn", "crowd", "skips"):
         if key in op:
             yield _without(plan, *path, key)
     for key, value in SIMPLER.items():

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from dynhull_server.state.fences.records import FenceEvent, Inside, KeptFence
 from dynhull_server.state.records import HullRow, Kept
 from dynhull_server.storage.port import NEWEST, Contents, NotCommittedError, Progress, Step, Storage
 
@@ -118,6 +119,34 @@ class FaultyStorage:
         """The oldest revision of a hull."""
         self._fail("oldest")
         return self._inner.oldest(number)
+
+    def read_fence(self, number: int) -> KeptFence | None:
+        """A fence."""
+        self.give_way()
+        self._fail("read")
+        kept = self._inner.read_fence(number)
+        self.give_way()
+        return kept
+
+    def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
+        """Events of a fence."""
+        self.give_way()
+        self._fail("read")
+        events = self._inner.read_events(number, after, most)
+        self.give_way()
+        return events
+
+    def boundary(self, number: int, first: int) -> int:
+        """Before which event all events can be dropped."""
+        self._fail("read")
+        return self._inner.boundary(number, first)
+
+    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+        """Steps; each may fail."""
+        for step in self._inner.inside(number, inside):
+            self.give_way()
+            self._fail("snapshot")
+            yield step
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
         """Steps; each may fail."""

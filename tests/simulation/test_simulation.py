@@ -20,6 +20,9 @@ FIRST = 5 * 10**6
 # Faults that are found in a second; `python -m simulation mutants` has all of them.
 QUICK = {
     "expiry_not_journalled",
+    "fence_expiry_with_the_batch",
+    "fence_lines_use_up_hulls",
+    "fence_sequence_again",
     "row02_discarded_while_creating",
     "row06_commit_thread_catches_one_kind",
     "row18_unknown_is_nothing",

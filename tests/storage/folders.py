@@ -13,12 +13,14 @@ from dynhull_server.state.fences.records import (
     AppendEvents,
     Cause,
     Consumer,
+    Delay,
     EventType,
     FenceEvent,
     FenceRow,
     Inside,
     Members,
     PutConsumer,
+    PutDelays,
 )
 from dynhull_server.state.records import Append, Contents, Create, HullRow, Kept, PointRows, Record
 from dynhull_server.storage.sqlite.folder import DATABASE
@@ -101,12 +103,13 @@ def events(first, last):
 
 
 def fill_fence(storage, last, number=9, hull="fleet"):
-    """A fence with a commit for each event, a consumer, and one who was inside from the beginning."""
+    """A fence with a commit for each event, a consumer, a delay, and one who was inside from the beginning."""
     inside = Inside(0, (Members(hull, PackedKeys.pack(["a"]), 1),))
     storage.commit([AddFence(fence_row(number, hull=hull), inside)])
     for each in events(1, last):
         storage.commit([AppendEvents(number, [each])])
     storage.commit([PutConsumer(number, Consumer("mail", 1, 0))])
+    storage.commit([PutDelays(number, {(hull, "é"): Delay(True, 2**50, 1, int(Cause.MOVED))})])
 
 
 def snapshot(storage, revision, number=1):

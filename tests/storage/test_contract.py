@@ -17,6 +17,7 @@ from dynhull_server.state.fences.records import (
     AppendEvents,
     ChangeFence,
     Consumer,
+    Delay,
     DropConsumer,
     DropEvents,
     DropFence,
@@ -24,6 +25,7 @@ from dynhull_server.state.fences.records import (
     Inside,
     Members,
     PutConsumer,
+    PutDelays,
     Waits,
 )
 from dynhull_server.state.records import (
@@ -159,7 +161,7 @@ def records(first, last):
 def test_what_was_committed_comes_back(opened):
     assert (opened.contents.hulls, opened.contents.next_number, opened.contents.notes) == ([], 1, [])
     batches = [
-        record(1, producer="truck é", sequence=7),
+        record(1, producer="truck é", sequence=7, may_skip=True),
         Record(2, PointRows(NOTHING, points(1, 1))),
         Record(3, PointRows(NOTHING, NOTHING)),
         record(4, n=20_000, deletes=np.array([[-0.5, 1e308], [5e-324, 0.0]]), lenient=True),
@@ -264,7 +266,11 @@ def test_hulls_with_keys_and_times(opened, kind):
     hull = HullRow(3, kind, "uid", 0.5, settings)
     opened.commit(Create(hull))
     everything = [record(revision) for revision in range(1, 31)]
-    kept = {20: Kept(20, contents(40_000), {"gateway 1": 19}, [], -7), 30: Kept(30, contents(0), {}, [], 2**53)}
+    skipping = frozenset({"gateway 1"})
+    kept = {
+        20: Kept(20, contents(40_000), {"gateway 1": 19}, [], -7, skipping=skipping),
+        30: Kept(30, contents(0), {}, [], 2**53),
+    }
     for revision in (10, 20, 30):
         opened.commit(Append(3, everything[revision - 10 : revision]))
         if revision in kept:
@@ -273,9 +279,7 @@ def test_hulls_with_keys_and_times(opened, kind):
         assert opened.storage.row(3) == hull
         for revision in range(20, 31):
             base = kept[revision // 10 * 10]
-            expected = Kept(
-                base.revision, base.contents, base.producers, everything[base.revision : revision], base.clock
-            )
+            expected = replace(base, records=everything[base.revision : revision])
             same(opened.storage.read(3, revision), expected)
         opened.reopen()
         assert opened.contents.hulls == [hull]
@@ -479,6 +483,7 @@ def test_all_kinds_of_events_come_back(opened):
         event(2)._replace(key=2**64 - 1, event_time=NO_TIME, area_revision=5, causes=255, distance=float("inf")),
         event(3)._replace(hull="other", time=3, first_time=1, previous=None, distance=5e-324),
         event(4)._replace(position=None, distance=None, previous=(-1e308, 5e-324), subject_revision=2**50),
+        event(5)._replace(type=EventType.BEGIN, key=None, position=None, previous=None, distance=0.0),
     ]
     kinds[0] = kinds[0]._replace(inside=members)
     fenced(opened, 0)
@@ -495,10 +500,10 @@ def test_all_kinds_of_events_come_back(opened):
 def test_who_is_inside_replaces_earlier_events(opened):
     fenced(opened, 6)
     members = (Members("fleet", PackedKeys.pack(f"key {i:05}" for i in range(40_000)), 4),)
-    opened.carry_out(opened.storage.inside(9, Inside(4, members)))
+    opened.carry_out(opened.storage.inside(9, Inside(4, members, 2**61)))
     for _ in range(2):
         kept = opened.storage.read_fence(9)
-        assert (kept.inside.sequence, kept.events, kept.first) == (4, events(5, 6), 1)
+        assert (kept.inside.sequence, kept.inside.time, kept.events, kept.first) == (4, 2**61, events(5, 6), 1)
         assert [key for each in kept.inside.members for key in each.keys] == list(members[0].keys)
         opened.reopen()
     assert opened.storage.boundary(9, 7) == 5  # later events lead from there to who is inside now
@@ -531,6 +536,23 @@ def test_since_when_a_fence_asks_for_how_long_comes_back(opened):
         for _ in range(2):
             assert opened.storage.read_fence(9).row == changed
             opened.reopen()
+
+
+def test_delays_come_back_until_they_end(opened):
+    fenced(opened, 2)
+    first = opened.storage.read_fence(9).delays
+    assert list(first) == [("fleet", "é")]
+    some = {("fleet", "b"): Delay(False, -1, 0, 255), ("b", 2**64 - 1): Delay(True, 2**62, 2**32 - 1, 0)}
+    opened.commit(PutDelays(9, some), PutDelays(9, {("fleet", "é"): None, ("b", 7): None}))
+    for _ in range(2):
+        assert opened.storage.read_fence(9).delays == some
+        opened.reopen()
+    opened.commit(PutDelays(9, {("b", 2**64 - 1): Delay(True, 3, 2, 1)}))
+    opened.commit(PutDelays(9, {("fleet", "b"): None, ("fleet", "é"): Delay(True, 4, 1, 1)}))
+    opened.commit(PutDelays(9, {("fleet", "é"): None}))
+    for _ in range(2):
+        assert opened.storage.read_fence(9).delays == {("b", 2**64 - 1): Delay(True, 3, 2, 1)}
+        opened.reopen()
 
 
 def test_settings_and_consumers_of_a_fence_change(opened):

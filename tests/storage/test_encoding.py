@@ -66,6 +66,7 @@ def key_rows(draw):
     return KeyRows(*map(draw, columns), condition)
 
 
+centers = st.none() | st.tuples(st.floats(-180, 180, exclude_max=True), st.floats(-90, 90))
 expiries = st.builds(Expiry, st.none() | times, st.integers(0, 2**32 - 1))
 
 
@@ -74,7 +75,15 @@ def records(draw):
     first = draw(st.integers(1, 2**40))
     rows = draw(st.lists(point_rows() | key_rows() | expiries, min_size=1, max_size=4))
     return [
-        Record(first + i, each, draw(st.text(max_size=9)), draw(st.integers(0, 2**64 - 1)), draw(st.none() | times))
+        Record(
+            first + i,
+            each,
+            draw(st.text(max_size=9)),
+            draw(st.integers(0, 2**64 - 1)),
+            draw(st.none() | times),
+            draw(centers),
+            draw(st.booleans()),
+        )
         for i, each in enumerate(rows)
     ]
 
@@ -131,14 +140,25 @@ def test_contents_come_back_from_chunks(given, size):
 
 @given(st.dictionaries(st.text(), st.integers(1, 2**64 - 1)) | st.just({"producers": 3, "clock": 4}), st.none() | times)
 def test_the_state_of_a_snapshot_comes_back(producers, clock):
-    assert chunks.state_from(chunks.state(Kept(producers=producers, clock=clock)))[:2] == (producers, clock)
+    for center in (None, (-180.0, 89.5)):
+        before = Kept(producers=producers, clock=clock, center=center, skipping=frozenset(list(producers)[::2]))
+        kept, _ = chunks.state_from(chunks.state(before))
+        assert (kept.producers, kept.clock, kept.center) == (producers, clock, center)
+        assert kept.skipping == before.skipping
+
+
+def test_a_snapshot_without_producers_that_skip():
+    """As before there were any."""
+    kept, _ = chunks.state_from(b'{"producers": {"p": 3}, "clock": 4}')
+    assert (kept.producers, kept.clock, kept.skipping) == ({"p": 3}, 4, frozenset())
 
 
 @pytest.mark.parametrize("state", [b"", b"{}", b'{"producers": 3, "clock": 4}'])
 def test_snapshots_of_earlier_formats(state):
     """Their chunks are points alone, and their state the last number of each producer."""
-    producers, clock, decoded = chunks.state_from(state)
-    assert (producers, clock) == ({"producers": 3, "clock": 4} if len(state) > 2 else {}, None)
+    kept, decoded = chunks.state_from(state)
+    assert kept.producers == ({"producers": 3, "clock": 4} if len(state) > 2 else {})
+    assert (kept.clock, kept.center) == (None, None)
     points = np.arange(6.0).reshape(-1, 2)
     same(chunks.joined([decoded(points.tobytes()), decoded(b"")]), Contents(points))
     same(chunks.joined([]), Contents())
@@ -158,6 +178,8 @@ settings = st.builds(
     st.integers(0, 2**64 - 1),
     st.none() | windows,
     st.booleans(),
+    st.sampled_from(["plane", "geographic"]),
+    centers,
 )
 
 

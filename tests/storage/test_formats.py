@@ -1,5 +1,6 @@
 """Data folders that earlier versions wrote: they open, are migrated once, and go on."""
 
+import json
 import shutil
 import sqlite3
 
@@ -11,6 +12,8 @@ from test_faults import FaultyDisk, failure
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
+from dynhull_server.state.fences.records import Delay, PutDelays
+from dynhull_server.state.fences.restoring import members_after
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.sqlite.schema import FORMAT
@@ -197,5 +200,32 @@ def test_a_folder_of_format_3_has_every_key_time_and_deadline(folder, name, tmp_
         )
         vans = next(row for row in contents.hulls if row.name == "vans")
         assert last_sequences(storage.read(vans.number)) == {"gate": 1 if name == "stopped" else 2}
+        storage.close()
+        assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
+
+
+# Format 4, written by tests/data/make_folder.py
+
+FORMAT_4 = OLD_FOLDERS / "format4"
+
+
+@pytest.mark.parametrize("name", ["stopped", "killed"])
+def test_a_folder_of_format_4_has_every_fence(folder, name):
+    """Who is inside, as the version said that wrote it; from then on, events may be delayed."""
+    shutil.copytree(FORMAT_4 / name, folder)
+    expected = json.loads((FORMAT_4 / f"{name}-fences.json").read_text())
+    for life in range(3):
+        storage, contents = opened(folder)
+        assert contents.notes == []
+        found = {}
+        for row in contents.fences:
+            kept = storage.read_fence(row.number)
+            inside = {hull: sorted(keys) for hull, keys in members_after(kept).items() if keys}
+            consumers = {each: consumer.acknowledged for each, consumer in kept.consumers.items()}
+            found[row.name] = {"inside": inside, "last": kept.last, "consumers": consumers}
+            assert len(kept.delays) == (life if row.name == "gate" else 0)
+        assert found == expected
+        gate = next(row.number for row in contents.fences if row.name == "gate")
+        storage.commit([PutDelays(gate, {("vans", f"van é{life}"): Delay(True, 10**15, 1, 1)})])
         storage.close()
         assert query(folder, "PRAGMA user_version") == [(FORMAT,)]

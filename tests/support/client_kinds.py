@@ -1,6 +1,7 @@
 """Both clients behind one interface, so that one test runs on both."""
 
 import asyncio
+import concurrent.futures
 import inspect
 import threading
 from functools import cache
@@ -17,13 +18,34 @@ def loop() -> asyncio.AbstractEventLoop:
 
 
 def wait(function, *arguments, **options):
-    """Call a function on the loop, await what it returns if necessary, and return the result."""
+    """Call a function on the loop, await what it returns if necessary, and return the result.
+
+    A future becomes one for threads.
+    """
 
     async def call():
         result = function(*arguments, **options)
+        if isinstance(result, asyncio.Future):
+            return threaded(result)
         return await result if inspect.isawaitable(result) else result
 
     return Waiting.of(asyncio.run_coroutine_threadsafe(call(), loop()).result())
+
+
+def threaded(future: asyncio.Future) -> concurrent.futures.Future:
+    """A future for threads with the outcome of one of the loop."""
+    outcome = concurrent.futures.Future()
+
+    def done(_: asyncio.Future) -> None:
+        if future.cancelled():
+            outcome.cancel()
+        elif future.exception() is not None:
+            outcome.set_exception(future.exception())
+        else:
+            outcome.set_result(future.result())
+
+    future.add_done_callback(done)
+    return outcome
 
 
 class Waiting:

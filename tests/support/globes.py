@@ -6,27 +6,32 @@ import mpmath
 import numpy as np
 import spherely
 
-from dynhull import GeoHull
-from dynhull._given import Given
-from dynhull._globe_tree import GlobeTree
-from dynhull._tree import HullTree
+from dynhull import GeoHull, GeoKeyedHull, GeoWindowHull
+from dynhull._globe_tree import GlobeEntities, GlobeTree, GlobeWindowTree
 
 EARTH_RADIUS = 6371008.8  # metres, the mean
 DIGITS = mpmath.MPContext()
 DIGITS.dps = 50
 
 
-class PythonGlobeTree(GlobeTree):
-    _tree_type = HullTree
-    _given_type = Given
-
-
 class PythonGeoHull(GeoHull):
     __slots__ = ()
-    _tree_type = PythonGlobeTree
+    _tree_type = GlobeTree
+
+
+class PythonGeoKeyedHull(GeoKeyedHull):
+    __slots__ = ()
+    _tree_type = GlobeEntities
+
+
+class PythonGeoWindowHull(GeoWindowHull):
+    __slots__ = ()
+    _tree_type = GlobeWindowTree
 
 
 GEO_HULLS = {"python": PythonGeoHull, "as installed": GeoHull}
+GEO_KEYED_HULLS = {"python": PythonGeoKeyedHull, "as installed": GeoKeyedHull}
+GEO_WINDOW_HULLS = {"python": PythonGeoWindowHull, "as installed": GeoWindowHull}
 
 
 def direction(place):

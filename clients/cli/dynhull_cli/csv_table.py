@@ -14,6 +14,7 @@ from .peek import peek
 
 DELIMITERS = "\t;,| "  # the first of these in the first line, outside quotes, separates the columns
 DELIMITER_NAMES = {"tab": "\t", "\\t": "\t", "space": " "}
+END_OF_TEXT = "\0\x04\0"  # after the last line: a row of its own unless a quote is open
 UTF16_MARKS = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 
 
@@ -89,11 +90,13 @@ def csv_table(name: str, file: IO[bytes], given: CsvFormat) -> Iterator[CsvTable
         skipped, first_line = _first_line(name, text)
         delimiter = _delimiter(given.delimiter, first_line)
         # Runs of spaces separate columns once.
-        reader = csv.reader(chain([first_line], text), delimiter=delimiter, skipinitialspace=delimiter == " ")
+        lines = chain([first_line], text, [END_OF_TEXT])
+        reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
         try:
             yield _table(name, reader, given, delimiter, skipped, notes)
         except csv.Error as error:
-            raise ValueError(f"{name}, line {skipped + reader.line_num}: {error}") from None
+            advice = ": is a quote not closed?" if "field limit" in str(error) else ""
+            raise ValueError(f"{name}, line {skipped + reader.line_num}: {error}{advice}") from None
     finally:
         text.detach()
 
@@ -106,8 +109,21 @@ def numbered(rows: Iterable[list[str]], first_line: int) -> Iterator[tuple[int, 
         first_line += 1 + sum(field.count("\n") for field in row)
 
 
+def _closed(name: str, reader: Any, skipped: int) -> Iterator[list[str]]:
+    """The rows; ValueError for a quote that is still open at the end of the file: it holds all lines after it."""
+    before = reader.line_num
+    for row in reader:
+        if row and row[-1].endswith(END_OF_TEXT):
+            if row == [END_OF_TEXT]:
+                return
+            raise ValueError(f"{name}, line {skipped + before + 1}: a quote is opened and not closed before the end")
+        yield row
+        before = reader.line_num
+
+
 def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: int, notes: list[str]) -> CsvTable:
-    first = [field.strip() for field in next(reader)]
+    rows = _closed(name, reader, skipped)
+    first = [field.strip() for field in next(rows)]
     if len(first) == 1:
         raise UnclearTableError(
             f"{name} has a single column, {first[0]!r}", "give the character between its columns with --delimiter"
@@ -118,7 +134,7 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
 
     if _is_header(first, given):
         x, y = coordinate_columns(name, first, given.x, given.y)
-        return CsvTable(first, x, y, delimiter, next_line(), reader, next_line, notes)
+        return CsvTable(first, x, y, delimiter, next_line(), rows, next_line, notes)
     numbers = [f"column {number}" for number in range(1, len(first) + 1)]
     if given.x is not None or given.y is not None:
         x, y = coordinate_columns(name, numbers, given.x, given.y)
@@ -131,7 +147,7 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
             "if the first row names the columns, add --header",
         )
     notes.append(f"{name} has no header: x is column {x + 1}, y is column {y + 1}")
-    return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], reader), next_line, notes)
+    return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], rows), next_line, notes)
 
 
 def _encoding(name: str, file: IO[bytes], given: str | None, notes: list[str]) -> str:

@@ -41,7 +41,7 @@ def list_hulls(
     prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="List only hulls whose names begin with this.")] = "",
     as_json: AsJson = False,
 ) -> None:
-    """List the hulls of the server by name, with their points, distinct points, revision, kind of keys and window.
+    """List the hulls by name, with their points, distinct points, revision, kind of keys, window and centre.
 
     dynhull list fleet/ --json | jq -r .name
 
@@ -59,7 +59,8 @@ def list_hulls(
             typer.echo(json_line(**_members(info)))
         else:
             counts = f"{info.points}\t{info.distinct}\t{info.revision}"
-            typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}")
+            frame = f"\tglobe {_shown_place(info)}".rstrip(" ") if info.geographic else ""
+            typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}")
 
 
 def _setting(text: str, *names: str) -> Any:
@@ -99,6 +100,18 @@ def create(
     point_limit: Annotated[
         int | None, _setting("Number of points beyond which batches are refused. Default: the server's limit.")
     ] = None,
+    geographic: Annotated[
+        bool, _setting("Points are longitudes and latitudes on the globe. Default: points of a plane.", "--geographic")
+    ] = False,
+    center: Annotated[
+        str | None,
+        _setting(
+            "Centre of a geographic hull, LON,LAT in degrees; points are within 85 degrees of it. Default: the mean "
+            "direction of the first points.",
+            "--center",
+            "--centre",
+        ),
+    ] = None,
     exist_ok: Annotated[
         bool, typer.Option("--exist-ok", help="Accept a hull that exists already with the same settings.")
     ] = False,
@@ -107,10 +120,11 @@ def create(
     """Create hulls without points.
 
         dynhull create fleet/north fleet/south
-        dynhull create vehicles --keyed str --max-age 30m
+        dynhull create vehicles --keyed str --max-age 30m --geographic
 
     A hull with --keyed holds one point for each key: `dynhull put` inserts or moves it. With --max-age or --max-points,
-    points leave the hull by themselves.
+    points leave the hull by themselves. With --geographic, edges are great circles; lengths and areas are metres and
+    square metres on WGS 84.
     """
     from dynhull_client import HullExistsError
 
@@ -123,7 +137,11 @@ def create(
         "ahead": "clamp" if clamp else "refuse",
         "ordering": "event_time" if event_order else "arrival",
         "point_limit": point_limit,
+        "geographic": geographic,
+        "center": None if center is None else _place(center),
     }
+    if center is not None and not geographic:
+        raise ValueError("--center is given with --geographic")
     for name in names:
         try:
             client.create_hull(name, **settings)
@@ -136,6 +154,43 @@ def create(
         typer.echo(
             json_line(name=name, created=created) if as_json else f"{name}: {'created' if created else 'exists'}"
         )
+
+
+@connected
+def recenter(
+    client: "HullClient",
+    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")],
+    center: Annotated[
+        str | None,
+        typer.Argument(metavar="LON,LAT", help="New centre, in degrees. Default: the mean direction of the points."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Move the centre of a geographic hull, whose points are within 85 degrees of it.
+
+        dynhull recenter fleet -- -170,-15
+
+    The hull is built anew, as one revision.
+    """
+    info = client.recenter(name, None if center is None else _place(center))
+    if as_json:
+        typer.echo(json_line(name=name, revision=info.revision, center=info.center))
+    else:
+        typer.echo(f"{name}: about {_shown_place(info)}, revision {info.revision}")
+
+
+def _place(text: str) -> tuple[float, float]:
+    """LON,LAT as numbers; ValueError for another text."""
+    try:
+        lon, lat = (float(each) for each in text.split(","))
+    except ValueError:
+        raise ValueError(f"the centre is {text!r}: give LON,LAT, two numbers of degrees") from None
+    return lon, lat
+
+
+def _shown_place(info: "HullInfo") -> str:
+    """The centre of a hull in a few characters; empty without one."""
+    return "" if info.center is None else ",".join(f"{each:g}" for each in info.center)
 
 
 @connected
@@ -195,6 +250,8 @@ def _members(info: "HullInfo") -> dict[str, Any]:
         "max_age": None if window is None or window.max_age is None else window.max_age.total_seconds(),
         "max_points": None if window is None else window.max_points,
         "clock": None if info.clock is None else info.clock.isoformat(),
+        "geographic": info.geographic,
+        "center": info.center,
     }
 
 
@@ -214,7 +271,8 @@ def _table(hulls: "list[HullInfo]") -> "Table":
         table.add_column(heading, justify="right")
     table.add_column("keys")
     table.add_column("window")
+    table.add_column("centre")
     for info in hulls:
         counts = (f"{each:,}" for each in (info.points, info.distinct, info.revision))
-        table.add_row(info.name, *counts, info.keyed or "", _window(info))
+        table.add_row(info.name, *counts, info.keyed or "", _window(info), _shown_place(info))
     return table

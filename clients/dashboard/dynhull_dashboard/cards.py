@@ -8,6 +8,7 @@ from html import escape
 from dynhull_client import Difference
 
 from .advice import about_hull
+from .degrees import SQUARE_KILOMETRE
 from .feed import HullFeed, Verified
 from .looks import Look
 
@@ -50,7 +51,12 @@ def _figures(feed: HullFeed) -> tuple[str, ...]:
     outline, _ = feed.drawings()
     drawn = len(outline.points)
     vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
-    return f"{feed.revision:,}", f"{feed.points:,}", vertices, _number(feed.area), _number(feed.rate, RATE_DIGITS)
+    return f"{feed.revision:,}", f"{feed.points:,}", vertices, _area(feed), _number(feed.rate, RATE_DIGITS)
+
+
+def _area(feed: HullFeed) -> str:
+    """The area; of a geographic hull in square kilometres, whatever the unit of the others."""
+    return _number(feed.area) if feed.center is None else f"{_number(feed.area / SQUARE_KILOMETRE)} km²"
 
 
 def symbol(look: Look) -> str:

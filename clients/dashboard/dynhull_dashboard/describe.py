@@ -35,9 +35,10 @@ def _sentence(feed: HullFeed) -> str:
         return f"{feed.name}: nothing drawn."
     left, bottom, right, top = feed.bounds
     shape = SHAPES.get(feed.vertices, f"a convex polygon with {feed.vertices:,} vertices")
+    x, y = ("x", "y") if feed.center is None else ("longitude", "latitude")
     return (
-        f"{feed.name}: {shape} around {feed.points:,} points, x from {left:.6g} to {right:.6g}, "
-        f"y from {bottom:.6g} to {top:.6g}, at revision {feed.revision:,}."
+        f"{feed.name}: {shape} around {feed.points:,} points, {x} from {left:.6g} to {right:.6g}, "
+        f"{y} from {bottom:.6g} to {top:.6g}, at revision {feed.revision:,}."
     )
 
 

@@ -20,9 +20,10 @@ from dynhull_client import (
     Verification,
 )
 
+from .degrees import Center, shown
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
-from .outline import Box, apart, drawn
+from .outline import Box, apart, box_around, drawn
 from .repeating import repeat
 from .search import KeySearch
 
@@ -56,8 +57,9 @@ class HullFeed:
         revision: its revision.
         points: its number of points, with multiplicity.
         vertices: its number of vertices.
-        area: its area; NaN before it is known.
+        area: its area, of a geographic hull in square metres; NaN before it is known.
         bounds: the smallest box around it; None while it is empty or unknown.
+        center: the centre of a geographic hull; None for a plane, or while there is none.
         verified: the last verification; None before the first.
         rate: batches per second, over the last second.
         history: one row per second.
@@ -84,6 +86,7 @@ class HullFeed:
         self.vertices = 0
         self.area = math.nan
         self.bounds: Box | None = None
+        self.center: Center | None = None
         self._outline = Drawing(vertices_of(self.name), 0, NO_POINTS)
         self._inner = Drawing(points_of(self.name), 0, NO_POINTS)
         self.verified: Verified | None = None
@@ -154,10 +157,14 @@ class HullFeed:
         assert event.measures is not None  # requested by measures=True
         self.vertices = len(copy.vertices)
         self.area = event.measures.area
-        self.bounds = event.measures.bounds if self.vertices else None
-        shown = drawn(self.vertices)
-        keys = None if copy.vertex_keys is None else copy.vertex_keys[shown]
-        self._outline = Drawing(vertices_of(self.name), event.revision, copy.vertices[shown], keys)
+        self.center = copy.center
+        corners = shown(copy.vertices, self.center)
+        self.bounds = None
+        if self.vertices:
+            self.bounds = event.measures.bounds if self.center is None else box_around(corners)
+        rows = drawn(self.vertices)
+        keys = None if copy.vertex_keys is None else copy.vertex_keys[rows]
+        self._outline = Drawing(vertices_of(self.name), event.revision, corners[rows], keys)
 
     async def _count(self) -> None:
         """Add a row to the history every second."""
@@ -177,9 +184,10 @@ class HullFeed:
     async def _sample(self) -> None:
         if self._inner.revision != self.revision:
             sampled = await self._client.sample_points(self.name, SAMPLE_SIZE, keys=self.keyed and self.followed)
-            inner = apart(sampled.points, self._outline.points)
+            points = shown(sampled.points, self.center)
+            inner = apart(points, self._outline.points)
             keys = None if sampled.keys is None else [sampled.keys[row] for row in np.flatnonzero(inner)]
-            self._inner = Drawing(points_of(self.name), sampled.revision, sampled.points[inner], keys)
+            self._inner = Drawing(points_of(self.name), sampled.revision, points[inner], keys)
 
     async def _find(self) -> None:
         await self.search.ask(self._copy)

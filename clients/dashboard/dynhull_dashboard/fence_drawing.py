@@ -10,6 +10,7 @@ import shapely
 
 from dynhull_client import Circle, Fence, Points, Prefix
 
+from .degrees import Center, circle, shown
 from .outline import MOST_DRAWN, Box
 
 CORNERS_OF_CIRCLE = 180
@@ -37,13 +38,16 @@ class Area:
     drawn: int = 0
 
 
-def area_of(name: str, fence: Fence | None) -> Area:
-    """The area of the fence with this name, an empty one where there is none. Time linear in the corners."""
+def area_of(name: str, fence: Fence | None, center: Center | None = None) -> Area:
+    """The area of the fence with this name, an empty one where there is none. Time linear in the corners.
+
+    With `center` it is on the globe, and drawn around this centre.
+    """
     if fence is None:
         return Area(_area_message(name))
     margin = fence.margin if fence.other_hull is None else fence.near
-    polygons = _polygons(fence)
-    around = _around(polygons, margin)
+    polygons = [[shown(ring, center) for ring in rings] for rings in _polygons(fence, on_globe=center is not None)]
+    around = _around(polygons, margin) if center is None else []
     message = _area_message(name, area_hulls(fence), margin, polygons, around)
     if not polygons:
         return Area(message)
@@ -88,10 +92,10 @@ def corner_count(fence: Fence) -> int:
     return sum(len(ring) for each in polygons for ring in (each.exterior, *each.holes))
 
 
-def _polygons(fence: Fence) -> list[Rings]:
+def _polygons(fence: Fence, *, on_globe: bool) -> list[Rings]:
     """The rings of the polygons to draw: the exterior, then the holes."""
     if isinstance(fence.area, Circle):
-        return [[_circle(fence.area, fence.area.r)]]
+        return [[circle(fence.area) if on_globe else _circle(fence.area, fence.area.r)]]
     if isinstance(fence.area, str):
         return []
     step = -(-corner_count(fence) // MOST_DRAWN)

@@ -4,6 +4,7 @@ import asyncio
 
 from dynhull_client import AsyncHullClient, DynhullError, Fence, FenceNotFoundError, Inside
 
+from .degrees import shown_place
 from .event_rows import MOST_EVENTS, EventRows
 from .fence_drawing import area_of
 from .marks import MOST_MARKED, Mark, Marks
@@ -78,10 +79,20 @@ class FenceFeed:
                 self._forget()
             raise
         self.trouble, self.deleted = None, False
-        before, self.fence = self.fence, fence
-        if before is None or _drawn(fence) != _drawn(before):
-            self.area = area_of(self.name, fence)
+        if self.fence is None or _drawn(fence) != _drawn(self.fence):
+            center = await self._center(fence)
+            self.marks.center = center
+            self.area = area_of(self.name, fence, center)
+        self.fence = fence
         self._known.set()
+
+    async def _center(self, fence: Fence) -> tuple[float, float] | None:
+        """The centre of the hulls of a fence on the globe; None for one in the plane."""
+        name = fence.subjects if isinstance(fence.subjects, str) else fence.area
+        if not isinstance(name, str):
+            return None
+        info = await self._client.wait_for_hull(name, timeout=TIMEOUT_SECONDS)
+        return info.center
 
     def _forget(self) -> None:
         """There is no fence of this name. Its events stay on the page."""
@@ -140,7 +151,10 @@ class FenceFeed:
                 break
             found = await self._client.positions(each.hull, keys, timeout=TIMEOUT_SECONDS)
             rows = zip(keys, found.positions.tolist(), found.present.tolist(), strict=True)
-            marks.extend(Mark(each.hull, str(key), x, y) for key, (x, y), present in rows if present)
+            center = self.marks.center
+            marks.extend(
+                Mark(each.hull, str(key), *shown_place(x, y, center)) for key, (x, y), present in rows if present
+            )
         return marks
 
 

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from dynhull_client import FenceEvent
 
+from .degrees import Center, shown_place
+
 MOST_MARKED = 500
 
 
@@ -23,9 +25,13 @@ class Marks:
 
     Args:
         fence: the name of the fence.
+
+    Attributes:
+        center: the centre of the hulls of a fence on the globe, around which they are drawn; None for the plane.
     """
 
     def __init__(self, fence: str) -> None:
+        self.center: Center | None = None
         self._fence = fence
         self._marks: dict[tuple[str, str], Mark] = {}
         self._message: str | None = None
@@ -55,5 +61,5 @@ class Marks:
             del self._marks[subject]
             self._message = None
         elif event.type == "enter" and event.position is not None and len(self) < MOST_MARKED:
-            self._marks[subject] = Mark(*subject, *event.position)
+            self._marks[subject] = Mark(*subject, *shown_place(*event.position, self.center))
             self._message = None

@@ -22,6 +22,12 @@ def drawn(count: int) -> slice:
     return slice(None, None, max(1, -(-count // MOST_DRAWN)))
 
 
+def box_around(points: Points) -> Box:
+    """The smallest box around some points."""
+    (left, bottom), (right, top) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return left, bottom, right, top
+
+
 def apart(points: Points, vertices: Points) -> npt.NDArray[np.bool_]:
     """Whether each point is not a vertex: these have a marker of their own."""
     return ~np.isin(points @ (1, 1j), vertices @ (1, 1j))

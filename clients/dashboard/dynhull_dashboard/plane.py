@@ -95,8 +95,8 @@ class Plane:
         )
         bare(self.plot)
         self.plot.min_border_left = LABEL_WIDTH + AXIS_LABEL_HEIGHT
-        self.plot.xaxis.axis_label = axis_label("x", units.x)
-        self.plot.yaxis.axis_label = axis_label("y", units.y)
+        self._names = axis_label("x", units.x), axis_label("y", units.y)
+        self.plot.xaxis.axis_label, self.plot.yaxis.axis_label = self._names
         self.plot.xaxis.formatter = compact_ticks()
         self.plot.yaxis.formatter = compact_ticks()
         # The ranges follow only these two corners, which move seldom; the hulls move often.
@@ -138,12 +138,21 @@ class Plane:
 
     def update(self) -> None:
         """Adjust the frame to the hulls and the fences."""
+        self._name_axes()
         boxes = [drawn.feed.bounds for drawn in self._drawn.values()]
         boxes += [feed.area.bounds for feed, _ in self._fences.values()]
         frame = frame_around([box for box in boxes if box is not None], self._frame, self._same_scale)
         if frame is not None and frame is not self._frame:
             self._frame = frame
             self._corners.data = _corners(frame)
+
+    def _name_axes(self) -> None:
+        """Name the axes longitude and latitude while all hulls with points are on the globe."""
+        feeds = [drawn.feed for drawn in self._drawn.values() if drawn.feed.bounds is not None]
+        on_globe = bool(feeds) and all(feed.center is not None for feed in feeds)
+        names = ("longitude (°)", "latitude (°)") if on_globe else self._names
+        if (self.plot.xaxis.axis_label, self.plot.yaxis.axis_label) != names:
+            self.plot.xaxis.axis_label, self.plot.yaxis.axis_label = names
 
     def _remove(self, gone: Sequence[object]) -> None:
         self._name_sources()

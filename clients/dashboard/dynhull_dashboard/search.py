@@ -8,6 +8,8 @@ from enum import Enum, auto
 
 from dynhull_client import AsyncHullClient, HullCopy
 
+from .degrees import shown_place
+
 FORGET_SECONDS = 2.0
 MOST_KEY_BYTES = 255
 LARGEST_KEY = 2**64 - 1
@@ -108,7 +110,7 @@ class KeySearch:
                 continue
             is_corner = key in corners or bool((copy.vertices == position).all(axis=1).any())
             state = State.INSIDE if side else State.VERTEX if is_corner else State.BOUNDARY
-            x, y = position.tolist()
+            x, y = shown_place(float(position[0]), float(position[1]), copy.center)
             found[key] = Sighting(state, x, y, answer.revision)
         return found
 

@@ -18,6 +18,7 @@ except ModuleNotFoundError as _missing:
 from ._areas import Circle, Polygon, Prefix
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
+from ._async_pipeline import AsyncPipeline
 from ._async_watch import AsyncFenceWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._batch import Batch
@@ -46,6 +47,7 @@ from ._errors import (
     RevisionForgottenError,
     SequenceAheadError,
     SequenceGapError,
+    StaleCopyError,
     UnauthenticatedError,
     UnavailableError,
 )
@@ -79,6 +81,7 @@ from ._messages import (
     Verification,
     Window,
 )
+from ._pipeline import Pipeline
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import FenceWatch, Watch
 from ._writer import Writer
@@ -88,6 +91,7 @@ __all__ = [
     "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncIngest",
+    "AsyncPipeline",
     "AsyncWatch",
     "AsyncWriter",
     "Batch",
@@ -135,6 +139,7 @@ __all__ = [
     "OutcomeUnknownError",
     "PermissionDeniedError",
     "Phases",
+    "Pipeline",
     "PointMissingError",
     "Points",
     "Polygon",
@@ -149,6 +154,7 @@ __all__ = [
     "SequenceGapError",
     "Sketch",
     "Snapshot",
+    "StaleCopyError",
     "SubjectsInside",
     "Supported",
     "Tangents",

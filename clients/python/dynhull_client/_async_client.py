@@ -8,6 +8,7 @@ from . import _calls as calls
 from . import _fences as fences
 from . import _uses as uses
 from ._async_ingest import AsyncIngest
+from ._async_pipeline import AsyncPipeline
 from ._async_watch import AsyncFenceWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call
@@ -41,6 +42,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     _connect = AsyncConnection
 
     create_hull = _answering(calls.create_hull)
+    recenter = _answering(calls.recenter)
     wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)
@@ -71,6 +73,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
     ingest = opening(AsyncIngest, calls.ingest)
+    pipeline = opening(AsyncPipeline, calls.pipeline)
     watch = opening(AsyncWatch, calls.watch)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     writer = opening(AsyncWriter, calls.writer)

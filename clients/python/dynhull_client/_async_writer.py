@@ -13,7 +13,8 @@ import grpc
 from ._calls import Writing, last_sequence
 from ._errors import DynhullError, error_of
 from ._gathering import put_parts, remove_parts
-from ._window import Window, settle
+from ._outcomes import settle
+from ._window import Window
 from ._writer import CLOSED
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ class AsyncWriter:
         points: npt.ArrayLike | None = None,
         times: Any = None,
         expire_times: Any = None,
+        sequence: int | None = None,
     ) -> asyncio.Future[Applied]:
         """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
 
@@ -66,13 +68,12 @@ class AsyncWriter:
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
-        return await self._add(
-            put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
-        )
+        parts = put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
+        return await self._add(parts, sequence)
 
-    async def remove(self, keys: Any) -> asyncio.Future[Applied]:
+    async def remove(self, keys: Any, *, sequence: int | None = None) -> asyncio.Future[Applied]:
         """Remove keys, as `Writer.remove` does."""
-        return await self._add(remove_parts(keys, self._writing.missing))
+        return await self._add(remove_parts(keys, self._writing.missing), sequence)
 
     async def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
@@ -110,17 +111,18 @@ class AsyncWriter:
     def __repr__(self) -> str:
         return f"<AsyncWriter to {self._writing.name!r} as producer {self._writing.producer!r}>"
 
-    async def _add(self, parts: list[Part]) -> asyncio.Future[Applied]:
-        window = await self._open()
+    async def _add(self, parts: list[Part], sequence: int | None) -> asyncio.Future[Applied]:
+        window = self._window
+        if window is None or self._closed:
+            window = await self._open()
+        number = window.number(parts, sequence)
         async with self._turn:
             for part in parts:
                 if not window.admits(part):
-                    window.hurry(monotonic())
-                    self._turn.notify_all()
-                await self._turn.wait_for(partial(self._may_put, window, part))
+                    await self._turn.wait_for(partial(self._may_put, window, part))
                 if self._closed:
                     raise RuntimeError(CLOSED)
-                outcome = window.put(part, monotonic())
+                outcome = window.put(part, monotonic(), number)
             self._turn.notify_all()
         return outcome
 

@@ -9,10 +9,9 @@ from google.protobuf.message import Message
 
 from dynhull.arrays import as_points
 from dynhull.keys import take_keys
-from dynhull_proto.v1 import batch_pb2
+from dynhull_proto.v1 import batch_pb2, points_pb2
 
 from ._keys import checked_keys, decode_keys, encode_keys, plain_keys
-from ._messages import encode_points
 from ._times import encode_duration, encode_times
 
 if TYPE_CHECKING:
@@ -33,7 +32,6 @@ CONDITIONS = {
     "present": batch_pb2.PUT_CONDITION_IF_PRESENT,
 }
 BYTES_PER_POINT = 16
-BYTES_PER_INTEGER = 8
 BYTES_PER_TIME = 8
 
 
@@ -74,14 +72,16 @@ class Batch:
         missing: Missing | None = None,
     ) -> None:
         self._message = batch_pb2.Batch()
-        self._set_policy(missing)
+        self._rows = 0
+        if missing is not None:
+            self._set_policy(missing)
         if (keys is None) != (points is None):
             raise ValueError("keys and points are given together: the position of each key")
         if not (keys is None and remove is None) and not (insert is None and delete is None and move is None):
             raise ValueError("a batch either puts and removes keys, or inserts, deletes and moves points")
         if insert is not None:
             inserted = as_points(insert, "insert")
-            self._message.inserts.CopyFrom(encode_points(inserted))
+            self._fill(self._message.inserts, inserted)
             if times is not None:
                 self._message.insert_times.CopyFrom(encode_times(times, len(inserted), "times"))
         elif points is not None:
@@ -89,23 +89,35 @@ class Batch:
         elif times is not None:
             raise ValueError("times are given with the points to put or to insert")
         if delete is not None:
-            self._message.deletes.CopyFrom(encode_points(as_points(delete, "delete")))
+            self._fill(self._message.deletes, as_points(delete, "delete"))
         if move is not None:
             self._move(as_points(move[0], "move[0]"), as_points(move[1], "move[1]"))
         if remove is not None:
-            self._message.removes.CopyFrom(encode_keys(checked_keys(remove, "remove")))
-        self._set_conditions(only, ttl, expire_times)
+            removed = checked_keys(remove, "remove")
+            self._message.removes.CopyFrom(encode_keys(removed))
+            self._rows += len(removed)
+        if not (only is None and ttl is None and expire_times is None):
+            self._set_conditions(only, ttl, expire_times)
 
     @property
     def message(self) -> batch_pb2.Batch:
         """The batch as a protobuf message."""
         return self._message
 
-    def __repr__(self) -> str:
-        return f"<Batch of {batch_rows(self._message)} rows>"
+    @property
+    def rows(self) -> int:
+        """The number of rows of its arrays."""
+        return self._rows
 
-    def _set_policy(self, missing: Missing | None) -> None:
-        if missing not in (None, "raise", "count"):
+    def __repr__(self) -> str:
+        return f"<Batch of {self._rows} rows>"
+
+    def _fill(self, message: points_pb2.Points, xy: npt.NDArray[Any]) -> None:
+        message.packed = np.asarray(xy, "<f8").tobytes()
+        self._rows += len(xy)
+
+    def _set_policy(self, missing: Missing) -> None:
+        if missing not in ("raise", "count"):
             raise ValueError(f'missing must be "raise" or "count", got {missing!r}')
         if missing == "count":
             self._message.missing_points = batch_pb2.MISSING_POINT_POLICY_COUNT
@@ -117,19 +129,17 @@ class Batch:
         if len(checked) != len(positions):
             raise ValueError(f"there are {len(checked)} keys and {len(positions)} points")
         self._message.puts.keys.CopyFrom(encode_keys(checked))
-        self._message.puts.points.CopyFrom(encode_points(positions))
+        self._fill(self._message.puts.points, positions)
         if times is not None:
             self._message.puts.times.CopyFrom(encode_times(times, len(checked), "times"))
 
     def _move(self, origins: npt.NDArray[Any], destinations: npt.NDArray[Any]) -> None:
         if len(origins) != len(destinations):
             raise ValueError(f"move has {len(origins)} origins and {len(destinations)} destinations")
-        self._message.moves.origins.CopyFrom(encode_points(origins))
-        self._message.moves.destinations.CopyFrom(encode_points(destinations))
+        self._fill(self._message.moves.origins, origins)
+        self._fill(self._message.moves.destinations, destinations)
 
     def _set_conditions(self, only: Only | None, ttl: float | timedelta | None, expire_times: Any) -> None:
-        if only is None and ttl is None and expire_times is None:
-            return
         if not self._message.HasField("puts"):
             raise ValueError("only, ttl and expire_times are given with keys to put")
         if only not in CONDITIONS:
@@ -145,18 +155,13 @@ class Batch:
             puts.expire_times.CopyFrom(encode_times(expire_times, rows, "expire_times"))
 
 
-def batch_rows(batch: batch_pb2.Batch) -> int:
-    """The number of rows of its arrays."""
-    points = batch.inserts, batch.deletes, batch.moves.origins, batch.moves.destinations, batch.puts.points
-    rows = sum(len(each.packed) for each in points) // BYTES_PER_POINT
-    return rows + len(batch.removes.lengths) + len(batch.removes.packed_integers) // BYTES_PER_INTEGER
-
-
 def join_batches(batches: Sequence[batch_pb2.Batch]) -> batch_pb2.Batch:
     """One batch with the effect of all these, which have the same policies.
 
     Either all rows that are put or inserted have a time, or none has.
     """
+    if len(batches) == 1:
+        return batches[0]
     joined = batch_pb2.Batch(missing_points=batches[0].missing_points, missing_keys=batches[0].missing_keys)
     _concatenate(joined, batches)
     return joined

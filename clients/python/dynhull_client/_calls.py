@@ -14,6 +14,7 @@ import grpc
 import numpy as np
 
 from dynhull.arrays import as_points
+from dynhull.globe import as_center
 from dynhull_proto.v1 import hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
@@ -64,6 +65,10 @@ CLOCKS = {"server": hull_pb2.CLOCK_SERVER, "data": hull_pb2.CLOCK_DATA}
 AHEAD_POLICIES = {"refuse": hull_pb2.AHEAD_POLICY_REFUSE, "clamp": hull_pb2.AHEAD_POLICY_CLAMP}
 
 
+# The number of progress marks within the time after which a copy is too old to answer.
+MARKS = 3
+
+
 def _nothing(_: DynhullError) -> None:
     return None
 
@@ -111,10 +116,15 @@ def create_hull(
     ahead: Ahead = "refuse",
     ordering: Ordering = "arrival",
     point_limit: int | None = None,
+    geographic: bool = False,
+    center: tuple[float, float] | None = None,
     exist_ok: bool = False,
     timeout: float | None = None,
 ) -> Call[HullInfo]:
     """Create an empty hull. Its settings are fixed from then on.
+
+    A geographic hull takes and returns longitudes and latitudes in degrees, as `dynhull.GeoHull` does: its edges are
+    great circles, and its lengths and areas are metres and square metres on WGS 84.
 
     With `max_age` or `max_points`, the hull has a sliding window: points leave when they are too old or too many. The
     time of a point is its event time or, if the batch has none, the time at which the server received it.
@@ -130,11 +140,20 @@ def create_hull(
         ordering: which of two positions of a key is the later one: the one that arrives last ("arrival"), or the one
             with the later event time ("event_time"): an older one then changes nothing.
         point_limit: the number of points beyond which a batch is refused; None for the server's own limit.
+        geographic: whether points are places on the globe, rather than points of a plane.
+        center: longitude and latitude of the centre of a geographic hull, whose points are all within 85 degrees of it;
+            None for the mean direction of its first points.
         exist_ok: whether to return an existing hull of that name and kind, with its points. HullExistsError if it has
             other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
     """
     config = _config(keyed, ordering, point_limit)
+    if geographic:
+        config.frame = hull_pb2.FRAME_GEOGRAPHIC
+    if center is not None:
+        if not geographic:
+            raise ValueError("center is a setting of a geographic hull: give geographic=True, too")
+        config.center.CopyFrom(_encode_center(center))
     if max_age is not None or max_points is not None:
         config.window.CopyFrom(_window(max_age, max_points, clock, max_skew, ahead))
     elif clock != "server" or max_skew is not None or ahead != "refuse":
@@ -164,6 +183,11 @@ def _config(keyed: KeyType | None, ordering: Ordering, point_limit: int | None) 
         ordering=choice("ordering", ordering, ORDERINGS),
         max_points=_positive("point_limit", point_limit),
     )
+
+
+def _encode_center(center: tuple[float, float]) -> hull_pb2.LonLat:
+    lon, lat = as_center(center)
+    return hull_pb2.LonLat(longitude=lon, latitude=lat)
 
 
 def _window(
@@ -197,12 +221,27 @@ def _positive(argument: str, value: int | None) -> int:
 
 def _as_wanted(existing: HullInfo, wanted: HullInfo) -> HullInfo:
     """The existing hull; HullExistsError if it has other settings than the one to create."""
-    for setting in ("keyed", "window", "ordering"):
+    for setting in ("keyed", "window", "ordering", "geographic"):
         has, wants = getattr(existing, setting), getattr(wanted, setting)
         if has != wants:
             message = f"the hull {existing.name!r} exists with other settings: its {setting} is {has!r}, not {wants!r}"
             raise HullExistsError(message, grpc.StatusCode.ALREADY_EXISTS, "HULL_EXISTS", {"value": existing.name})
     return existing
+
+
+def recenter(name: str, center: tuple[float, float] | None = None, *, timeout: float | None = None) -> Call[HullInfo]:
+    """Move the centre of a geographic hull, as one revision: the hull is built anew.
+
+    Decisions that depend on nanometres may change. HullUnsuitableError if the hull is a plane, if a point is beyond 85
+    degrees from the new centre, or if there is no point to choose it from.
+
+    Args:
+        name: the hull.
+        center: longitude and latitude; None for the mean direction of the present points.
+        timeout: seconds, instead of the client's.
+    """
+    request = pb.RecenterRequest(name=name, center=None if center is None else _encode_center(center))
+    return Call("Recenter", request, lambda response: messages.decode_info(response.hull), timeout, repeatable=False)
 
 
 def wait_for_hull(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[HullInfo]:
@@ -243,6 +282,7 @@ def apply(  # noqa: D417  # unnamed takes nothing
     missing: Missing = "raise",
     producer: str = "",
     sequence: int = 0,
+    may_skip: bool = False,
     timeout: float | None = None,
 ) -> Call[Applied]:
     """Apply one batch: all of it or nothing, as one revision.
@@ -258,6 +298,8 @@ def apply(  # noqa: D417  # unnamed takes nothing
         producer: a name for the sender that numbers the batch, so that it is applied once however often it is sent.
         sequence: the batch's number. A producer numbers its batches to a hull 1, 2, 3, ...; SequenceGapError reports
             the next number.
+        may_skip: whether numbers rise and may skip, as the offsets of a log do: then a batch with any greater number
+            than the last is new. Send it after the answer to the one before.
         timeout: seconds, instead of the client's.
     """
     if unnamed:
@@ -266,7 +308,7 @@ def apply(  # noqa: D417  # unnamed takes nothing
             f"write apply({name!r}, insert=points) or apply({name!r}, delete=points)"
         )
     batch = Batch(insert=insert, delete=delete, move=move, times=times, missing=missing)
-    return _apply(name, batch, producer, sequence, timeout)
+    return _apply(name, batch, producer, sequence, may_skip, timeout)
 
 
 def put(
@@ -281,6 +323,7 @@ def put(
     expire_times: Any = None,
     producer: str = "",
     sequence: int = 0,
+    may_skip: bool = False,
     timeout: float | None = None,
 ) -> Call[Applied]:
     """Put keys as one batch, as one revision: a new key is inserted, a known key moves.
@@ -300,10 +343,11 @@ def put(
         expire_times: (n,) the times at which the keys leave, instead of `ttl`.
         producer: as for `apply`.
         sequence: as for `apply`.
+        may_skip: as for `apply`.
         timeout: seconds, instead of the client's.
     """
     batch = Batch(keys=keys, points=points, times=times, remove=remove, only=only, ttl=ttl, expire_times=expire_times)
-    return _apply(name, batch, producer, sequence, timeout)
+    return _apply(name, batch, producer, sequence, may_skip, timeout)
 
 
 def remove(
@@ -313,6 +357,7 @@ def remove(
     missing: Missing = "count",
     producer: str = "",
     sequence: int = 0,
+    may_skip: bool = False,
     timeout: float | None = None,
 ) -> Call[Applied]:
     """Remove keys as one batch.
@@ -324,13 +369,19 @@ def remove(
             with KeyMissingError, which names the row.
         producer: as for `apply`.
         sequence: as for `apply`.
+        may_skip: as for `apply`.
         timeout: seconds, instead of the client's.
     """
-    return _apply(name, Batch(remove=keys, missing=missing), producer, sequence, timeout)
+    return _apply(name, Batch(remove=keys, missing=missing), producer, sequence, may_skip, timeout)
 
 
 def transfer(
-    batches: Mapping[str, Batch], *, producer: str = "", sequence: int = 0, timeout: float | None = None
+    batches: Mapping[str, Batch],
+    *,
+    producer: str = "",
+    sequence: int = 0,
+    may_skip: bool = False,
+    timeout: float | None = None,
 ) -> Call[dict[str, Applied]]:
     """Apply a batch to each of 2 to 16 hulls: all of them, as one revision each, or none.
 
@@ -345,10 +396,11 @@ def transfer(
         batches: the batch of each hull. The hulls must exist.
         producer: as for `apply`.
         sequence: as for `apply`; counted in each of the hulls.
+        may_skip: as for `apply`.
         timeout: seconds, instead of the client's.
     """
     parts = [pb.HullBatch(name=name, batch=batch.message) for name, batch in batches.items()]
-    request = pb.ApplyTogetherRequest(batches=parts, producer=producer, sequence=sequence)
+    request = pb.ApplyTogetherRequest(batches=parts, producer=producer, sequence=sequence, may_skip=may_skip)
 
     def decode(response: pb.ApplyTogetherResponse) -> dict[str, Applied]:
         return dict(zip(batches, map(messages.decode_applied, response.results), strict=True))
@@ -356,8 +408,10 @@ def transfer(
     return Call("ApplyTogether", request, decode, timeout, repeatable=sequence > 0)
 
 
-def _apply(name: str, batch: Batch, producer: str, sequence: int, timeout: float | None) -> Call[Applied]:
-    request = pb.ApplyRequest(name=name, batch=batch.message, producer=producer, sequence=sequence)
+def _apply(
+    name: str, batch: Batch, producer: str, sequence: int, may_skip: bool, timeout: float | None
+) -> Call[Applied]:
+    request = pb.ApplyRequest(name=name, batch=batch.message, producer=producer, sequence=sequence, may_skip=may_skip)
     return Call(
         "Apply", request, lambda response: messages.decode_applied(response.result), timeout, repeatable=sequence > 0
     )
@@ -429,6 +483,8 @@ def support(
 ) -> Call[Supported]:
     """The extreme vertex in each of (n, 2) directions, which may have any length but 0. Exact.
 
+    A direction of a geographic hull is east and north at its centre: (sin b, cos b) for a bearing b.
+
     With `keys`, also the key of each vertex, in a keyed hull. HullEmptyError if the hull has no points.
     """
     vectors = encoded(directions, "directions")
@@ -442,7 +498,10 @@ def support(
 
 
 def tangents(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Tangents]:
-    """The left and right tangent points of each of (n, 2) points; NaN for points not strictly outside. Exact."""
+    """The left and right tangent points of each of (n, 2) points; NaN for points not strictly outside. Exact.
+
+    The points of a question about a geographic hull are within 85 degrees of its centre.
+    """
     request = pb.TangentsRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
 
     def decode(response: pb.TangentsResponse) -> Tangents:
@@ -463,6 +522,8 @@ def distance(
     timeout: float | None = None,
 ) -> Call[Distances]:
     """The distance of each of (n, 2) points to the hull: 0 inside and on the boundary, inf if the hull is empty.
+
+    Of a geographic hull in metres, on WGS 84, within a micrometre.
 
     Arguments as for `locate`; a missing key has the distance NaN.
     """
@@ -498,7 +559,10 @@ def _ask_about(
 def intersect_lines(
     name: str, p: npt.ArrayLike, q: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
 ) -> Call[Crossings]:
-    """The points where the line through each of (n, 2) p and q enters and leaves the hull; NaN if it misses."""
+    """The points where the line through each of (n, 2) p and q enters and leaves the hull; NaN if it misses.
+
+    Lines of a geographic hull are great circles, through places within 85 degrees of its centre.
+    """
     request = pb.IntersectLinesRequest(
         name=name, min_revision=min_revision, origins=encoded(p, "p"), targets=encoded(q, "q")
     )
@@ -583,6 +647,7 @@ class Writing:
     coalesce: Literal["last"] | None
     stop_on_error: bool
     patience: float
+    may_skip: bool
 
 
 def writer(
@@ -596,6 +661,7 @@ def writer(
     coalesce: Literal["last"] | None = None,
     stop_on_error: bool = False,
     patience: float = 60.0,
+    may_skip: bool = False,
 ) -> Writing:
     """A writer that gathers points into batches, each applied exactly once.
 
@@ -621,14 +687,51 @@ def writer(
             key comes again.
         stop_on_error: whether a refused batch ends the writer; otherwise the batches after it are still applied.
         patience: seconds without a server after which the writer gives up.
+        may_skip: whether the caller numbers what it puts, as with the offsets of a log: numbers that rise and may skip.
+            The batch of several puts has the number of the last one, so the writer's `sequence` is where to continue
+            after a restart. Needs a `producer`.
     """
+    if may_skip and producer is None:
+        raise ValueError("may_skip needs a producer, whose numbers go on after a restart")
     for argument, value in (("batch_points", batch_points), ("in_flight", in_flight)):
         if value < 1:
             raise ValueError(f"{argument} must be at least 1, got {value}")
     producer = f"writer-{uuid4().hex}" if producer is None else producer
     if coalesce not in (None, "last"):
         raise ValueError(f'coalesce must be None or "last", got {coalesce!r}')
-    return Writing(name, producer, batch_points, linger, in_flight, missing, coalesce, stop_on_error, patience)
+    return Writing(
+        name, producer, batch_points, linger, in_flight, missing, coalesce, stop_on_error, patience, may_skip
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Piping:
+    """A pipeline to open."""
+
+    batch_reads: int
+    in_flight: int
+
+
+def pipeline(*, batch_reads: int = 256, in_flight: int = 4096) -> Piping:
+    """Many reads in few messages: each method returns the future of its answer, and the answers come in order.
+
+    >>> from dynhull_client import HullClient
+    >>> client = HullClient()  # doctest: +SKIP
+    >>> with client.pipeline() as pipeline:  # doctest: +SKIP
+    ...     answers = [pipeline.locate("fleet", [position]) for position in positions]
+    >>> answers[0].result().sides  # doctest: +SKIP
+
+    Reads are sent as soon as the connection takes them: alone where there are few, many in a message where there are
+    many.
+
+    Args:
+        batch_reads: the most reads of a message.
+        in_flight: the most reads that are sent and not answered. As many more may wait to be sent.
+    """
+    for argument, value in (("batch_reads", batch_reads), ("in_flight", in_flight)):
+        if value < 1:
+            raise ValueError(f"{argument} must be at least 1, got {value}")
+    return Piping(batch_reads, in_flight)
 
 
 @dataclass(frozen=True, slots=True)
@@ -653,6 +756,7 @@ def watch(
     resume: HullCopy | None = None,
     directions: npt.ArrayLike | None = None,
     keys: bool = False,
+    outline: bool = False,
     follow: bool = False,
     reconnect: bool = True,
     timeout: float | None = None,
@@ -668,7 +772,8 @@ def watch(
         name: the hull.
         min_revision: the first event waits until the hull has reached it.
         max_rate: the most events a second, each with all changes since the one before; 0 for no limit.
-        progress_interval: seconds without an event after which a Progress is sent; None for never.
+        progress_interval: seconds without an event after which a Progress is sent; None for never or, with a copy that
+            has a `max_staleness`, for a third of it.
         measures: whether events include measures.
         copy: a copy that the watch itself updates before it returns an event. If the copy holds the hull already, the
             watch continues from there.
@@ -676,6 +781,8 @@ def watch(
         directions: (k, 2) vectors; the watch then sends no vertices but `Sketch` events with the extreme vertices in
             these directions.
         keys: whether events name the vertices, in a keyed hull; `HullCopy.vertex_keys` then has their keys.
+        outline: whether there are events only when the vertices change (or, with `keys`, their names), not for every
+            revision. A Progress then says that they have not changed up to its revision.
         follow: whether the watch survives the deletion of the hull: it returns a `Deleted` event, and a Snapshot when
             there is a new hull of that name. It also waits for a hull that does not exist yet. Without it,
             HullNotFoundError ends the watch. With `directions`, the watch notices only a deletion that happens while it
@@ -691,6 +798,7 @@ def watch(
         max_events_per_second=max_rate,
         include_measures=measures,
         include_keys=keys,
+        outline_only=outline,
     )
     if copy is not None and resume is not None:
         raise ValueError("give either copy, which the watch updates, or resume, which the caller updates, not both")
@@ -699,6 +807,9 @@ def watch(
         request.resume.uid, request.resume.revision = held.uid, held.revision
     if directions is not None:
         request.directions.CopyFrom(encoded(directions, "directions"))
+    kept = copy if copy is not None else resume
+    if progress_interval is None and kept is not None and kept.max_staleness is not None:
+        progress_interval = kept.max_staleness / MARKS
     if progress_interval is not None:
         request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
     return Watching(request, copy, follow, reconnect, timeout)

@@ -13,6 +13,7 @@ from ._fence_messages import Fence
 from ._ingest import Ingest
 from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
+from ._pipeline import Pipeline
 from ._watch import FenceWatch, Watch
 from ._writer import Writer
 
@@ -52,6 +53,7 @@ class HullClient(Client[BlockingConnection]):
     _connect = BlockingConnection
 
     create_hull = _answering(calls.create_hull)
+    recenter = _answering(calls.recenter)
     wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)
@@ -82,6 +84,7 @@ class HullClient(Client[BlockingConnection]):
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
     ingest = opening(Ingest, calls.ingest)
+    pipeline = opening(Pipeline, calls.pipeline)
     watch = opening(Watch, calls.watch)
     watch_fence = opening(FenceWatch, fences.watch_fence)
     writer = opening(Writer, calls.writer)

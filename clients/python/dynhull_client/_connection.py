@@ -40,6 +40,7 @@ class Connection:
     Attributes:
         address: host:port.
         stub: the methods of both services, whose names differ.
+        retries: how often a call that reached no server is repeated.
         blocking: makes a BlockingConnection with the same arguments, for use in threads.
     """
 
@@ -71,7 +72,7 @@ class Connection:
             retries=retries,
         )
         self._timeout = timeout
-        self._retries = retries
+        self.retries = retries
         self._wait_for_ready = wait_for_ready
         self._closed = False
         # Call credentials would do the same, but gRPC sends them over TLS only, which a local server does not need.
@@ -93,7 +94,7 @@ class Connection:
         return self.begin(getattr(self.stub, call.method), call.request, attempts.timeout())
 
     def _attempts(self, call: Call[Any]) -> Attempts:
-        return Attempts(call, self._timeout if call.timeout is None else call.timeout, self._retries)
+        return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
 
 
 class BlockingConnection(Connection):

@@ -1,11 +1,14 @@
 """The errors a call may end with, one class for each cause."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
+from typing import Any
 
 import grpc
 from google.rpc.error_details_pb2 import ErrorInfo
 from grpc_status import rpc_status
+
+from dynhull_proto.v1.hull_service_pb2 import ReadError
 
 DOMAIN = "dynhull.v1"
 
@@ -141,6 +144,10 @@ class UnavailableError(DynhullError, ConnectionError):
     """No server answers at the address, or it is starting or shutting down."""
 
 
+class StaleCopyError(DynhullError, TimeoutError):
+    """A copy has not heard of its hull for longer than its `max_staleness`: the watch is interrupted, or not read."""
+
+
 class OutcomeUnknownError(DynhullError):
     """The server's disk failed during the batch, which may or may not have been applied.
 
@@ -191,20 +198,30 @@ BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
     grpc.StatusCode.UNAVAILABLE: UnavailableError,
 }
 
+CODES: Mapping[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
+
 
 def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
     """The error that a finished call ended with."""
-    code, message = call.code(), call.details()
-    info = _error_info(call)
+    status = rpc_status.from_call(call)
+    return _error(call.code(), call.details(), () if status is None else status.details)
+
+
+def error_of_read(error: ReadError) -> DynhullError:
+    """The error that a read of a Query call was answered with."""
+    return _error(CODES.get(error.code, grpc.StatusCode.UNKNOWN), error.message, error.details)
+
+
+def _error(code: grpc.StatusCode, message: str | None, details: Iterable[Any]) -> DynhullError:
+    info = _error_info(details)
     if info.reason:
         return BY_REASON.get(info.reason, DynhullError)(message or code.name, code, info.reason, info.metadata)
     return BY_CODE.get(code, DynhullError)(message or code.name, code, "", {})
 
 
-def _error_info(call: grpc.Call | grpc.RpcError) -> ErrorInfo:
+def _error_info(details: Iterable[Any]) -> ErrorInfo:
     """The server's reason; without one where something else answered."""
-    status = rpc_status.from_call(call)
-    for detail in [] if status is None else status.details:
+    for detail in details:
         info = ErrorInfo()
         if detail.Unpack(info) and info.domain == DOMAIN:
             return info

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dynhull.arrays import as_points
 
-from ._batch import Batch, batch_rows, join_batches, keep_last_rows
+from ._batch import Batch, join_batches, keep_last_rows
 from ._keys import checked_keys, plain_keys
 from ._times import as_microseconds
 
@@ -63,8 +63,8 @@ def put_parts(
     """
     options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move}
     if keys is None or points is None:
-        message = Batch(**options, keys=keys, points=points, times=times, expire_times=expire_times).message
-        return [Part(message, batch_rows(message), timed=None if insert is None else times is not None)]
+        batch = Batch(**options, keys=keys, points=points, times=times, expire_times=expire_times)
+        return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
     checked, xy = checked_keys(keys), as_points(points, "points")
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")

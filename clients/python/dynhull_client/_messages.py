@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from dynhull import globe
 from dynhull._shown import geometry, svg
 from dynhull._value import Value
 from dynhull.arrays import Points as Points
@@ -21,7 +22,9 @@ from ._times import Times, decode_time, decode_times
 Clock = Literal["server", "data"]
 Ordering = Literal["arrival", "event_time"]
 Ahead = Literal["refuse", "clamp"]
-Cause = Literal["batch", "expiry"]
+Cause = Literal["batch", "expiry", "recenter"]
+BATCH: Cause = "batch"
+CAUSES: dict[int, Cause] = {batch_pb2.CAUSE_EXPIRY: "expiry", batch_pb2.CAUSE_RECENTER: "recenter"}
 
 KEY_TYPES: dict[int, KeyType] = {hull_pb2.IDENTITY_STRING_KEYS: "str", hull_pb2.IDENTITY_INTEGER_KEYS: "int"}
 
@@ -61,6 +64,8 @@ class HullInfo:
         ordering: which of two positions of a key is the later one: by arrival or by event time.
         point_limit: the number of points beyond which a batch is refused; None for the server's own limit.
         clock: its clock, which decides what is too old; None if it has none so far.
+        geographic: whether its points are longitudes and latitudes in degrees.
+        center: longitude and latitude of the centre of a geographic hull; None if it has none so far.
     """
 
     name: str
@@ -74,11 +79,15 @@ class HullInfo:
     ordering: Ordering = "arrival"
     point_limit: int | None = None
     clock: datetime | None = None
+    geographic: bool = False
+    center: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Measures(Value):
     """Measures of a hull in the unit of its coordinates; `centroid` and `bounds` are NaN without points.
+
+    Of a geographic hull, square metres and metres on WGS 84 between the geodesics; `centroid` and `bounds` are NaN.
 
     `bounds` are the least x, least y, greatest x and greatest y.
     """
@@ -112,7 +121,7 @@ class Hull(Value):
         return {
             "type": "Feature",
             "id": self.info.name,
-            "geometry": geometry(self.vertices),
+            "geometry": shown_geometry(self.vertices, self.info.center),
             "properties": {
                 "name": self.info.name,
                 "revision": self.info.revision,
@@ -124,9 +133,10 @@ class Hull(Value):
 
     def _repr_html_(self) -> str:
         info, measures = self.info, self.measures
+        picture = shown_svg(self.vertices, info.center, info.name)
         caption = f"{info.points} points, {len(self.vertices)} vertices, area {measures.area:.6g}"
         return (
-            f"<figure>{svg(self.vertices, info.name)}<figcaption><b>{escape(info.name)}</b> at revision "
+            f"<figure>{picture}<figcaption><b>{escape(info.name)}</b> at revision "
             f"{info.revision}: {caption}</figcaption></figure>"
         )
 
@@ -211,8 +221,8 @@ class Positions(Value):
         revision: the hull's revision.
         positions: (n, 2) a position in each row, NaN for a missing key.
         present: (n,) whether the hull has the key.
-        times: (n,) the event time of each key as datetime64[us] in UTC; 1970-01-01 for a key without one; None if the
-            hull has no times.
+        times: (n,) the event time of each key as datetime64[us] in UTC; 1970-01-01 for a key without one, NaT for a
+            missing key; None if the hull has no times.
     """
 
     revision: int
@@ -296,8 +306,8 @@ class Tangents(Value):
 class Snapshot(Value):
     """The whole hull. `uid` identifies it when a watch resumes.
 
-    This and the other events have the cause of their revision, "batch" or "expiry", and the hull's clock at that
-    revision, which is None for a hull without one. Keys are None unless requested.
+    This and the other events have the cause of their revision, "batch", "expiry" or "recenter"; the hull's clock at
+    that revision, None for a hull without one; and the centre of a geographic hull. Keys are None unless requested.
     """
 
     revision: int
@@ -308,14 +318,17 @@ class Snapshot(Value):
     vertex_keys: KeyTuple | None = None
     cause: Cause = "batch"
     clock: datetime | None = None
+    center: tuple[float, float] | None = None
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
         """The hull as a GeoJSON geometry."""
-        return geometry(self.vertices)
+        return shown_geometry(self.vertices, self.center)
 
     def _repr_svg_(self) -> str:
-        return svg(self.vertices, f"revision {self.revision}: {self.points} points, {len(self.vertices)} vertices")
+        return shown_svg(
+            self.vertices, self.center, f"revision {self.revision}: {self.points} points, {len(self.vertices)} vertices"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -340,6 +353,7 @@ class Change(Value):
     renamed_keys: KeyTuple | None = None
     cause: Cause = "batch"
     clock: datetime | None = None
+    center: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -353,6 +367,7 @@ class Sketch(Value):
     keys: KeyTuple | None = None
     cause: Cause = "batch"
     clock: datetime | None = None
+    center: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,6 +378,7 @@ class Progress:
     points: int
     cause: Cause = "batch"
     clock: datetime | None = None
+    center: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -420,6 +436,16 @@ class Verification:
     keys_equal: bool = True
 
 
+def shown_geometry(vertices: Points, center: tuple[float, float] | None) -> dict[str, Any]:
+    """The hull as a GeoJSON geometry; on the globe, cut at 180 degrees (RFC 7946)."""
+    return geometry(vertices) if center is None else globe.geojson(vertices)
+
+
+def shown_svg(vertices: Points, center: tuple[float, float] | None, title: str) -> str:
+    """A drawing of the hull; on the globe, in the projection about its centre, in which its edges are straight."""
+    return svg(vertices if center is None else globe.Gnomonic(center).project_all(vertices), title)
+
+
 def encode_points(xy: Points) -> points_pb2.Points:
     """Points in the form of a message."""
     return points_pb2.Points(packed=np.asarray(xy, "<f8").tobytes())
@@ -445,7 +471,14 @@ def decode_info(message: hull_pb2.Hull) -> HullInfo:
         "event_time" if config.ordering == hull_pb2.ORDERING_EVENT_TIME else "arrival",
         config.max_points or None,
         _clock(message),
+        config.frame == hull_pb2.FRAME_GEOGRAPHIC,
+        decode_center(message),
     )
+
+
+def decode_center(message: hull_pb2.Hull | hull_service_pb2.WatchResponse) -> tuple[float, float] | None:
+    """The centre of a geographic hull; None if it has none."""
+    return (message.center.longitude, message.center.latitude) if message.HasField("center") else None
 
 
 def decode_measures(message: hull_pb2.Measures) -> Measures:
@@ -508,6 +541,8 @@ def decode_positions(message: hull_service_pb2.GetPositionsResponse) -> Position
     """The positions of keys."""
     present = np.frombuffer(message.present, np.bool_)
     times = decode_times(message.times) if message.HasField("times") else None
+    if times is not None:
+        times[~present] = np.datetime64("NaT")
     return Positions(message.revision, decode_points(message.positions), present, times)
 
 
@@ -526,15 +561,14 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
     """An event of a watch; None if this version of the client does not know its kind."""
     measures = decode_measures(message.measures) if message.HasField("measures") else None
     head = message.revision, message.point_count
-    cause: Cause = "expiry" if message.cause == batch_pb2.CAUSE_EXPIRY else "batch"
-    made = cause, _clock(message)
+    cause, clock, center = CAUSES.get(message.cause, BATCH), _clock(message), decode_center(message)
     if message.HasField("snapshot"):
         snapshot = message.snapshot
         named = decode_names(snapshot.vertex_keys) if keys else None
-        return Snapshot(*head, decode_points(snapshot.vertices), measures, snapshot.uid, named, *made)
+        return Snapshot(*head, decode_points(snapshot.vertices), measures, snapshot.uid, named, cause, clock, center)
     if message.HasField("sketch"):
         named = decode_names(message.sketch.keys) if keys else None
-        return Sketch(*head, decode_points(message.sketch.vertices), measures, named, *made)
+        return Sketch(*head, decode_points(message.sketch.vertices), measures, named, cause, clock, center)
     if message.HasField("change"):
         change = message.change
         return Change(
@@ -548,10 +582,12 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
             decode_names(change.added_keys) if keys else None,
             np.array(change.renamed_indices, np.intp) if keys else None,
             decode_names(change.renamed_keys) if keys else None,
-            *made,
+            cause,
+            clock,
+            center,
         )
     if message.HasField("progress"):
-        return Progress(*head, *made)
+        return Progress(*head, cause, clock, center)
     return None
 
 

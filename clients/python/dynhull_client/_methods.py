@@ -16,7 +16,7 @@ AnyConnection = TypeVar("AnyConnection", bound=Connection)
 
 Function = Callable[..., Any]
 
-NOT_NEGATIVE = (
+NOT_NEGATIVE = {
     "after",
     "confirmations",
     "max_events",
@@ -24,7 +24,7 @@ NOT_NEGATIVE = (
     "other_min_revision",
     "sequence",
     "timeout",
-)
+}
 
 
 class Client(Generic[AnyConnection]):
@@ -62,8 +62,8 @@ class Annotation(str):
     __repr__ = str.__str__
 
 
-def documented(method: Function, describe: Function, returns: str) -> None:
-    """Give a method the name, documentation and parameters of the function that describes its call.
+def documented(method: Function, describe: Function, returns: str, without: str = "") -> None:
+    """Give a method the name, documentation and parameters of the function that describes its call, but one.
 
     Annotations are shown as the source has them: numpy's ArrayLike alone fills five lines otherwise.
     """
@@ -73,18 +73,28 @@ def documented(method: Function, describe: Function, returns: str) -> None:
         parameter.replace(annotation=Annotation(parameter.annotation.replace("npt.", "")))
         for parameter in described.parameters.values()
         if parameter.kind != inspect.Parameter.VAR_POSITIONAL  # takes nothing: see `calls.apply`
+        and parameter.name != without
     ]
     method.__name__ = method.__qualname__ = describe.__name__
-    method.__doc__ = describe.__doc__
+    method.__doc__ = _undocumented(describe.__doc__, without)
     method.__signature__ = described.replace(  # type: ignore[attr-defined]
         parameters=[this, *parameters], return_annotation=Annotation(returns)
     )
 
 
+def _undocumented(documentation: str | None, argument: str) -> str | None:
+    """The documentation without the line about an argument."""
+    if documentation is None or not argument:
+        return documentation
+    lines = documentation.splitlines(keepends=True)
+    return "".join(line for line in lines if not line.lstrip().startswith(f"{argument}:"))
+
+
 def described(describe: Callable[P, Description], *arguments: P.args, **options: P.kwargs) -> Description:
     """What the function describes; ValueError for a number that is not allowed in any call."""
-    given: dict[str, Any] = options
-    require_not_negative(**{name: given.get(name) for name in NOT_NEGATIVE})
+    if options:
+        given: dict[str, Any] = options
+        require_not_negative(**{name: given[name] for name in NOT_NEGATIVE & given.keys()})
     return describe(*arguments, **options)
 
 

@@ -25,7 +25,8 @@ Doubles = npt.NDArray[np.float64]
 class Measured(Measures):
     """All measures of a hull at one revision, as in `dynhull.DynamicHull`. Without points: lengths 0, coordinates NaN.
 
-    `min_box` and `min_perimeter_box` are (4, 2) corners, counter-clockwise; `min_circle` is a centre and a radius.
+    `min_box` and `min_perimeter_box` are (4, 2) corners, counter-clockwise; `min_circle` is a centre and a radius. A
+    geographic hull has lengths in metres, but no width, boxes and circle: NaN, and no corners.
     """
 
     diameter: float
@@ -39,6 +40,9 @@ class Measured(Measures):
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Separation(Value):
     """The distance or overlap of two hulls, each at one revision. Lengths are within 1e-12 of the hulls' size.
+
+    Of two geographic hulls, `distance` is the least one of a vertex of one hull to the other hull, in metres; depth,
+    normal and offset are NaN, and there are no closest points.
 
     Attributes:
         revision: the revision of the first hull.
@@ -129,7 +133,8 @@ def separate(
 ) -> Call[Separation]:
     """Whether two hulls intersect, their distance and the line between them, or the depth of their overlap.
 
-    A hull overlaps itself by its width. HullEmptyError if one of them has no points.
+    A hull overlaps itself by its width. HullEmptyError if one of them has no points. Two geographic hulls may have
+    different centres; HullUnsuitableError if only one of the hulls is geographic.
 
     Args:
         name: the first hull.

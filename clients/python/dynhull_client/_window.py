@@ -4,7 +4,7 @@ No I/O and no clock: `Writer` and `AsyncWriter` add them.
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 # These refuse the writer, not one of its batches.
 FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
 Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
+LARGEST_SEQUENCE = 2**63 - 1
+# The size up to which batches share a message: beyond that, the cost of a message does not count.
+MESSAGE_BYTES = 2**16
+# Around a batch in a message: the key and the length.
+FRAME_BYTES = 16
 Settled = list[tuple[Any, Applied | DynhullError]]
 
 
@@ -43,11 +48,13 @@ class Next(Generic[Future]):
         outcome: the future of its effect.
         due: the time at which it is sent at the latest.
         gathering: the parts put so far.
+        number: the number that the caller gave it; 0 if the writer counts its batches.
     """
 
     outcome: Future
     due: float
     gathering: Gathering
+    number: int = 0
 
 
 @dataclass(slots=True)
@@ -56,12 +63,14 @@ class Batch(Generic[Future]):
 
     Attributes:
         outcome: the future of its effect.
-        request: the message.
+        message: the batch with its number.
+        size: its size in bytes.
         sent: how often it was sent.
     """
 
     outcome: Future
-    request: pb.StreamRequest
+    message: pb.NumberedBatch
+    size: int
     sent: int = 0
 
 
@@ -82,38 +91,59 @@ class Window(Generic[Future]):
         self.settled = 0
         self._writing = writing
         self._new_outcome: Callable[[], Future] = new_outcome
+        self._last = sequence  # the last number given
         self._next: Next[Future] | None = None
-        self._under_way: deque[Batch[Future]] = deque()
-        self._on_this_connection = 0
+        self._waiting: deque[Batch[Future]] = deque()  # to be sent on this connection
+        self._sent: deque[Batch[Future]] = deque()  # on this connection
+        self._most_batches = self._most_bytes = 0  # of a message, once the server has announced that it takes several
         self._one_at_a_time = False
         self._refusal: DynhullError | None = None
         self._pauses = pauses()
         self._lost_since: float | None = None
 
     @property
-    def full(self) -> bool:
-        """Whether there is no room for more points."""
-        return self._next is not None and self._next.gathering.rows >= self._writing.batch_points
-
-    @property
     def empty(self) -> bool:
         """Whether everything is acknowledged."""
-        return self._next is None and not self._under_way
+        return self._next is None and not self._waiting and not self._sent
 
     def admits(self, part: Part) -> bool:
-        """Whether the part can be put now: there is room, and it may go into the batch being gathered."""
-        return self._next is None or (not self.full and self._next.gathering.admits(part))
+        """Whether the part can be put now: into the batch being gathered, or because another batch can begin."""
+        return self._next is None or self._joins(self._next, part) or self._room
 
-    def put(self, part: Part, now: float) -> Future:
-        """Add a part to the batch being gathered; returns its outcome."""
+    def number(self, parts: Sequence[Part], sequence: int | None) -> int:
+        """The number of parts, 0 if the writer numbers its batches; raises ValueError for a bad one."""
+        if sequence is None and not self._writing.may_skip:
+            return 0
+        if sequence is None or not self._writing.may_skip:
+            raise ValueError("with may_skip=True, and only then, each put and remove has a sequence")
+        if not 1 <= sequence <= LARGEST_SEQUENCE:
+            raise ValueError(f"sequence must be from 1 to {LARGEST_SEQUENCE}, got {sequence}")
+        if len(parts) > 1:
+            raise ValueError("changes with a sequence are one batch, which has each key once")
+        return sequence
+
+    def put(self, part: Part, now: float, number: int) -> Future:
+        """Add a part that the window admits; returns the outcome of its batch.
+
+        `number` is that of the part, 0 if the writer numbers its batches. A batch has the number of its last part.
+        """
         if self.failure is not None:
             raise self.failure
-        if self._next is None:
+        following = self._next
+        if number and number <= (last := self._last if following is None else following.number):
+            raise ValueError(f"sequence must be greater than the one before, {last}, got {number}")
+        if following is not None and not self._joins(following, part):
+            self._complete(following)
+            following = None
+        if following is None:
             gathering = Gathering(coalesce=self._writing.coalesce == "last")
-            self._next = Next(self._new_outcome(), now + self._writing.linger, gathering)
+            following = self._next = Next(self._new_outcome(), now + self._writing.linger, gathering)
             self.begun += 1
-        self._next.gathering.add(part)
-        return self._next.outcome
+        following.gathering.add(part)
+        following.number = number
+        if self._full(following) and self._room:
+            self._complete(following)
+        return following.outcome
 
     def hurry(self, now: float) -> None:
         """Make the gathered points due now."""
@@ -122,51 +152,70 @@ class Window(Generic[Future]):
 
     def first(self) -> pb.StreamRequest:
         """The first message of a connection."""
-        return pb.StreamRequest(name=self._writing.name, producer=self._writing.producer)
+        writing = self._writing
+        return pb.StreamRequest(
+            name=writing.name, producer=writing.producer, accept_results=True, may_skip=writing.may_skip
+        )
 
     def take(self, now: float) -> pb.StreamRequest | None:
-        """The next message to send on this connection; None if there is none yet."""
-        most = 1 if self._one_at_a_time else self._writing.in_flight
-        if self._on_this_connection >= most:
+        """The next message to send on this connection, with all batches that fit; None if there is none yet."""
+        if self._one_at_a_time and self._sent:
             return None
-        if self._on_this_connection == len(self._under_way):
-            following = self._next
-            if following is None or (following.due > now and not self.full):
-                return None
-            self._next = None
-            sequence = self.sequence + len(self._under_way) + 1
-            request = pb.StreamRequest(batch=following.gathering.joined(), sequence=sequence)
-            self._under_way.append(Batch(following.outcome, request))
-        batch = self._under_way[self._on_this_connection]
-        self._on_this_connection += 1
-        batch.sent += 1
-        return batch.request
+        following = self._next
+        if following is not None and self._room and (following.due <= now or self._full(following)):
+            self._complete(following)
+        waiting = self._waiting
+        if not waiting:
+            return None
+        if not self._most_batches or self._one_at_a_time:
+            message = self._send()
+            return pb.StreamRequest(batch=message.batch, sequence=message.sequence)
+        count, size = 1, waiting[0].size
+        while count < len(waiting) and count < self._most_batches and size + waiting[count].size <= self._most_bytes:
+            size += waiting[count].size
+            count += 1
+        # While others are under way, a message waits until it is full or as large as those: then messages grow as long
+        # as batches come faster than they are acknowledged.
+        if count == len(waiting) < len(self._sent) and size < self._most_bytes and count < self._most_batches:
+            return None
+        return pb.StreamRequest(batches=[self._send() for _ in range(count)])
 
     def due_in(self, now: float) -> float | None:
         """Seconds until the gathered points are due; None if nothing waits for that."""
-        waits = self._next is not None and self._on_this_connection == len(self._under_way)
-        return max(0.0, self._next.due - now) if self._next is not None and waits else None
+        return max(0.0, self._next.due - now) if self._next is not None and self._room else None
 
     def acknowledge(self, response: pb.StreamResponse) -> Settled:
-        """Settle the first batch under way, which was applied."""
-        if not self._under_way:  # abandoned while the response was on its way
+        """Settle the first batches sent, which were applied."""
+        if response.max_batches:
+            self._most_batches = response.max_batches
+            self._most_bytes = min(MESSAGE_BYTES, response.max_message_bytes - FRAME_BYTES)
             return []
-        applied = decode_applied(response.result)
-        if applied.duplicate and self._under_way[0].sent == 1:
-            batch = f"batch {response.sequence} of producer {self._writing.producer!r}"
-            message = f"{batch} had been applied before it was sent: another writer uses the same name"
-            return self._end(ProducerInUseError(message, grpc.StatusCode.FAILED_PRECONDITION, "PRODUCER_IN_USE", {}))
-        self._lost_since, self._pauses = None, pauses()
+        settled: Settled = []
+        for each in response.results or (response,):
+            if not self._sent:  # abandoned while the response was on its way
+                break
+            applied = decode_applied(each.result)
+            batch = self._sent[0]
+            if applied.duplicate and batch.sent == 1:
+                name = f"batch {each.sequence} of producer {self._writing.producer!r}"
+                message = f"{name} had been applied before it was sent: another writer uses the same name"
+                error = ProducerInUseError(message, grpc.StatusCode.FAILED_PRECONDITION, "PRODUCER_IN_USE", {})
+                return settled + self._end(error)
+            self._sent.popleft()
+            self.sequence = batch.message.sequence
+            self.settled += 1
+            settled.append((batch.outcome, applied))
+        if settled and self._lost_since is not None:
+            self._lost_since, self._pauses = None, pauses()
         self._one_at_a_time = False
-        self._on_this_connection -= 1
-        self.sequence += 1
-        self.settled += 1
-        return [(self._under_way.popleft().outcome, applied)]
+        return settled
 
     def lost(self, error: DynhullError, now: float) -> tuple[Settled, float | None]:
         """Handle the end of a connection: what it settles, and the seconds until the next one; None for no next one."""
-        alone = self._on_this_connection == 1
-        self._on_this_connection = 0
+        alone = len(self._sent) == 1
+        self._waiting.extendleft(reversed(self._sent))
+        self._sent.clear()
+        self._most_batches = 0  # the next server may be an older one
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
             return self._end(error), None
         if error.reason and not passes(error):
@@ -183,11 +232,13 @@ class Window(Generic[Future]):
 
     def abandon(self) -> list[Future]:
         """Drop all batches; returns their outcomes, which stay unknown."""
-        left = [each.outcome for each in self._under_way]
+        left = [each.outcome for each in self._sent]
+        left += [each.outcome for each in self._waiting]
         if self._next is not None:
             left.append(self._next.outcome)
         self._next = None
-        self._under_way.clear()
+        self._sent.clear()
+        self._waiting.clear()
         return left
 
     def raise_refusal(self) -> None:
@@ -196,31 +247,48 @@ class Window(Generic[Future]):
         if refusal is not None:
             raise refusal
 
+    @property
+    def _room(self) -> bool:
+        """Whether another batch can wait to be sent."""
+        return len(self._sent) + len(self._waiting) < self._writing.in_flight
+
+    def _full(self, following: Next[Future]) -> bool:
+        return following.gathering.rows >= self._writing.batch_points
+
+    def _joins(self, following: Next[Future], part: Part) -> bool:
+        return not self._full(following) and following.gathering.admits(part)
+
+    def _complete(self, following: Next[Future]) -> None:
+        """Number the batch being gathered: it is to be sent."""
+        self._next = None
+        self._last = following.number or self._last + 1
+        message = pb.NumberedBatch(batch=following.gathering.joined(), sequence=self._last)
+        self._waiting.append(Batch(following.outcome, message, message.ByteSize() + FRAME_BYTES))
+
+    def _send(self) -> pb.NumberedBatch:
+        batch = self._waiting.popleft()
+        self._sent.append(batch)
+        batch.sent += 1
+        return batch.message
+
     def _refuse(self, error: DynhullError) -> tuple[Settled, float | None]:
         """Settle the first batch, which is at fault, as all before it are acknowledged; renumber the others."""
         if self._writing.stop_on_error:
             return self._end(error), None
         self._refusal = self._refusal or error
-        refused = self._under_way.popleft()
+        if not self._waiting:  # nothing was sent: it is the call that was refused
+            return self._end(error), None
+        refused = self._waiting.popleft()
         self.settled += 1
         self._lost_since = None
-        for batch in self._under_way:
-            batch.request.sequence -= 1
+        for batch in self._waiting:
             batch.sent = 0
+            if not self._writing.may_skip:
+                batch.message.sequence -= 1
+        if not self._writing.may_skip:
+            self._last -= 1
         return [(refused.outcome, error)], 0.0
 
     def _end(self, error: DynhullError) -> Settled:
         self.failure = error
         return [(outcome, error) for outcome in self.abandon()]
-
-
-def settle(settled: Settled) -> None:
-    """Set the outcomes of batches."""
-    for outcome, result in settled:
-        if outcome.done():  # cancelled by its caller
-            continue
-        if isinstance(result, Applied):
-            outcome.set_result(result)
-        else:
-            outcome.set_exception(result)
-            outcome.exception()  # flush and close raise it too: asyncio need not report it as never retrieved

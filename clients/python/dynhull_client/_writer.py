@@ -13,7 +13,8 @@ import grpc
 from ._calls import Writing, last_sequence
 from ._errors import DynhullError, error_of
 from ._gathering import put_parts, remove_parts
-from ._window import Window, settle
+from ._outcomes import settle
+from ._window import Window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,6 +71,7 @@ class Writer:
         points: npt.ArrayLike | None = None,
         times: Any = None,
         expire_times: Any = None,
+        sequence: int | None = None,
     ) -> Future[Applied]:
         """Add points to the next batch; waits while too many are not acknowledged.
 
@@ -85,6 +87,7 @@ class Writer:
             points: (n, 2) positions of the keys.
             times: (n,) event times of the keys or of the points to insert.
             expire_times: (n,) the times at which the keys leave; as for `HullClient.put`.
+            sequence: with `may_skip`, the number of these changes, greater than all before; without it, None.
 
         Returns:
             The effect of the batch, or of the last one of several, once it is acknowledged; or the error of a refused
@@ -98,13 +101,12 @@ class Writer:
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
-        return self._add(
-            put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
-        )
+        parts = put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
+        return self._add(parts, sequence)
 
-    def remove(self, keys: Any) -> Future[Applied]:
+    def remove(self, keys: Any, *, sequence: int | None = None) -> Future[Applied]:
         """Remove keys in the next batch, as `put` adds points. Removing a key that was put before is a new batch."""
-        return self._add(remove_parts(keys, self._writing.missing))
+        return self._add(remove_parts(keys, self._writing.missing), sequence)
 
     def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
@@ -142,17 +144,18 @@ class Writer:
     def __repr__(self) -> str:
         return f"<Writer to {self._writing.name!r} as producer {self._writing.producer!r}>"
 
-    def _add(self, parts: list[Part]) -> Future[Applied]:
-        window = self._open()
+    def _add(self, parts: list[Part], sequence: int | None) -> Future[Applied]:
+        window = self._window
+        if window is None or self._closed:
+            window = self._open()
+        number = window.number(parts, sequence)
         with self._turn:
             for part in parts:
                 if not window.admits(part):
-                    window.hurry(monotonic())
-                    self._turn.notify_all()
-                self._turn.wait_for(partial(self._may_put, window, part))
+                    self._turn.wait_for(partial(self._may_put, window, part))
                 if self._closed:
                     raise RuntimeError(CLOSED)
-                outcome = window.put(part, monotonic())
+                outcome = window.put(part, monotonic(), number)
             self._turn.notify_all()
         return outcome
 

@@ -254,13 +254,18 @@ struct Area {
     for (const Polygon& polygon : polygons) polygon.for_each_edge(visit);
   }
 
+  std::size_t bytes() const {
+    std::size_t bytes = sizeof *this + convex.capacity() * sizeof(Point);
+    for (const Polygon& polygon : polygons) bytes += polygon.bytes();
+    return bytes;
+  }
+
   // The distance from p, rounded once: 0 inside and on the boundary, infinite if the area is empty.
-  double distance(Point p) const {
-    if (where(p) >= 0) return 0;
-    if (kind == Kind::DISK) return distance_to_circle(p, center, radius);
-    double least = INFINITE;
-    for_each_edge([&](Edge edge) { least = std::min(least, distance_to_segment(p, edge)); });
-    return least;
+  double distance(Point p) const { return where(p) >= 0 ? 0 : distance_to_boundary(p); }
+  // The same for a p that is not inside.
+  double distance_to_boundary(Point p) const {
+    if (kind == Kind::DISK) return where(p) >= 0 ? 0 : distance_to_circle(p, center, radius);
+    return distance_to_nearest(p, [&](auto visit) { for_each_edge(visit); });
   }
 
   // Whether the segment from p to q, which differ, has a point of the area.

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <map>
+#include <numeric>
 #include <string_view>
 
 #include "../hull_tree.hpp"
@@ -43,16 +44,15 @@ struct Crossings {
 
 class Fences {
  public:
-  explicit Fences(const Slots& slots) : slots_(&slots) {
-    make_room(0);
-    slots.for_each([&](std::uint32_t slot) { subjects_[slot].zone = NONE; });
-  }
+  explicit Fences(const Slots& slots) : slots_(&slots) { subjects_.reserve(slots_->end()); }
 
   // What the entities report. Only the two functions that make room throw.
 
-  // For `extra` subjects that move or appear.
+  // For a batch with `extra` subjects that move or appear.
   void make_room(std::size_t extra) {
-    subjects_.reserve(slots_->end() + extra, fresh());
+    ++batches_;
+    subjects_.reserve(slots_->end() + extra);
+    if (changes_.capacity() < changes_.size() + extra) forget_merged();
     grow(changes_, extra);
     grow(strayed_, extra);
   }
@@ -63,28 +63,27 @@ class Fences {
       gone_keys_.reserve(std::max(gone_keys_.size() + bytes, 2 * gone_keys_.size()));
   }
 
-  void fetch(std::uint32_t slot) const { prefetch(&subjects_[slot]); }
+  void fetch(std::uint32_t slot) const { prefetch(&subjects_.box(slot)); }
 
-  void moved(std::uint32_t slot, Point before) {
+  void moved(std::uint32_t slot, Point before, Point now) {
     ++reports_;
-    Change& change = changed(slot, before);
-    if (subjects_[slot].box.holds((*slots_)[slot].place) || change.strayed) return;
-    change.strayed = true;
-    strayed_.push_back(slot);
+    if (!subjects_.box(slot).holds(now)) {
+      prefetch(&subjects_[slot]);
+      strayed_.push_back(static_cast<std::uint32_t>(changes_.size()));
+    }
+    changes_.push_back({before, slot});
   }
 
   void appeared(std::uint32_t slot) {
     ++reports_;
-    subjects_[slot] = fresh();
-    Change& change = changed(slot, NOWHERE);
-    change.fresh = true;
-    if (!zoned_) return;
-    change.strayed = true;
-    strayed_.push_back(slot);
+    subjects_.begin(slot);
+    if (zoned_) strayed_.push_back(static_cast<std::uint32_t>(changes_.size()));
+    changes_.push_back({NOWHERE, slot, true});
   }
 
   void left(std::uint32_t slot, Cause cause) {
     ++reports_;
+    merge_changes();
     Subject& subject = subjects_[slot];
     Gone gone;
     gone.before = (*slots_)[slot].place;
@@ -93,6 +92,7 @@ class Fences {
     if (const std::size_t number = number_of(subject); number < changes_.size()) {
       gone.before = changes_[number].before;
       gone.fresh = changes_[number].fresh;
+      gone.returned = changes_[number].returned;
     }
     if (slots_->strings()) {
       const std::string_view key = slots_->arena()[(*slots_)[slot].key];
@@ -104,7 +104,7 @@ class Fences {
     }
     gone_.push_back(gone);
     unlist(subject);
-    subject = fresh();
+    subjects_.begin(slot);
   }
 
   // Fences
@@ -118,38 +118,40 @@ class Fences {
            const std::vector<std::uint32_t>* inside) {
     ready();
     const auto entry = numbers_.find(number);
-    if (entry == numbers_.end()) return add_whole(tree, number, std::move(area), cross, own, inside);
+    if (entry == numbers_.end()) return add_number(tree, number, std::move(area), cross, own, inside);
     const std::uint32_t handle = entry->second;
     Fence& fence = *fences_[handle];
-    if (inside) {
-      torn_ = true;
-      forget(handle);
-      return add_whole(tree, number, std::move(area), cross, own, inside);
-    }
-    if (fence.own != own) return change_kind(tree, handle, std::move(area), cross, own);
-    if (!own) crossable_ += std::size_t{cross} - std::size_t{fence.cross};
-    fence.cross = cross;
-    if (own) {
-      owners_changed_ = true;
+    if (cross && !own) stray_changed();
+    if (inside || fence.own != own) {
+      entry->second = inside ? add(tree, number, std::move(area), cross, own, inside)
+                             : add_other_kind(tree, handle, std::move(area), cross, own);
+      remove(handle);
+    } else if (own) {
       recent_.push_back(handle);
       auto empty = std::make_shared<const Area>(Area::of_hull({}, true, area.margin));
       if (fence.area->margin != area.margin) fence.area = std::move(empty);  // until it is decided
-    } else if (!(*fence.area == area)) {
-      recent_.push_back(handle);
-      torn_ = true;
-      replace(handle, std::make_shared<const Area>(std::move(area)));
-      torn_ = false;
-      divide_crowded();
+      owners_changed_ = true;
+      fence.cross = cross;
+    } else {
+      if (!(*fence.area == area)) {
+        recent_.push_back(handle);
+        torn_ = true;
+        replace(handle, std::make_shared<const Area>(std::move(area)));
+        torn_ = false;
+      }
+      crossable_ += std::size_t{cross} - std::size_t{fence.cross};
+      fence.cross = cross;
     }
+    perhaps_divide_crowded();
   }
 
   // Removes a fence, and returns the keys of the subjects that were inside.
   Crossings drop(std::int64_t number) {
     ready();
     Crossings keys = inside(number);
-    torn_ = true;
-    forget(numbers_.at(number));
-    torn_ = false;
+    const auto entry = numbers_.find(number);
+    remove(entry->second);
+    numbers_.erase(entry);
     return keys;
   }
 
@@ -167,7 +169,7 @@ class Fences {
 
   // Whether there is nothing to decide.
   bool idle() const {
-    return strayed_.empty() && gone_.empty() && waiting_.empty() && !torn_ && taken_.rows.empty() &&
+    return strayed_.empty() && gone_.empty() && waiting_.empty() && !torn_ && !everyone_ && taken_.rows.empty() &&
            (owners_.empty() || (changes_.empty() && !owners_changed_));
   }
   // About how many subjects are to be decided.
@@ -179,23 +181,24 @@ class Fences {
   // vertices. If memory does not suffice, nothing is lost: the next call returns it.
   template <class SlotsAt>
   Crossings take(HullTree& tree, SlotsAt slots_at) {
-    const bool everyone = torn_;
-    ready();
+    found_.clear();
+    prepare(only_strayed_matter());
     for (const std::uint32_t handle : recent_)
       if (fences_[handle] && *fences_[handle]->area == *fences_[handle]->decided)
         fences_[handle]->decided = fences_[handle]->area;
-    std::sort(strayed_.begin(), strayed_.end());
-    strayed_.erase(std::unique(strayed_.begin(), strayed_.end()), strayed_.end());
-    if (everyone)
-      slots_->for_each([&](std::uint32_t slot) { decide(slot); });
-    else
-      decide_strayed();
+    if (everyone_) {
+      for_each_strayed([](std::uint32_t) {}, [] {});
+      slots_->for_each([&](std::uint32_t slot) { decide(slot), cross_found(); });
+    } else {
+      for_each_strayed([&](std::uint32_t slot) { decide(slot); }, [&] { cross_found(); });
+    }
+    divide_crowded();
     decide_waiting();
     for (const std::uint32_t handle : owners_) look_at_own(*fences_[handle], tree);
     report_gone();
+    list_fresh();
     for (const std::uint32_t handle : owners_) decide_own(handle, tree, slots_at);
     sort(taken_);
-    torn_ = false;
     begin_again();
     return std::exchange(taken_, {});
   }
@@ -219,38 +222,45 @@ class Fences {
         const std::uint32_t slot = zones_[zone].subjects[at];
         require(there(slot) && subjects_[slot].zone == zone && subjects_[slot].at == at, "a subject misfiled");
         const Point p = (*slots_)[slot].place;
-        if (subjects_[slot].box.holds(p)) require(zones_.find(p) == zone, "a subject in another zone");
+        if (subjects_.box(slot).holds(p)) require(zones_.find(p) == zone, "a subject in another zone");
       }
       for (const std::uint32_t handle : zones_[zone].covering) {
         require(fences_[handle] && !fences_[handle]->own, "a fence that is gone covers a zone");
-        require(fences_[handle]->area->holds(Zones::sample(zones_[zone].box)), "a fence that does not cover its zone");
+        require(fences_[handle]->area->holds(zones_[zone].anchor()), "a fence that does not cover its zone");
       }
+      for (const Piece& piece : zones_[zone].pieces)
+        require(!piece.simple || piece.inside == (fences_[piece.fence]->area->where(zones_[zone].anchor()) > 0),
+                "a piece whose anchor is elsewhere");
     }
   }
 
  private:
   static constexpr Point NOWHERE = {NO_TIME, NO_TIME};
-  static constexpr std::size_t CROWD = 96, MANY_PIECES = 20;  // beyond which a zone is divided
+  static constexpr std::size_t CROWD = 96, MANY_PIECES = 32;  // beyond which a zone is divided
   static constexpr std::uint32_t FIRST = 1;                   // the base of numbers of changes
   static constexpr std::size_t LOOKAHEAD = 16;                // subjects that are being prefetched
-  static constexpr std::size_t PIECES_FETCHED = 5;            // lines of a zone's pieces
 
   // A subject that has changed since crossings were last taken.
   struct Change {
     Point before;  // NaN if it is new
     std::uint32_t slot;
-    bool fresh, strayed, returned;  // returned: in the same time it was gone
+    bool fresh = false, strayed = false;
+    bool returned = false;  // what was known of a fresh one when it was there before is known again
+    bool decided = false;
+  };
+  struct Found {
+    std::uint32_t fence, slot;
+    int change;
+    std::optional<double> distance;
   };
   struct Gone {
     Point before = NOWHERE;
     std::uint64_t key = 0;
     Cause cause = REMOVED;
     std::uint8_t length = 0;
-    bool fresh = false, done = false;
+    bool fresh = false, returned = false, done = false;
     Members inside;
   };
-
-  static Subject fresh() { return {SafeBox::everywhere(), NONE, 0, 0, {}}; }
 
   template <class Item>
   static void grow(std::vector<Item>& items, std::size_t extra) {
@@ -266,17 +276,51 @@ class Fences {
 
   std::size_t number_of(const Subject& subject) const { return subject.changed - base_; }
 
-  Change& changed(std::uint32_t slot, Point before) {
-    Subject& subject = subjects_[slot];
-    if (number_of(subject) >= changes_.size() || subject.changed == 0) {
-      subject.changed = base_ + static_cast<std::uint32_t>(changes_.size());
-      changes_.push_back({before, slot, false, false, false});
-    }
-    return changes_[number_of(subject)];
-  }
   const Change* change_of(std::uint32_t slot) const {
     const Subject& subject = subjects_[slot];
     return subject.changed != 0 && number_of(subject) < changes_.size() ? &changes_[number_of(subject)] : nullptr;
+  }
+  Change* change_of(std::uint32_t slot) { return const_cast<Change*>(std::as_const(*this).change_of(slot)); }
+
+  // Changes are only appended until somebody asks for that of a subject: then its first one has its number.
+  void merge_changes() {
+    for (; merged_ < changes_.size(); ++merged_) {
+      Subject& subject = subjects_[changes_[merged_].slot];
+      if (number_of(subject) > merged_) subject.changed = base_ + static_cast<std::uint32_t>(merged_);
+    }
+    std::size_t kept = merged_strayed_;
+    for (std::size_t i = merged_strayed_; i < strayed_.size(); ++i) {
+      const std::size_t first = number_of(subjects_[changes_[strayed_[i]].slot]);
+      if (first < changes_.size() && !std::exchange(changes_[first].strayed, true))
+        strayed_[kept++] = static_cast<std::uint32_t>(first);
+    }
+    strayed_.resize(kept);
+    merged_strayed_ = kept;
+  }
+  // The same where one batch is all that has happened, and nobody will ask for others than the strayed.
+  void number_strayed() {
+    for (const std::uint32_t number : strayed_) subjects_[changes_[number].slot].changed = base_ + number;
+  }
+  bool only_strayed_matter() const {
+    return batches_ < 2 && merged_ == 0 && gone_.empty() && recent_.empty() && waiting_.empty() && owners_.empty() &&
+           !torn_ && !everyone_;
+  }
+
+  // Removes changes that have been merged into others, and those of subjects that are gone.
+  void forget_merged() {
+    merge_changes();
+    strayed_.clear();
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+      if (!current(i)) continue;
+      const auto number = static_cast<std::uint32_t>(kept++);
+      subjects_[changes_[i].slot].changed = base_ + number;
+      changes_[number] = changes_[i];
+      if (changes_[number].strayed) strayed_.push_back(number);
+    }
+    changes_.resize(kept);
+    merged_ = kept;
+    merged_strayed_ = strayed_.size();
   }
 
   // Forgets all changes. Their numbers are not used again until all numbers have been.
@@ -289,6 +333,7 @@ class Fences {
     }
     changes_.clear();
     strayed_.clear();
+    merged_ = merged_strayed_ = batches_ = 0;
     for (Gone& gone : gone_) members_.clear(gone.inside);
     gone_.clear();
     gone_keys_.clear();
@@ -296,13 +341,16 @@ class Fences {
       if (Fence* const fence = fences_[handle].get()) {
         fence->decided = fence->area;
         fence->decided_own = fence->own;
-        fence->given = false;
+        fence->given = fence->listed = false;
         fence->earlier.reset();
       }
     recent_.clear();
-    for (const std::uint32_t handle : owners_) fences_[handle]->decided = fences_[handle]->area;
+    for (const std::uint32_t handle : owners_) {
+      fences_[handle]->decided = fences_[handle]->area;
+      fences_[handle]->listed = false;
+    }
     places_.reset();
-    owners_changed_ = false;
+    owners_changed_ = everyone_ = false;
   }
 
   // Zones
@@ -325,34 +373,47 @@ class Fences {
 
   // Lists every subject in the zone where it is. Makes the zones if there are none, or if the index is torn.
   void ready() {
-    if (returned_ != reports_) return_gone();
-    if (torn_ && zoned_) rebuild();
-    if (!zoned_) return;
-    for (std::size_t from = 0; from < strayed_.size(); from += LOOKAHEAD) relist_some(from);
+    prepare(false);
+    for_each_strayed([](std::uint32_t) {}, [] {});
     divide_crowded();
   }
-  // Some of those that have strayed, so that their cache misses overlap.
-  void relist_some(std::size_t from) {
-    const std::size_t end = std::min(from + LOOKAHEAD, strayed_.size());
-    std::uint32_t zones[LOOKAHEAD];
-    for (std::size_t i = from; i < end; ++i) {
-      prefetch(&subjects_[strayed_[i]]);
-      if (strayed_[i] < slots_->end()) prefetch(&(*slots_)[strayed_[i]]);
+  void prepare(bool only_strayed) {
+    only_strayed ? number_strayed() : merge_changes();
+    if (torn_) rebuild();
+    if (returned_ != reports_) return_gone();
+  }
+
+  // Lists those that have strayed in the zone where they are, and visits them. Their cache misses overlap.
+  template <class Visit, class After>
+  void for_each_strayed(Visit visit, After after_some) {
+    if (!zoned_) return;
+    std::uint32_t slots[LOOKAHEAD], zones[LOOKAHEAD];
+    for (std::size_t from = 0; from < strayed_.size(); from += LOOKAHEAD) {
+      std::size_t count = 0;
+      for (std::size_t i = from; i < std::min(from + LOOKAHEAD, strayed_.size()); ++i)
+        if (current(strayed_[i])) slots[count++] = changes_[strayed_[i]].slot;
+      find_zones({slots, count}, zones);
+      for (std::size_t i = 0; i < count; ++i) {
+        relist(slots[i], zones[i]);
+        visit(slots[i]);
+      }
+      after_some();
     }
-    for (std::size_t i = from; i < end; ++i) {
-      zones[i - from] = there(strayed_[i]) ? zones_.find((*slots_)[strayed_[i]].place) : NONE;
-      if (zones[i - from] == NONE) continue;
-      const auto* const zone = reinterpret_cast<const char*>(&zones_[zones[i - from]]);
-      prefetch(zone);
-      prefetch(zone + 64);
+  }
+  void find_zones(std::span<const std::uint32_t> slots, std::uint32_t* zones) const {
+    for (const std::uint32_t slot : slots) {
+      prefetch(&(*slots_)[slot]);
+      if (const std::uint32_t zone = subjects_[slot].zone; zone != NONE) prefetch(&zones_[zone]);
     }
-    for (std::size_t i = from; i < end; ++i) {
-      if (zones[i - from] == NONE) continue;
-      const auto* const pieces = reinterpret_cast<const char*>(zones_[zones[i - from]].pieces.data());
-      for (std::size_t at = 0; at < PIECES_FETCHED; ++at) prefetch(pieces + 64 * at);
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      const Point p = (*slots_)[slots[i]].place;
+      const std::uint32_t old = zones[i] = subjects_[slots[i]].zone;
+      if (old != NONE && zones_[old].holds(p)) continue;
+      zones[i] = zones_.find(p);
+      if (old != NONE) zones_[old].fetch_subjects();
+      zones_[zones[i]].fetch();
     }
-    for (std::size_t i = from; i < end; ++i)
-      if (zones[i - from] != NONE) relist(strayed_[i], zones[i - from]);
+    for (std::size_t i = 0; i < slots.size(); ++i) zones_[zones[i]].fetch_pieces();
   }
   void relist(std::uint32_t slot, std::uint32_t zone) {
     Subject& subject = subjects_[slot];
@@ -362,31 +423,43 @@ class Fences {
       unlist(subject);
       list(slot, zone);
     }
-    lay_box(subject, p);
+    lay_box(slot, p);
   }
-  void lay_box(Subject& subject, Point p) {
-    const Zone& zone = zones_[subject.zone];
-    subject.box = SafeBox::everywhere();
-    subject.box.stay_in(zone.box);
-    for (const Zone::Piece& piece : zone.pieces)
-      if (!subject.box.keep_off(piece.rim, p)) subject.box.keep_off(fences_[piece.fence]->strip(piece.edge), p);
+  void lay_box(std::uint32_t slot, Point p) {
+    const Zone& zone = zones_[subjects_[slot].zone];
+    SafeBox box = SafeBox::everywhere();
+    box.stay_in(zone.box, p);
+    for (const Piece& piece : zone.pieces) box.keep_off(strip_of(piece), p);
+    subjects_.box(slot) = box;
   }
 
+  // Makes the zones from the fences and the places, and decides everything at the next occasion.
   void rebuild() {
+    everyone_ = true;
+    for (std::uint32_t slot = 0; slot < subjects_.size(); ++slot) subjects_[slot].zone = NONE;
     zones_ = Zones();
     crowded_.clear();
     waiting_.clear();
+    slots_->for_each([&](std::uint32_t slot) { forget_lost(subjects_[slot].inside); });
+    for (Gone& gone : gone_) forget_lost(gone.inside);
+    if (zoned_) make_zones();
+    torn_ = false;
+  }
+  void forget_lost(Members& inside) {
+    former_.assign(members_.of(inside).begin(), members_.of(inside).end());
+    for (const std::uint32_t handle : former_)
+      if (!fences_[handle]) members_.remove(inside, handle);
+  }
+  void make_zones() {
     Zone& all = zones_[0];
     for (std::uint32_t handle = 0; handle < fences_.size(); ++handle)
-      for (std::size_t i = 0; fences_[handle] && i < fences_[handle]->sorted.size(); ++i)
-        all.pieces.push_back(piece_of(handle, fences_[handle]->sorted[i]));
+      if (fences_[handle] && !fences_[handle]->own) {
+        const std::vector<Edge> edges = sorted_edges(*fences_[handle]->area);
+        append_pieces(all, handle, *fences_[handle]->area, edges, inside_at(*fences_[handle]->area, all.anchor()));
+      }
     all.subjects.reserve(slots_->size());
-    for (std::uint32_t slot = 0; slot < subjects_.size(); ++slot) subjects_[slot].zone = NONE;
     slots_->for_each([&](std::uint32_t slot) {
       Subject& subject = subjects_[slot];
-      former_.assign(members_.of(subject.inside).begin(), members_.of(subject.inside).end());
-      for (const std::uint32_t handle : former_)
-        if (!fences_[handle]) members_.remove(subject.inside, handle);
       subject.zone = 0;
       subject.at = static_cast<std::uint32_t>(all.subjects.size());
       all.subjects.push_back(slot);
@@ -394,7 +467,7 @@ class Fences {
     crowded_.assign(1, 0);
     divide_crowded();
     for (std::uint32_t zone = 0; zone < zones_.size(); ++zone)
-      for (const std::uint32_t slot : zones_[zone].subjects) lay_box(subjects_[slot], (*slots_)[slot].place);
+      for (const std::uint32_t slot : zones_[zone].subjects) lay_box(slot, (*slots_)[slot].place);
   }
 
   static bool is_crowded(const Zone& zone) {
@@ -409,6 +482,16 @@ class Fences {
     }
   }
 
+  // If memory suffices. A crowded zone is slower, and is noticed again when something is added.
+  void perhaps_divide_crowded() {
+    if (torn_) return;
+    try {
+      divide_crowded();
+    } catch (const std::bad_alloc&) {
+      crowded_.clear();
+    }
+  }
+
   void divide(std::uint32_t number) {
     Box extent = Box::none();
     const Box box = zones_[number].box;
@@ -416,8 +499,8 @@ class Fences {
     if (by_subjects)
       for (const std::uint32_t slot : zones_[number].subjects) extent.add((*slots_)[slot].place);
     else
-      for (const Zone::Piece& piece : zones_[number].pieces) {
-        const Box strip = around(fences_[piece.fence]->strip(piece.edge));
+      for (const Piece& piece : zones_[number].pieces) {
+        const Box strip = around(strip_of(piece));
         extent.add(strip.least);
         extent.add(strip.greatest);
       }
@@ -443,15 +526,18 @@ class Fences {
       part.subjects.shrink_to_fit();
       if (!(part.box.least.x < part.box.greatest.x && part.box.least.y < part.box.greatest.y)) continue;
       for (std::size_t i = 0; i < old.pieces.size();) {
-        const std::uint32_t handle = old.pieces[i].fence;
-        const Fence& fence = *fences_[handle];
-        bool touched = false;
-        for (; i < old.pieces.size() && old.pieces[i].fence == handle; ++i)
-          if (may_touch(fence.strip(old.pieces[i].edge), part.box)) {
-            part.pieces.push_back(old.pieces[i]);
-            touched = true;
-          }
-        if (!touched && fence.area->holds(Zones::sample(part.box))) part.covering.push_back(handle);
+        const std::span<const Piece> run = old.run(i);
+        const Area& area = *fences_[run[0].fence]->area;
+        const std::size_t first = part.pieces.size();
+        for (const Piece& piece : run)
+          if (may_touch(strip_of(piece), part.box)) part.pieces.push_back(piece);
+        if (first == part.pieces.size()) {
+          if (area.holds(part.anchor())) part.covering.push_back(run[0].fence);
+        } else {
+          const bool inside = inside_at(area, part.anchor());
+          for (std::size_t k = first; k < part.pieces.size(); ++k) part.pieces[k].inside = inside;
+        }
+        i += run.size();
       }
       part.pieces.shrink_to_fit();
     }
@@ -471,7 +557,7 @@ class Fences {
         Subject& subject = subjects_[zone.subjects[at]];
         subject.zone = children[q];
         subject.at = at;
-        subject.box.stay_in(zone.box);
+        subjects_.box(zone.subjects[at]).stay_in(zone.box, (*slots_)[zone.subjects[at]].place);
       }
       if (is_crowded(zone)) crowded_.push_back(children[q]);
       if (!zone.pending.empty()) waiting_.push_back(children[q]);
@@ -488,77 +574,80 @@ class Fences {
 
   // Setting fences
 
-  void add_whole(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
-                 const std::vector<std::uint32_t>* inside) {
-    torn_ = true;
+  // If memory does not suffice, what is left of a new fence goes when the zones are made anew.
+
+  void add_number(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
+                  const std::vector<std::uint32_t>* inside) {
+    const auto entry = numbers_.emplace(number, NONE).first;
     try {
-      add(tree, number, std::make_shared<const Area>(std::move(area)), cross, own, inside);
+      entry->second = add(tree, number, std::move(area), cross, own, inside);
     } catch (...) {
-      if (const auto entry = numbers_.find(number); entry != numbers_.end()) discard(entry->second);
+      numbers_.erase(entry);
       throw;
     }
-    torn_ = false;
-    divide_crowded();
+    perhaps_divide_crowded();
   }
 
-  std::uint32_t add(const HullTree& tree, std::int64_t number, std::shared_ptr<const Area> area, bool cross, bool own,
+  std::uint32_t add(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
                     const std::vector<std::uint32_t>* inside) {
-    if (!zoned_ && !own) {
-      zoned_ = true;
-      rebuild();
-    }
     auto fence = std::make_unique<Fence>();
     fence->number = number;
     fence->cross = cross;
     fence->own = fence->decided_own = own;
-    fence->area = std::move(area);
+    fence->area = std::make_shared<const Area>(std::move(area));
     fence->decided = fence->area;
     fence->given = inside != nullptr;
     fence->earlier = places();
     grow(recent_, 1);
     grow(owners_, 1);
+    torn_ = true;
+    if (!zoned_ && !own) {
+      zoned_ = true;
+      const bool everyone = everyone_;  // no fence had a zone: nothing is to be decided again
+      rebuild();
+      everyone_ = everyone;
+      torn_ = true;
+    }
     const std::uint32_t handle = free_handle();
-    numbers_.emplace(number, handle);
     fences_[handle] = std::move(fence);
     recent_.push_back(handle);
-    if (own) {
+    if (own)
       owners_.push_back(handle);
-      add_own(tree, handle, inside);
-    } else {
+    else
       crossable_ += cross;
-      add_pieces(handle, inside);
+    try {
+      own ? add_own(tree, handle, inside) : add_pieces(handle, inside);
+    } catch (...) {
+      discard(handle);
+      throw;
     }
+    torn_ = false;
     return handle;
   }
 
   // Between a fence around the subjects' own hull and another one: who was inside, stays inside until decided.
-  void change_kind(const HullTree& tree, std::uint32_t handle, Area area, bool cross, bool own) {
+  std::uint32_t add_other_kind(const HullTree& tree, std::uint32_t old, Area area, bool cross, bool own) {
     std::vector<std::uint32_t> inside;
-    for_each_inside(handle, [&](std::uint32_t slot) { inside.push_back(slot); });
-    std::vector<std::size_t> gone;
-    for (std::size_t i = 0; i < gone_.size(); ++i)
-      if (was_inside(handle, gone_[i])) gone.push_back(i);
-    const auto decided = fences_[handle]->decided;
-    const auto earlier = fences_[handle]->earlier;
-    const bool decided_own = fences_[handle]->decided_own;
-    const std::int64_t number = fences_[handle]->number;
-    torn_ = true;
-    forget(handle);
-    const std::uint32_t changed = add(tree, number, std::make_shared<const Area>(std::move(area)), cross, own, &inside);
-    Fence& fence = *fences_[changed];
-    fence.decided = decided;
-    fence.decided_own = decided_own;
-    fence.given = false;
-    fence.earlier = earlier;
-    for (std::size_t i = 0, next = 0; i < gone_.size(); ++i) {
-      const bool was = next < gone.size() && gone[next] == i;
-      next += was;
-      fence.count += was;
-      if (was != own && (!own || was_there(fence, key_of(gone_[i]), gone_[i].fresh)))
-        members_.add(gone_[i].inside, changed);
+    for_each_inside(old, [&](std::uint32_t slot) { inside.push_back(slot); });
+    const std::uint32_t handle = add(tree, fences_[old]->number, std::move(area), cross, own, &inside);
+    Fence& fence = *fences_[handle];
+    fence.decided = fences_[old]->decided;
+    fence.decided_own = fences_[old]->decided_own;
+    fence.given = fences_[old]->given;
+    fence.earlier = fences_[old]->earlier;
+    try {
+      for (Gone& gone : gone_) {
+        const bool was = was_inside(old, gone);
+        fence.count += was;
+        if (was != own && (!own || was_there(fence, key_of(gone), gone.fresh && !gone.returned)))
+          members_.add(gone.inside, handle);
+      }
+    } catch (...) {
+      discard(handle);
+      torn_ = true;
+      throw;
     }
-    torn_ = false;
-    divide_crowded();
+    return handle;
   }
 
   std::uint32_t free_handle() {
@@ -585,34 +674,45 @@ class Fences {
     return there(slot) && change_of(slot) == &changes_[change];
   }
 
-  Zone::Piece piece_of(std::uint32_t handle, std::uint32_t edge) const {
-    return {handle, edge, rim_of(fences_[handle]->strip(edge))};
+  Strip strip_of(const Piece& piece) const {
+    return piece.wide ? dynhull::strip_of(*fences_[piece.fence]->area, piece.edge) : Strip{piece.edge, 0, -1};
+  }
+  static bool is_simple(const Area& area) { return area.polygons.size() == 1; }
+  static bool inside_at(const Area& area, Point anchor) { return is_simple(area) && area.where(anchor) > 0; }
+  static void append_pieces(Zone& zone, std::uint32_t handle, const Area& area, std::span<const Edge> edges,
+                            bool inside) {
+    const bool disk = area.kind == Area::Kind::DISK;
+    for (const Edge& edge : edges)
+      zone.pieces.push_back({edge, handle, is_simple(area), disk || area.margin > 0, disk, inside});
   }
 
   void add_pieces(std::uint32_t handle, const std::vector<std::uint32_t>* inside) {
     Fence& fence = *fences_[handle];
     const Area& area = *fence.area;
-    std::vector<std::uint32_t> ids;
-    for (const Edge& edge : Fence::sorted_edges(area)) {
-      const std::uint32_t id = fence.add(edge);
-      fence.sorted.push_back(id);
-      ids.push_back(id);
-    }
+    const std::vector<Edge> edges = sorted_edges(area);
+    std::vector<std::uint32_t> ids(edges.size());
+    std::iota(ids.begin(), ids.end(), 0);
+    std::vector<Edge> near;
     for (std::size_t i = 0; inside && i < inside->size(); ++i) {
       members_.add(subjects_[(*inside)[i]].inside, handle);
       ++fence.count;
     }
     zones_.descend(
-        ids, [&](std::uint32_t id) { return fence.strip(id); }, [&](Point p) { return area.holds(p); },
+        ids, [&](std::uint32_t id) { return dynhull::strip_of(area, edges[id]); },
+        [&](Point p) { return area.holds(p); },
         [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
           Zone& zone = zones_[number];
-          if (touching.empty()) zone.covering.push_back(handle);
-          for (const std::uint32_t id : touching) zone.pieces.push_back(piece_of(handle, id));
+          near.clear();
+          for (const std::uint32_t id : touching) near.push_back(edges[id]);
+          if (touching.empty())
+            zone.covering.push_back(handle);
+          else
+            append_pieces(zone, handle, area, near, inside_at(area, zone.anchor()));
           if (inside) wait_for(handle, number);
           if (is_crowded(zone)) crowded_.push_back(number);
           for (const std::uint32_t slot : zone.subjects) {
             const Point p = (*slots_)[slot].place;
-            for (const std::uint32_t id : touching) subjects_[slot].box.keep_off(fence.strip(id), p);
+            for (const Edge& edge : near) subjects_.box(slot).keep_off(dynhull::strip_of(area, edge), p);
             if (inside || !(touching.empty() || area.holds(p))) continue;
             members_.add(subjects_[slot].inside, handle);
             ++fence.count;
@@ -633,87 +733,93 @@ class Fences {
     const std::shared_ptr<const Area> old = fence.area;
     const bool keeps = old->kind == area->kind && old->kind != Area::Kind::DISK && old->margin == area->margin &&
                        old->closed == area->closed && old->polygons.size() < 2 && area->polygons.size() < 2;
-    constexpr std::uint32_t ADDED = std::uint32_t{1} << 31;
-    std::vector<std::uint32_t> ids, removed;
-    std::vector<std::uint32_t> sorted;
-    auto next = fence.sorted.begin();
-    for (const Edge& edge : Fence::sorted_edges(*area)) {
-      for (; keeps && next != fence.sorted.end() && Fence::less(fence.edges[*next], edge); ++next)
-        removed.push_back(*next);
-      if (keeps && next != fence.sorted.end() && !Fence::less(edge, fence.edges[*next])) {
-        sorted.push_back(*next++);
-        continue;
-      }
-      const std::uint32_t id = fence.add(edge);
-      sorted.push_back(id);
-      ids.push_back(id | ADDED);
+    const std::vector<Edge> before = sorted_edges(*old);
+    const std::vector<Edge> after = sorted_edges(*area);
+    std::vector<Edge> added = after, removed = before;
+    if (keeps) {
+      added.clear();
+      removed.clear();
+      std::set_difference(after.begin(), after.end(), before.begin(), before.end(), std::back_inserter(added),
+                          edge_less);
+      std::set_difference(before.begin(), before.end(), after.begin(), after.end(), std::back_inserter(removed),
+                          edge_less);
     }
-    removed.insert(removed.end(), next, fence.sorted.end());
-    ids.insert(ids.end(), removed.begin(), removed.end());
-    std::vector<bool> is_removed(fence.edges.size());
-    for (const std::uint32_t id : removed) is_removed[id] = true;
+    std::vector<std::uint32_t> ids(added.size() + removed.size());  // those added, then those removed
+    std::iota(ids.begin(), ids.end(), 0);
+    const auto is_added = [&](std::uint32_t id) { return id < added.size(); };
 
+    std::vector<Edge> near;
     zones_.descend(
         ids,
-        [&](std::uint32_t id) { return id & ADDED ? fence.strip_of(*area, id & ~ADDED) : fence.strip_of(*old, id); },
+        [&](std::uint32_t id) {
+          return is_added(id) ? dynhull::strip_of(*area, added[id])
+                              : dynhull::strip_of(*old, removed[id - added.size()]);
+        },
         [&](Point p) { return old->holds(p) != area->holds(p); },
         [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
           Zone& zone = zones_[number];
           wait_for(handle, number);
-          std::vector<Zone::Piece> kept;
-          std::erase_if(zone.pieces, [&](const Zone::Piece& piece) {
-            if (piece.fence != handle) return false;
-            if (!is_removed[piece.edge]) kept.push_back(piece);
-            return true;
-          });
+          near.clear();
+          for (const Piece& piece : zone.run_of(handle))
+            if (!std::binary_search(removed.begin(), removed.end(), piece.edge, edge_less)) near.push_back(piece.edge);
           for (const std::uint32_t id : touching)
-            if (id & ADDED) kept.push_back({handle, id & ~ADDED, rim_of(fence.strip_of(*area, id & ~ADDED))});
-          zone.pieces.insert(zone.pieces.end(), kept.begin(), kept.end());
+            if (is_added(id)) near.push_back(added[id]);
+          std::erase_if(zone.pieces, [&](const Piece& piece) { return piece.fence == handle; });
           std::erase(zone.covering, handle);
-          if (kept.empty() && area->holds(Zones::sample(zone.box))) zone.covering.push_back(handle);
+          if (near.empty()) {
+            if (area->holds(zone.anchor())) zone.covering.push_back(handle);
+          } else {
+            append_pieces(zone, handle, *area, near, inside_at(*area, zone.anchor()));
+          }
           if (is_crowded(zone)) crowded_.push_back(number);
           for (const std::uint32_t id : touching) {
-            if (!(id & ADDED)) continue;
-            const Strip strip = fence.strip_of(*area, id & ~ADDED);
-            for (const std::uint32_t slot : zone.subjects) subjects_[slot].box.keep_off(strip, (*slots_)[slot].place);
+            if (!is_added(id)) continue;
+            const Strip strip = dynhull::strip_of(*area, added[id]);
+            for (const std::uint32_t slot : zone.subjects) subjects_.box(slot).keep_off(strip, (*slots_)[slot].place);
           }
-          if (fence.cross && !touching.empty())
-            for (const std::uint32_t slot : zone.subjects) stray_if_changed(slot);
         });
-    fence.free.insert(fence.free.end(), removed.begin(), removed.end());
-    fence.sorted = std::move(sorted);
     fence.area = std::move(area);
   }
   // A way that was in the subject's box may meet a new area.
-  void stray_if_changed(std::uint32_t slot) {
-    if (change_of(slot) == nullptr || change_of(slot)->strayed) return;
-    strayed_.push_back(slot);
-    changes_[number_of(subjects_[slot])].strayed = true;
+  void stray_changed() {
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+      if (changes_[i].strayed || !current(i)) continue;
+      strayed_.push_back(static_cast<std::uint32_t>(i));
+      merged_strayed_ = strayed_.size();
+      changes_[i].strayed = true;
+    }
   }
 
-  // Removes a fence and its memberships.
-  void forget(std::uint32_t handle) {
-    const Fence& fence = *fences_[handle];
-    for (Gone& gone : gone_) members_.remove(gone.inside, handle);
-    if (fence.own) {
-      for (const std::uint32_t slot : fence.outside) members_.remove(subjects_[slot].inside, handle);
-    } else {
-      for_each_zone(handle, [&](std::uint32_t number) {
-        Zone& zone = zones_[number];
-        std::erase(zone.covering, handle);
-        std::erase(zone.pending, handle);
-        std::erase_if(zone.pieces, [&](const Zone::Piece& piece) { return piece.fence == handle; });
-        for (const std::uint32_t slot : zone.subjects) members_.remove(subjects_[slot].inside, handle);
-      });
-      for (const std::uint32_t slot : strayed_) members_.remove(subjects_[slot].inside, handle);
+  // Removes a fence and its memberships. If memory does not suffice, these go when the zones are made anew.
+  void remove(std::uint32_t handle) {
+    try {
+      forget(handle);
+    } catch (const std::bad_alloc&) {
+      torn_ = true;
     }
     discard(handle);
   }
+  void forget(std::uint32_t handle) {
+    const Fence& fence = *fences_[handle];
+    if (fence.own) {
+      for (const std::uint32_t slot : fence.outside) members_.remove(subjects_[slot].inside, handle);
+      return;
+    }
+    for_each_zone(handle, [&](std::uint32_t number) {
+      Zone& zone = zones_[number];
+      std::erase(zone.covering, handle);
+      std::erase(zone.pending, handle);
+      std::erase_if(zone.pieces, [&](const Piece& piece) { return piece.fence == handle; });
+      for (const std::uint32_t slot : zone.subjects) members_.remove(subjects_[slot].inside, handle);
+    });
+    for (const std::uint32_t number : strayed_) members_.remove(subjects_[changes_[number].slot].inside, handle);
+    if (everyone_) slots_->for_each([&](std::uint32_t slot) { members_.remove(subjects_[slot].inside, handle); });
+  }
   void discard(std::uint32_t handle) {
     const Fence& fence = *fences_[handle];
+    for (Gone& gone : gone_) members_.remove(gone.inside, handle);
     if (!fence.own) crossable_ -= fence.cross;
     std::erase(owners_, handle);
-    numbers_.erase(fence.number);
     fences_[handle].reset();
     first_free_ = std::min(first_free_, std::size_t{handle});
   }
@@ -721,10 +827,13 @@ class Fences {
   // Visits the zones that list a fence, each once.
   template <class Visit>
   void for_each_zone(std::uint32_t handle, Visit visit) {
-    const Fence& fence = *fences_[handle];
-    std::vector<std::uint32_t> ids = fence.sorted, zones;
+    const Area& area = *fences_[handle]->area;
+    const std::vector<Edge> edges = sorted_edges(area);
+    std::vector<std::uint32_t> ids(edges.size()), zones;
+    std::iota(ids.begin(), ids.end(), 0);
     zones_.descend(
-        ids, [&](std::uint32_t id) { return fence.strip(id); }, [&](Point p) { return fence.area->holds(p); },
+        ids, [&](std::uint32_t id) { return dynhull::strip_of(area, edges[id]); },
+        [&](Point p) { return area.holds(p); },
         [&](std::uint32_t number, std::span<const std::uint32_t>) { zones.push_back(number); });
     for (const std::uint32_t number : waiting_) {
       const std::vector<std::uint32_t>& pending = zones_[number].pending;
@@ -744,11 +853,17 @@ class Fences {
       });
       return;
     }
+    if (everyone_) {
+      slots_->for_each([&](std::uint32_t slot) {
+        if (members_.has(subjects_[slot].inside, handle)) visit(slot);
+      });
+      return;
+    }
     std::vector<std::uint32_t> strays;  // who was inside and is elsewhere now
-    for (const std::uint32_t slot : strayed_)
-      if (there(slot) && members_.has(subjects_[slot].inside, handle)) strays.push_back(slot);
+    for (const std::uint32_t number : strayed_)
+      if (current(number) && members_.has(subjects_[changes_[number].slot].inside, handle))
+        strays.push_back(changes_[number].slot);
     std::sort(strays.begin(), strays.end());
-    strays.erase(std::unique(strays.begin(), strays.end()), strays.end());
     for_each_zone(handle, [&](std::uint32_t zone) {
       for (const std::uint32_t slot : zones_[zone].subjects)
         if (members_.has(subjects_[slot].inside, handle) && !std::binary_search(strays.begin(), strays.end(), slot))
@@ -763,63 +878,74 @@ class Fences {
     return fence.given || fence.area != fence.decided || fence.own != fence.decided_own;
   }
 
-  void decide_strayed() {
-    for (std::size_t i = 0; i < strayed_.size(); ++i) {
-      if (i + LOOKAHEAD < strayed_.size()) {
-        prefetch(&(*slots_)[strayed_[i + LOOKAHEAD]]);
-        prefetch(&subjects_[strayed_[i + LOOKAHEAD]]);
-      }
-      if (there(strayed_[i])) decide(strayed_[i]);
-    }
-  }
-
   void decide(std::uint32_t slot) {
     const Point p = (*slots_)[slot].place;
     const std::uint32_t number = subjects_[slot].zone;
     if (number == NONE) return;  // there are no zones
     const Zone& zone = zones_[number];
-    found_.clear();
-    for (const std::uint32_t handle : zone.covering) found_.push_back(handle);
-    const Change* const change = change_of(slot);
-    // On a way within the zone, off all pieces of an area that is there since then, the state stays what it was.
-    const bool known = recent_.empty() && change && !change->fresh && zone.holds(change->before);
-    const Box way = Box::of({known ? change->before : p, p});
+    Change* const change = change_of(slot);
+    // The state before is that of areas which are still there, and the way from there is within the zone.
+    const bool known =
+        !everyone_ && recent_.empty() && change && !change->fresh && !change->decided && zone.holds(change->before);
+    if (change) change->decided = true;
+    if (!known) decide_covering(slot, zone);
     for (std::size_t i = 0; i < zone.pieces.size();) {
-      const std::uint32_t handle = zone.pieces[i].fence;
-      const std::size_t first = i;
-      bool near = !known;
-      for (; i < zone.pieces.size() && zone.pieces[i].fence == handle; ++i) near |= zone.pieces[i].rim.meets(way);
+      const std::span<const Piece> run = zone.run(i);
+      i += run.size();
+      const std::uint32_t handle = run[0].fence;
       const bool was = members_.has(subjects_[slot].inside, handle);
-      if (near ? holds(zone, first, p, was) : was) found_.push_back(handle);
+      const bool from_before = known && !run[0].wide;
+      const bool now =
+          from_before ? holds(run, change->before, was, p, was) : holds(run, zone.anchor(), run[0].inside, p, was);
+      if (now == was) continue;
+      find(handle, slot, now ? +1 : -1, now || run[0].disk ? std::nullopt : zone.distance(run, p));
     }
-    former_.clear();
-    for (const std::uint32_t handle : members_.of(subjects_[slot].inside))
-      if (!fences_[handle]->own && std::find(found_.begin(), found_.end(), handle) == found_.end())
-        former_.push_back(handle);
-    for (const std::uint32_t handle : former_) cross(handle, slot, -1);
-    for (const std::uint32_t handle : found_)
-      if (!members_.has(subjects_[slot].inside, handle)) cross(handle, slot, +1);
-    if (change) decide_ways(*change, p);
+    if (change && crossable_ > 0) {
+      former_.clear();
+      for (const Found& each : found_)
+        if (each.slot == slot && each.change < 0) former_.push_back(each.fence);
+      cross_found();
+      decide_ways(*change, p);
+    }
   }
 
-  // Decides for the fence of a zone's pieces from number `i` on.
-  bool holds(const Zone& zone, std::size_t i, Point p, bool was) const {
-    const std::uint32_t handle = zone.pieces[i].fence;
-    const Fence& fence = *fences_[handle];
-    const Area& area = *fence.area;
-    const int where = area.where(p);
+  // Crossings of some subjects are reported together, when their fences have been fetched.
+  void find(std::uint32_t handle, std::uint32_t slot, int change, std::optional<double> distance = {}) {
+    prefetch(fences_[handle].get());
+    found_.push_back({handle, slot, change, distance});
+  }
+  void cross_found() {
+    for (const Found& each : found_) cross(each.fence, each.slot, each.change, each.distance);
+    found_.clear();
+  }
+
+  // Decides for the fences that cover a zone, and for those that are not near it.
+  void decide_covering(std::uint32_t slot, const Zone& zone) {
+    const auto is_near = [&](std::uint32_t handle) { return zone.covered_by(handle) || !zone.run_of(handle).empty(); };
+    for (const std::uint32_t handle : members_.of(subjects_[slot].inside))
+      if (!is_near(handle) && !fences_[handle]->own) find(handle, slot, -1);
+    for (const std::uint32_t handle : zone.covering)
+      if (!members_.has(subjects_[slot].inside, handle)) find(handle, slot, +1);
+  }
+
+  // Decides for the fence of these pieces of a zone, by the way to p from another point of the zone, where it is known
+  // whether that is inside.
+  bool holds(std::span<const Piece> run, Point from, bool inside, Point p, bool was) const {
+    const std::optional<bool> after = run[0].simple ? inside_after(run, from, inside, p) : std::nullopt;
+    if (after && (*after || !run[0].wide || !was)) return *after;
+    const Area& area = *fences_[run[0].fence]->area;
+    const int where = after ? -1 : area.where(p);
     if (where >= (area.closed ? 0 : 1)) return true;
     if (!was || area.margin == 0) return false;
     if (where == 0) return true;
     if (area.kind == Area::Kind::DISK) return compare_distance(p, area.center, area.radius, area.margin) <= 0;
-    for (; i < zone.pieces.size() && zone.pieces[i].fence == handle; ++i)
-      if (compare_distance(p, nearest_part(p, fence.edges[zone.pieces[i].edge]), area.margin) <= 0) return true;
-    return false;
+    return std::any_of(run.begin(), run.end(), [&](const Piece& piece) {
+      return compare_distance(p, nearest_part(p, piece.edge), area.margin) <= 0;
+    });
   }
 
   // Reports the fences that a subject has passed through: it was outside, is outside, and the way meets the area.
   void decide_ways(const Change& change, Point now) {
-    if (crossable_ == 0) return;
     ways_.clear();
     const std::uint32_t slot = change.slot;
     const auto collect = [&](Point from) {
@@ -829,7 +955,7 @@ class Fences {
           ids, [&](std::uint32_t) { return way; }, [](Point) { return false; },
           [&](std::uint32_t number, std::span<const std::uint32_t>) {
             for (const std::uint32_t handle : zones_[number].covering) ways_.push_back(handle);
-            for (const Zone::Piece& piece : zones_[number].pieces) ways_.push_back(piece.fence);
+            for (const Piece& piece : zones_[number].pieces) ways_.push_back(piece.fence);
           });
     };
     if (!change.fresh && !(change.before == now)) collect(change.before);
@@ -867,9 +993,7 @@ class Fences {
       const Zone& zone = zones_[number];
       for (const std::uint32_t handle : zone.pending) {
         const bool covers = zone.covered_by(handle);
-        std::size_t piece = 0;
-        while (piece < zone.pieces.size() && zone.pieces[piece].fence != handle) ++piece;
-        const bool touches = piece < zone.pieces.size();
+        const std::span<const Piece> run = zone.run_of(handle);
         for (std::size_t at = 0; at < zone.subjects.size(); ++at) {
           if (at + LOOKAHEAD < zone.subjects.size()) {
             prefetch(&(*slots_)[zone.subjects[at + LOOKAHEAD]]);
@@ -877,7 +1001,8 @@ class Fences {
           }
           const std::uint32_t slot = zone.subjects[at];
           const bool was = members_.has(subjects_[slot].inside, handle);
-          const bool now = covers || (touches && holds(zone, piece, (*slots_)[slot].place, was));
+          const bool now =
+              covers || (!run.empty() && holds(run, zone.anchor(), run[0].inside, (*slots_)[slot].place, was));
           if (now != was) cross(handle, slot, now ? +1 : -1);
         }
       }
@@ -901,7 +1026,7 @@ class Fences {
     else
       row.cause = 0;
     if (changed(fence) || row.cause == 0) row.cause |= AREA;
-    row.distance = distance ? *distance : change > 0 ? 0 : fence.area->distance(row.now);
+    row.distance = distance ? *distance : change > 0 ? 0 : fence.area->distance_to_boundary(row.now);
     append_key(taken_, slot, row);
     try {
       if (change != 0 && (change > 0) != fence.own)
@@ -955,13 +1080,14 @@ class Fences {
     returned_ = reports_;
   }
   void merge(Gone& from, Gone& to) {
-    found_.assign(members_.of(from.inside).begin(), members_.of(from.inside).end());
-    for (const std::uint32_t handle : found_)
+    former_.assign(members_.of(from.inside).begin(), members_.of(from.inside).end());
+    for (const std::uint32_t handle : former_)
       if (!members_.has(to.inside, handle)) members_.add(to.inside, handle);
     if (!from.fresh) {
       to.before = from.before;
       to.fresh = false;
     }
+    to.returned |= from.returned;
     members_.clear(from.inside);
     from.done = true;
   }
@@ -971,16 +1097,16 @@ class Fences {
     const Fence& fence = *fences_[handle];
     const bool listed = members_.has(gone.inside, handle);
     if (gone.done || !fence.own) return listed && !gone.done;
-    return !listed && was_there(fence, key_of(gone), gone.fresh);
+    return !listed && was_there(fence, key_of(gone), gone.fresh && !gone.returned);
   }
   bool was_inside_own(std::uint32_t handle, std::uint32_t slot) const {
     const Change* const change = change_of(slot);
     return !members_.has(subjects_[slot].inside, handle) &&
-           was_there(*fences_[handle], key_of(slot), change && change->fresh);
+           was_there(*fences_[handle], key_of(slot), change && change->fresh && !change->returned);
   }
   // Whether a key was there when the state of a fence was last decided.
   static bool was_there(const Fence& fence, const std::string& key, bool fresh) {
-    if (fence.earlier)
+    if (fence.earlier && !fence.listed)
       if (const auto entry = fence.earlier->find(key); entry != fence.earlier->end()) return entry->second.has_value();
     return !fresh;
   }
@@ -989,10 +1115,19 @@ class Fences {
     for (Gone& gone : gone_) {
       if (gone.done) continue;
       for (const std::uint32_t handle : owners_)
-        if (was_inside(handle, gone)) leave(handle, gone);
-      found_.assign(members_.of(gone.inside).begin(), members_.of(gone.inside).end());
-      for (const std::uint32_t handle : found_) {
-        if (!fences_[handle]->own) leave(handle, gone);
+        if (was_inside(handle, gone)) {
+          members_.add(gone.inside, handle);
+          try {
+            leave(handle, gone);
+          } catch (...) {
+            members_.remove(gone.inside, handle);
+            throw;
+          }
+        }
+      former_.assign(members_.of(gone.inside).begin(), members_.of(gone.inside).end());
+      for (const std::uint32_t handle : former_) {
+        if (fences_[handle]->own) continue;
+        leave(handle, gone);
         members_.remove(gone.inside, handle);
       }
       gone.done = true;
@@ -1045,6 +1180,22 @@ class Fences {
     fence.area = *area == *fence.decided ? fence.decided : std::move(area);
   }
 
+  // Subjects that were not there are outside at first.
+  void list_fresh() {
+    for (std::size_t i = 0; i < changes_.size() && !owners_.empty(); ++i) {
+      if (!changes_[i].fresh || changes_[i].returned || !current(i)) continue;
+      const std::uint32_t slot = changes_[i].slot;
+      for (const std::uint32_t handle : owners_) {
+        Fence& fence = *fences_[handle];
+        if (members_.has(subjects_[slot].inside, handle) || was_there(fence, key_of(slot), true)) continue;
+        fence.outside.push_back(slot);
+        members_.add(subjects_[slot].inside, handle);
+      }
+      changes_[i].returned = true;
+    }
+    for (const std::uint32_t handle : owners_) fences_[handle]->listed = true;
+  }
+
   template <class SlotsAt>
   void decide_own(std::uint32_t handle, HullTree& tree, SlotsAt slots_at) {
     Fence& fence = *fences_[handle];
@@ -1065,32 +1216,22 @@ class Fences {
       else
         cross(handle, slot, +1, 0);
     }
-    for (std::size_t i = 0; i < changes_.size(); ++i) {
-      const std::uint32_t slot = changes_[i].slot;
-      if (!current(i) || !changes_[i].fresh || changes_[i].returned || is_single(slot)) continue;
-      if (!was_there(fence, key_of(slot), true)) cross(handle, slot, +1, 0);
-    }
     for (const std::uint32_t slot : at_vertices) {
-      const Change* const change = change_of(slot);
       const Point p = (*slots_)[slot].place;
       if (!members_.has(subjects_[slot].inside, handle)) {
-        const bool absent = change && change->fresh && !change->returned && !was_there(fence, key_of(slot), true);
-        if (!absent && is_near_neighbours(fence.area->convex, p, fence.area->margin)) continue;
+        if (is_near_neighbours(fence.area->convex, p, fence.area->margin)) continue;
         bool stays = false;
         double distance = 0;
         tree.without(p, [&] {
           const std::optional<Edge> part = nearest_part(tree.nodes(), p);
-          stays = !absent && part && compare_distance(p, *part, fence.area->margin) <= 0;
+          stays = part && compare_distance(p, *part, fence.area->margin) <= 0;
           distance = dynhull::distance(tree.nodes(), p);
         });
         if (stays) continue;
         outside.push_back(slot);
         fence.outside.push_back(slot);  // in case of an exception
-        if (absent)
-          members_.add(subjects_[slot].inside, handle);
-        else
-          cross(handle, slot, -1, distance);
-        if (!absent) continue;
+        cross(handle, slot, -1, distance);
+        continue;
       }
       const std::optional<Point> from = start(fence, slot);
       if (!fence.cross || !from || *from == p) continue;
@@ -1147,31 +1288,36 @@ class Fences {
     to.rows.push_back(row);
   }
 
-  // By fence, then by key. After an exception, a way may have been reported already.
+  // By fence, then by key. After an exception, a way may have been reported already, or that of a subject that has
+  // left.
   void sort(Crossings& found) const {
-    std::sort(found.rows.begin(), found.rows.end(), [&](const Crossing& a, const Crossing& b) {
-      if (a.fence != b.fence) return a.fence < b.fence;
-      return slots_->strings() ? found.string(a) < found.string(b) : a.key < b.key;
-    });
-    const auto same_way = [&](const Crossing& a, const Crossing& b) {
-      return a.fence == b.fence && a.change == 0 && b.change == 0 &&
-             (slots_->strings() ? found.string(a) == found.string(b) : a.key == b.key);
+    const auto order = [&](const Crossing& a, const Crossing& b) {
+      if (a.fence != b.fence) return a.fence <=> b.fence;
+      return slots_->strings() ? found.string(a) <=> found.string(b) : a.key <=> b.key;
     };
-    found.rows.erase(std::unique(found.rows.begin(), found.rows.end(), same_way), found.rows.end());
+    std::sort(found.rows.begin(), found.rows.end(), [&](const Crossing& a, const Crossing& b) {
+      const auto sign = order(a, b);
+      return sign != 0 ? sign<0 : (a.change != 0)>(b.change != 0);
+    });
+    const auto needless = [&](const Crossing& a, const Crossing& b) { return b.change == 0 && order(a, b) == 0; };
+    found.rows.erase(std::unique(found.rows.begin(), found.rows.end(), needless), found.rows.end());
   }
 
   const Slots* slots_;
   Subjects subjects_;
   MemberLists members_;
   std::vector<Change> changes_;
-  std::vector<std::uint32_t> strayed_;  // slots of subjects that have left their box, or are new
+  std::vector<std::uint32_t> strayed_;  // changes of subjects that have left their box, or are new
+  std::size_t merged_ = 0, merged_strayed_ = 0, batches_ = 0;
   std::vector<Gone> gone_;
   std::string gone_keys_;
   std::uint32_t base_ = FIRST;
 
   Zones zones_;
   std::vector<std::uint32_t> crowded_, waiting_;  // zones to divide, and those with subjects to decide
-  bool zoned_ = false, torn_ = false;
+  bool zoned_ = false;
+  bool torn_ = false;      // the zones are to be made anew
+  bool everyone_ = false;  // all subjects are to be decided
 
   std::map<std::int64_t, std::uint32_t> numbers_;
   std::vector<std::unique_ptr<Fence>> fences_;
@@ -1184,7 +1330,8 @@ class Fences {
   std::uint64_t placed_ = 0, returned_ = 0;  // their number when the places were noted, and when subjects came back
 
   Crossings taken_;
-  std::vector<std::uint32_t> found_, former_, ways_;
+  std::vector<Found> found_;
+  std::vector<std::uint32_t> former_, ways_;
 };
 
 }  // namespace dynhull

@@ -1,4 +1,5 @@
-// Exact comparisons of the distance from a point to a point or a segment with a radius, and the distance to a circle.
+// Exact comparisons of the distance from a point to a point or a segment with a radius, and distances to segments and
+// circles.
 #pragma once
 
 #include "../query/constructions.hpp"
@@ -58,6 +59,34 @@ inline double distance_to_segment(Point p, Edge edge) {
   const Edge part = nearest_part(p, edge);
   if (!(part.a == part.b)) return orientation(part.a, part.b, p) == 0 ? 0 : distance_to_line(p, part.a, part.b);
   return p == part.a ? 0 : distance(p, part.a);
+}
+
+// Bounds of the distance from a point to a segment.
+struct AboutDistance {
+  double least = 0, most = INFINITE;
+
+  AboutDistance(Point p, Edge edge) {
+    const double ux = edge.b.x - edge.a.x, uy = edge.b.y - edge.a.y, vx = p.x - edge.a.x, vy = p.y - edge.a.y;
+    const double square = ux * ux + uy * uy;
+    if (!(square > SMALLEST_SQUARE && square < 1 / SMALLEST_SQUARE)) return;
+    const double share = std::clamp((ux * vx + uy * vy) / square, 0.0, 1.0);
+    const double x = vx - share * ux, y = vy - share * uy, distance = std::sqrt(x * x + y * y);
+    const double error = NEARNESS_BOUND * (std::abs(ux) + std::abs(uy) + std::abs(vx) + std::abs(vy));
+    if (!(distance + error < INFINITE)) return;
+    least = distance - error;
+    most = distance + error;
+  }
+};
+
+// The distance from p to the nearest of some segments, rounded once. Infinite if there are none.
+template <class ForEach>
+double distance_to_nearest(Point p, ForEach for_each) {
+  double most = INFINITE, nearest = INFINITE;
+  for_each([&](Edge edge) { most = std::min(most, AboutDistance(p, edge).most); });
+  for_each([&](Edge edge) {
+    if (AboutDistance(p, edge).least <= most) nearest = std::min(nearest, distance_to_segment(p, edge));
+  });
+  return nearest;
 }
 
 [[gnu::noinline, gnu::cold]] inline double distance_to_circle_exact(Point p, Point center, double radius) {

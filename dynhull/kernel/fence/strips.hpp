@@ -1,5 +1,5 @@
-// The boundary of an area with its margin, in pieces, and boxes that certainly keep off it. Only these tests round, and
-// always to the safe side: they choose what is decided exactly, and decide nothing themselves.
+// The boundary of an area with its margin, in strips. The tests here round, and always to the safe side: they choose
+// what is decided exactly, and decide nothing themselves.
 #pragma once
 
 #include "area.hpp"
@@ -12,6 +12,8 @@ struct Strip {
   Edge edge;
   double margin, radius;
 };
+
+inline bool edge_less(const Edge& e, const Edge& f) { return e.a == f.a ? e.b < f.b : e.a < f.a; }
 
 constexpr double STRIP_BOUND = 1e-14;  // relative, far above the rounding of a few operations
 constexpr double STRIP_SLACK = 1e-280;
@@ -48,124 +50,17 @@ inline bool may_touch(const Strip& strip, const Box& box) {
   return !(std::abs(ux * vy - uy * vx) - reach > error);
 }
 
-// A box with a strip strictly inside, rounded to floats.
-struct Rim {
-  float least_x, greatest_x, least_y, greatest_y;
-
-  bool meets(const Box& box) const {
-    return (least_x < box.greatest.x) & (box.least.x < greatest_x) & (least_y < box.greatest.y) &
-           (box.least.y < greatest_y);
-  }
-};
-
-constexpr float INFINITE_FLOAT = std::numeric_limits<float>::infinity();
-
-inline float float_above(double value) {
-  const float near = static_cast<float>(value);
-  return near <= value ? std::nextafter(near, INFINITE_FLOAT) : near;
-}
-inline float float_below(double value) {
-  const float near = static_cast<float>(value);
-  return near >= value && value < INFINITE ? std::nextafter(near, -INFINITE_FLOAT) : near;
+inline Strip strip_of(const Area& area, Edge edge) {
+  return {edge, area.margin, area.kind == Area::Kind::DISK ? area.radius : -1};
 }
 
-inline Rim rim_of(const Strip& strip) {
-  const Box box = around(strip);
-  return {float_below(box.least.x), float_above(box.greatest.x), float_below(box.least.y), float_above(box.greatest.y)};
+// The edges of an area in order; a disk has its center.
+inline std::vector<Edge> sorted_edges(const Area& area) {
+  std::vector<Edge> all;
+  if (area.kind == Area::Kind::DISK) all.push_back({area.center, area.center});
+  area.for_each_edge([&](Edge edge) { all.push_back(edge); });
+  std::sort(all.begin(), all.end(), edge_less);
+  return all;
 }
-
-// Rounded to floats, inwards. Empty unless it holds the subject's place.
-struct SafeBox {
-  float least_x, greatest_x, least_y, greatest_y;
-
-  static SafeBox everywhere() {
-    constexpr float INF = std::numeric_limits<float>::infinity();
-    return {-INF, INF, -INF, INF};
-  }
-  bool holds(Point p) const { return (p.x >= least_x) & (p.x <= greatest_x) & (p.y >= least_y) & (p.y <= greatest_y); }
-
-  // Stays where least <= p < greatest.
-  void stay_in(const Box& box) {
-    least_x = std::max(least_x, at_least(box.least.x));
-    least_y = std::max(least_y, at_least(box.least.y));
-    greatest_x = std::min(greatest_x, float_below(box.greatest.x));
-    greatest_y = std::min(greatest_y, float_below(box.greatest.y));
-  }
-
-  // Cuts off what is in the rim of a strip. False if p is in it.
-  bool keep_off(const Rim& rim, Point p) {
-    if ((rim.least_x >= greatest_x) | (rim.greatest_x <= least_x) | (rim.least_y >= greatest_y) |
-        (rim.greatest_y <= least_y))
-      return true;
-    const double beside_x = std::max(rim.least_x - p.x, p.x - rim.greatest_x);
-    const double beside_y = std::max(rim.least_y - p.y, p.y - rim.greatest_y);
-    if (std::max(beside_x, beside_y) < 0) return false;
-    if (beside_x >= beside_y)
-      p.x <= rim.least_x ? greatest_x = rim.least_x : least_x = rim.greatest_x;
-    else
-      p.y <= rim.least_y ? greatest_y = rim.least_y : least_y = rim.greatest_y;
-    return true;
-  }
-
-  // Cuts off what is in the strip, so that p stays inside unless it is close to it.
-  void keep_off(const Strip& strip, Point p) {
-    const Box box = around(strip);
-    if (box.least.x > greatest_x || box.greatest.x < least_x || box.least.y > greatest_y || box.greatest.y < least_y)
-      return;
-    const double beside_x = std::max(box.least.x - p.x, p.x - box.greatest.x);
-    const double beside_y = std::max(box.least.y - p.y, p.y - box.greatest.y);
-    const double beside = std::max(beside_x, beside_y), clear = clearance(strip, p);
-    if (beside <= clear) {
-      if (!(clear > 0)) {
-        *this = {1, 0, 1, 0};
-        return;
-      }
-      least_x = std::max(least_x, at_least(p.x - clear));
-      greatest_x = std::min(greatest_x, at_most(p.x + clear));
-      least_y = std::max(least_y, at_least(p.y - clear));
-      greatest_y = std::min(greatest_y, at_most(p.y + clear));
-    } else if (beside_x >= beside_y) {
-      if (p.x < box.least.x)
-        greatest_x = std::min(greatest_x, float_below(box.least.x));
-      else
-        least_x = std::max(least_x, float_above(box.greatest.x));
-    } else {
-      if (p.y < box.least.y)
-        greatest_y = std::min(greatest_y, float_below(box.least.y));
-      else
-        least_y = std::max(least_y, float_above(box.greatest.y));
-    }
-  }
-
- private:
-  static float at_least(double value) {
-    const float near = static_cast<float>(value);
-    return near < value ? std::nextafter(near, INFINITE_FLOAT) : near;
-  }
-  static float at_most(double value) {
-    const float near = static_cast<float>(value);
-    return near > value ? std::nextafter(near, -INFINITE_FLOAT) : near;
-  }
-  // Half the side of a square around p that is off the strip: a quarter of the distance, as a square reaches farther in
-  // its corners and as coordinates are rounded. 0 if there is none for sure.
-  static double clearance(const Strip& strip, Point p) {
-    const Point a = strip.edge.a;
-    double distance = 0, size = 0;
-    if (strip.radius >= 0) {
-      const double from_center = std::hypot(p.x - a.x, p.y - a.y);
-      distance = from_center < strip.radius ? strip.radius - from_center : from_center - strip.radius - strip.margin;
-      size = from_center + strip.radius + strip.margin;
-    } else {
-      const double ux = strip.edge.b.x - a.x, uy = strip.edge.b.y - a.y;
-      const double left = ux * (p.y - a.y), right = uy * (p.x - a.x), length = std::sqrt(ux * ux + uy * uy);
-      if (!(length > SMALLEST_LENGTH)) return 0;
-      distance = std::abs(left - right) / length - strip.margin;
-      size = (std::abs(left) + std::abs(right) + STRIP_SLACK) / length + strip.margin;
-    }
-    const double clear = (distance - STRIP_BOUND * size) / 4;
-    return clear > 0 && clear < INFINITE ? clear : 0;
-  }
-  static constexpr double SMALLEST_LENGTH = 1e-140;  // its square does not underflow
-};
 
 }  // namespace dynhull

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "../memory/pages.hpp"
-#include "strips.hpp"
+#include "safe_box.hpp"
 
 namespace dynhull {
 
@@ -81,39 +81,61 @@ class MemberLists {
 };
 
 struct Subject {
-  SafeBox box;
-  std::uint32_t zone, at;  // the zone that lists it, and where; NONE if none does
-  std::uint32_t changed;   // its number in the list of changes, plus a base
+  std::uint32_t zone = NONE, at = 0;  // the zone that lists it, and where; NONE if none does
+  std::uint32_t changed = 0;          // its number in the list of changes, plus a base
   Members inside;
 };
 
-// Subjects by slot number. Grows without a copy where the system supports that.
-class Subjects {
+// Items by slot number. Grows without a copy where the system supports that.
+template <class Item>
+class SlotArray {
  public:
-  Subjects() = default;
-  Subjects(const Subjects&) = delete;
-  ~Subjects() { memory::release(data_, bytes()); }
+  SlotArray() = default;
+  SlotArray(const SlotArray&) = delete;
+  ~SlotArray() { memory::release(data_, bytes()); }
 
-  Subject& operator[](std::uint32_t slot) { return data_[slot]; }
-  const Subject& operator[](std::uint32_t slot) const { return data_[slot]; }
-  std::size_t size() const { return size_; }
-  std::size_t bytes() const { return memory::whole_pages(capacity_ * sizeof(Subject)); }
+  Item& operator[](std::size_t slot) { return data_[slot]; }
+  const Item& operator[](std::size_t slot) const { return data_[slot]; }
+  std::size_t bytes() const { return memory::whole_pages(capacity_ * sizeof(Item)); }
 
-  // Makes room for slots below `end`, which are subjects of nothing yet.
-  void reserve(std::size_t end, const Subject& fresh) {
-    if (end <= size_) return;
-    if (end > capacity_) {
-      const std::size_t capacity = std::max(end, capacity_ + capacity_ / 8);
-      const std::size_t larger = memory::whole_pages(capacity * sizeof(Subject));
-      data_ = static_cast<Subject*>(memory::resize(data_, bytes(), larger));
-      capacity_ = larger / sizeof(Subject);
-    }
-    for (; size_ < end; ++size_) data_[size_] = fresh;
+  void reserve(std::size_t end) {
+    if (end <= capacity_) return;
+    const std::size_t larger = memory::whole_pages(std::max(end, capacity_ + capacity_ / 8) * sizeof(Item));
+    data_ = static_cast<Item*>(memory::resize(data_, bytes(), larger));
+    capacity_ = larger / sizeof(Item);
   }
 
  private:
-  Subject* data_ = nullptr;
-  std::size_t capacity_ = 0, size_ = 0;
+  Item* data_ = nullptr;
+  std::size_t capacity_ = 0;
+};
+
+// Subjects by slot number. The boxes are apart, as most moves look at nothing else.
+class Subjects {
+ public:
+  Subject& operator[](std::uint32_t slot) { return subjects_[slot]; }
+  const Subject& operator[](std::uint32_t slot) const { return subjects_[slot]; }
+  SafeBox& box(std::uint32_t slot) { return boxes_[slot]; }
+  const SafeBox& box(std::uint32_t slot) const { return boxes_[slot]; }
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const { return boxes_.bytes() + subjects_.bytes(); }
+
+  // Makes room for slots below `end`, which are subjects of nothing yet. Only this throws.
+  void reserve(std::size_t end) {
+    if (end <= size_) return;
+    boxes_.reserve(end);
+    subjects_.reserve(end);
+    for (; size_ < end; ++size_) begin(static_cast<std::uint32_t>(size_));
+  }
+  void begin(std::uint32_t slot) {
+    boxes_[slot] = SafeBox::everywhere();
+    subjects_[slot] = Subject{};
+  }
+
+ private:
+  SlotArray<SafeBox> boxes_;
+  SlotArray<Subject> subjects_;
+  std::size_t size_ = 0;
 };
 
 }  // namespace dynhull

@@ -5,6 +5,8 @@
 // the rim are infinite.
 #pragma once
 
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "../tree/leaf.hpp"
@@ -12,21 +14,81 @@
 
 namespace dynhull {
 
-struct Zone {
-  struct Piece {
-    std::uint32_t fence, edge;
-    Rim rim;
-  };
+// An edge of a fence in a zone.
+struct Piece {
+  Edge edge;
+  std::uint32_t fence;
+  bool simple;  // the area is one polygon
+  bool wide;    // more than the edge is near the boundary: the area has a margin, or is a disk
+  bool disk;    // instead of an edge
+  bool inside;  // simple: whether the zone's anchor is
+};
 
-  Box box;                                   // without its right and upper side
+// Whether the end of a way in a zone is inside of a polygon, by the edges that the way crosses, if its start is. None
+// where the way is not clear of the ends of an edge, or starts or ends on one. Exact.
+inline std::optional<bool> inside_after(std::span<const Piece> pieces, Point from, bool inside, Point to) {
+  const Box way = Box::of({from, to});
+  for (const Piece& piece : pieces) {
+    const Edge edge = piece.edge;
+    if (!Box::of(edge).meets(way)) continue;
+    const int at_from = orientation(edge.a, edge.b, from), at_to = orientation(edge.a, edge.b, to);
+    if (at_from * at_to > 0) continue;
+    const int at_a = orientation(from, to, edge.a), at_b = orientation(from, to, edge.b);
+    if (at_a * at_b > 0) continue;
+    if (at_from == 0 || at_to == 0 || at_a == 0 || at_b == 0) return std::nullopt;
+    inside = !inside;
+  }
+  return inside;
+}
+
+// A finite point of a box. If it has none, of its closure.
+inline Point anchor_of(const Box& box) {
+  const auto of = [](double least, double greatest) {
+    return least > -INFINITE ? least : greatest < INFINITE ? std::nextafter(greatest, -INFINITE) : 0;
+  };
+  return {of(box.least.x, box.greatest.x), of(box.least.y, box.greatest.y)};
+}
+
+struct alignas(LINE) Zone {
+  Box box;                         // without its right and upper side
+  std::vector<Piece> pieces = {};  // those of a fence one after the other
+  std::size_t most = 0;            // subjects or pieces beyond which it is worth dividing; 0 for the usual number
   std::vector<std::uint32_t> covering = {};  // fences
-  std::vector<Piece> pieces = {};            // those of a fence one after the other
   std::vector<std::uint32_t> subjects = {};
   std::vector<std::uint32_t> pending = {};  // fences for which all subjects are to be decided again
-  std::size_t most = 0;  // subjects or pieces beyond which it is worth dividing; 0 for the usual number
 
   bool holds(Point p) const {
     return (box.least.x <= p.x) & (p.x < box.greatest.x) & (box.least.y <= p.y) & (p.y < box.greatest.y);
+  }
+  void fetch() const {
+    for (std::size_t i = 0; i < sizeof(Zone); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
+  }
+  void fetch_pieces() const {
+    const std::size_t bytes = std::min(pieces.size() * sizeof(Piece), std::size_t{8 * LINE});
+    for (std::size_t i = 0; i < bytes; i += LINE) prefetch(reinterpret_cast<const char*>(pieces.data()) + i);
+  }
+  void fetch_subjects() const { prefetch(&subjects); }
+  Point anchor() const { return anchor_of(box); }
+  // The distance from a point of the zone to the nearest of some pieces, if all others are farther. Rounded once.
+  std::optional<double> distance(std::span<const Piece> run, Point p) const {
+    const double nearest = distance_to_nearest(p, [&](auto visit) {
+      for (const Piece& piece : run) visit(piece.edge);
+    });
+    const double to_border =
+        std::min({p.x - box.least.x, box.greatest.x - p.x, p.y - box.least.y, box.greatest.y - p.y});
+    return nearest < to_border * (1 - NEARNESS_BOUND) ? std::optional(nearest) : std::nullopt;
+  }
+  // The pieces of the fence of piece `first`.
+  std::span<const Piece> run(std::size_t first) const {
+    std::size_t end = first + 1;
+    while (end < pieces.size() && pieces[end].fence == pieces[first].fence) ++end;
+    return std::span(pieces).subspan(first, end - first);
+  }
+  // Those of a fence; empty if there are none.
+  std::span<const Piece> run_of(std::uint32_t fence) const {
+    for (std::size_t first = 0; first < pieces.size(); ++first)
+      if (pieces[first].fence == fence) return run(first);
+    return {};
   }
   bool covered_by(std::uint32_t fence) const {
     return std::find(covering.begin(), covering.end(), fence) != covering.end();
@@ -91,16 +153,8 @@ class Zones {
     std::size_t bytes = nodes_.capacity() * sizeof(Node) + zones_.capacity() * sizeof(Zone);
     for (const Zone& zone : zones_)
       bytes += (zone.covering.capacity() + zone.subjects.capacity() + zone.pending.capacity()) * sizeof(Number) +
-               zone.pieces.capacity() * sizeof(Zone::Piece);
+               zone.pieces.capacity() * sizeof(Piece);
     return bytes;
-  }
-
-  // A finite point of a box that has one.
-  static Point sample(const Box& box) {
-    const auto of = [](double least, double greatest) {
-      return least > -INFINITE ? least : greatest < INFINITE ? std::nextafter(greatest, -INFINITE) : 0;
-    };
-    return {of(box.least.x, box.greatest.x), of(box.least.y, box.greatest.y)};
   }
 
  private:
@@ -119,7 +173,7 @@ class Zones {
   static bool empty(const Box& box) { return !(box.least.x < box.greatest.x && box.least.y < box.greatest.y); }
 
   std::uint32_t parent_of(Number zone) const {
-    const Point p = sample(zones_[zone].box);
+    const Point p = zones_[zone].anchor();
     std::uint32_t parent = NONE;
     for (std::uint32_t at = root_; !(at & ZONE); at = nodes_[at].child[quarter(nodes_[at].split, p)]) parent = at;
     return parent;
@@ -134,7 +188,7 @@ class Zones {
       if (may_touch(strip_of(ids[i]), box)) ids.push_back(ids[i]);
     const std::size_t end = ids.size();
     if (start == end) {
-      if (beyond(sample(box))) visit_all(at, visit);
+      if (beyond(anchor_of(box))) visit_all(at, visit);
     } else if (at & ZONE) {
       visit(at & ~ZONE, std::span<const std::uint32_t>(ids).subspan(start));
     } else {

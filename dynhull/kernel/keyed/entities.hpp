@@ -67,12 +67,14 @@ class Entities {
 
   // Throws DuplicateKey; then, and after every other exception, nothing has changed.
   template <class Keys>
-  Counts put(HullTree& tree, const Keys& keys, Puts& puts, Only only) {
+  Counts put(FramedTree& tree, const Keys& keys, Puts& puts, Only only) {
     const std::size_t count = keys.size();
     Counts counts;
     const Changes changes(2 * count);
     Batch<Keys> batch(*this, keys);
     if (fences_) fences_->make_room(count);
+    if (only != Only::ALL || ordered)
+      for (std::size_t i = 0; i < count; ++i) tree.require(puts.place(i));
     std::size_t change = 0;
     for (std::size_t i = 0; i < count; ++i) {
       Found& row = batch[i];
@@ -101,7 +103,7 @@ class Entities {
       throw;
     }
     batch.commit();
-    if (fences_) report_moved(batch, puts, count);
+    if (fences_) report_moved(batch, puts, changes, count);
     rename([&] { rename_moved(batch, puts, changes, count); });
     if (ages_) age(batch, count);
     return counts;
@@ -109,7 +111,7 @@ class Entities {
 
   // Returns the number of entities removed. Throws DuplicateKey, and MissingKey unless missing keys are ignored.
   template <class Keys>
-  std::int64_t remove(HullTree& tree, const Keys& keys, bool ignore_missing) {
+  std::int64_t remove(FramedTree& tree, const Keys& keys, bool ignore_missing) {
     const Changes changes(keys.size());
     Batch<Keys> batch(*this, keys);
     std::size_t change = 0;
@@ -133,11 +135,11 @@ class Entities {
 
   // Removes all entities with a time of at most `until`. Returns their number. The first call of `expire`, `evict` or
   // `oldest` is O(n), and each that follows when most of the entities have left or memory did not suffice.
-  std::size_t expire(HullTree& tree, double until) {
+  std::size_t expire(FramedTree& tree, double until) {
     return remove_oldest(tree, [until](Ages& ages, auto& taken) { ages.take_until(until, taken); });
   }
   // Removes the `count` oldest entities: those without a time first, ties by key. Returns their number.
-  std::size_t evict(HullTree& tree, std::size_t count) {
+  std::size_t evict(FramedTree& tree, std::size_t count) {
     return remove_oldest(tree, [count](Ages& ages, auto& taken) { ages.take_oldest(count, taken); });
   }
   // The least time; NO_TIME if no entity has one.
@@ -146,7 +148,7 @@ class Entities {
     return ages_->oldest();
   }
 
-  void clear(HullTree& tree) {
+  void clear(FramedTree& tree) {
     Entities empty(slots_.strings(), ordered);
     if (fences_) {
       fences_->make_room_to_leave(slots_.size(), slots_.arena().living());
@@ -160,14 +162,15 @@ class Entities {
   }
 
   // Whether the names of all these places that are vertices are known. If not, `name` makes them known.
-  bool named(const HullTree& tree, std::span<const Point> places) const {
+  bool named(const FramedTree& tree, std::span<const Point> places) const {
     return names_ && names_->current(tree, places);
   }
-  void name(const HullTree& tree) { names_ = std::make_unique<Names>(tree, slots_); }
+  void forget_names() { names_.reset(); }
+  void name(const FramedTree& tree) { names_ = std::make_unique<Names>(tree, slots_); }
 
   // What has crossed the fences of an index since the last time.
-  Crossings take(HullTree& tree, Fences& fences) {
-    return fences.take(tree, [&](const std::vector<Point>& places) {
+  Crossings take(FramedTree& tree, Fences& fences) {
+    return fences.take(tree.plane(), [&](const std::vector<Point>& places) {
       if (!named(tree, places)) name(tree);
       return least_at(places);
     });
@@ -177,7 +180,7 @@ class Entities {
   std::vector<std::uint32_t> least_at(std::span<const Point> places) const { return names_->least_at(slots_, places); }
 
   // Throws std::logic_error unless the tree has the entities' points, and every key and name is found.
-  void check(const HullTree& tree) const {
+  void check(const FramedTree& tree) const {
     const auto require = [](bool holds, const char* message) {
       if (!holds) throw std::logic_error(message);
     };
@@ -322,14 +325,17 @@ class Entities {
   }
 
   template <class Rows>
-  void report_moved(Rows& batch, Puts& puts, std::size_t count) {
+  void report_moved(Rows& batch, Puts& puts, const Changes& changes, std::size_t count) {
+    std::size_t change = 0;
     for (std::size_t i = 0; i < count; ++i) {
       if (i + LOOKAHEAD < count && batch[i + LOOKAHEAD].slot != NONE) fences_->fetch(batch[i + LOOKAHEAD].slot);
       if (!batch[i].moved) continue;
+      change += !batch[i].entered;
+      const Point now = changes.place(change++);
       if (batch[i].entered)
         fences_->appeared(batch[i].slot);
       else
-        fences_->moved(batch[i].slot, puts.place(i));
+        fences_->moved(batch[i].slot, puts.place(i), now);
     }
   }
 
@@ -375,7 +381,7 @@ class Entities {
   }
 
   template <class Take>
-  std::size_t remove_oldest(HullTree& tree, Take take) {
+  std::size_t remove_oldest(FramedTree& tree, Take take) {
     if (!ages_) ages_ = std::make_unique<Ages>(slots_);
     std::vector<Ages::Taken> taken;
     try {

@@ -7,7 +7,7 @@
 
 #include <set>
 
-#include "../hull_tree.hpp"
+#include "../globe/framed_tree.hpp"
 #include "../static/inner_boxes.hpp"
 #include "slot_table.hpp"
 #include "slots.hpp"
@@ -16,16 +16,17 @@ namespace dynhull {
 
 class Names {
  public:
-  Names(const HullTree& tree, const Slots& slots) : boxes_(boxes_in(tree)), several_(Order{&slots}) {
+  Names(const FramedTree& tree, const Slots& slots)
+      : frame_(tree.frame()), boxes_(boxes_in(tree.plane())), several_(Order{&slots}) {
     slots.for_each([&](std::uint32_t slot) { add(slots, slot, slots[slot].place); });
     laid_ = outside_;
   }
 
   // Whether the names of all these places that are vertices are known.
-  bool current(const HullTree& tree, std::span<const Point> places) const {
+  bool current(const FramedTree& tree, std::span<const Point> places) const {
     if (outside_ > 2 * laid_ + FEW) return false;
     return std::none_of(places.begin(), places.end(),
-                        [&](Point place) { return inside(place) && is_vertex(tree, place); });
+                        [&](Point place) { return inside(place) && tree.is_vertex(*frame_(place)); });
   }
 
   // The slot of the least key at each place, or NONE. A place inside the boxes costs a scan of all entities.
@@ -105,11 +106,9 @@ class Names {
     }
   };
 
-  bool inside(Point place) const { return boxes_.holds(place); }
-
-  static bool is_vertex(const HullTree& tree, Point place) {
-    const Ref root = tree.nodes().root;
-    return root != NONE && (on_chain(tree.nodes(), root, UPPER, place) || on_chain(tree.nodes(), root, LOWER, place));
+  bool inside(Point place) const {
+    const std::optional<Point> in_plane = frame_(place);
+    return in_plane && boxes_.holds(*in_plane);
   }
 
   std::uint32_t at(const Slots& slots, Point place) const {
@@ -159,6 +158,7 @@ class Names {
     return boxes;
   }
 
+  Frame frame_;
   InnerBoxes boxes_;
   SlotTable table_;                  // one entry for each place, with its least key
   std::set<Member, Order> several_;  // all entities of the places that several have shared

@@ -1,7 +1,7 @@
 // What a batch of puts brings, what it counts, and what it asks of the tree.
 #pragma once
 
-#include "../hull_tree.hpp"
+#include "../globe/framed_tree.hpp"
 #include "slots.hpp"
 
 namespace dynhull {
@@ -14,17 +14,21 @@ struct Counts {
 // The places and times of a batch, checked and copied. Throws NotFinite.
 class Puts {
  public:
-  Puts(const Point* points, const double* times, bool or_none, std::size_t count)
+  Puts(const Frame& frame, const Point* points, const double* times, bool or_none, std::size_t count)
       : places_(count), times_(times != nullptr ? count : 0), timed_(times != nullptr) {
     Plain plain;
-    for (std::size_t i = 0; i < count; ++i) places_[i] = plain(points[i]);
+    bool placed = true;
+    for (std::size_t i = 0; i < count; ++i) {
+      places_[i] = plain(points[i]);
+      placed &= frame.has(places_[i]);
+    }
     double strange = 0;
     for (std::size_t i = 0; timed_ && i < count; ++i) {
       const double time = times[i] + 0.0;  // turns -0.0 into 0.0
       times_[i] = std::isnan(time) ? NO_TIME : time;
       strange += or_none && std::isnan(time) ? 0 : time - time;
     }
-    if (!plain.finite() || strange != 0) throw NotFinite();
+    if (!plain.finite() || !placed || strange != 0) throw NotFinite();
   }
 
   Point& place(std::size_t row) { return places_[row]; }
@@ -45,7 +49,7 @@ class Changes {
     places_[row] = place;
   }
   Point place(std::size_t row) const { return places_[row]; }
-  void apply(HullTree& tree, std::size_t count, bool all_insert) const {
+  void apply(FramedTree& tree, std::size_t count, bool all_insert) const {
     if (count > 0) tree.apply({ops_.data(), all_insert ? 0u : 1u}, places_.data(), count, false);
   }
 

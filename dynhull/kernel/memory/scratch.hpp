@@ -59,7 +59,7 @@ class BlockCache {
     return block;
   }
 
-  std::array<Block, 4> blocks_ = {};  // as many as a batch uses at a time
+  std::array<Block, 8> blocks_ = {};  // about as many as a batch uses at a time
 };
 
 // A fixed number of plain records, uninitialised.

@@ -59,8 +59,9 @@ inline PointArray array_of(std::vector<Point> points) {
 
 // A finite coordinate. A value other than a float or a small integer goes to dynhull.arrays, which converts or refuses
 // it.
+constexpr long long LARGEST_EXACT_INTEGER = 1LL << 53;
+
 inline double coordinate(nb::handle value, const char* name) {
-  constexpr long long LARGEST_EXACT_INTEGER = 1LL << 53;
   if (PyFloat_CheckExact(value.ptr())) {
     const double number = PyFloat_AS_DOUBLE(value.ptr());
     if (std::isfinite(number)) return number + 0.0;  // turns -0.0 into 0.0
@@ -113,7 +114,38 @@ std::optional<PointArray> plain_copy(std::size_t count, At at) {
   return plain.finite() ? std::optional(output.array()) : std::nullopt;
 }
 
+// A double that is exactly the number; false for anything but a finite float or an integer of at most 2**53.
+inline bool plain_number(PyObject* value, double& number) {
+  if (PyFloat_CheckExact(value)) {
+    number = PyFloat_AS_DOUBLE(value);
+    return std::isfinite(number);
+  }
+  if (!PyLong_CheckExact(value)) return false;
+  int overflow = 0;
+  const long long integer = PyLong_AsLongLongAndOverflow(value, &overflow);
+  number = static_cast<double>(integer);
+  return overflow == 0 && -LARGEST_EXACT_INTEGER <= integer && integer <= LARGEST_EXACT_INTEGER;
+}
+
+// The points of a list of lists or tuples of two numbers; None for any other list.
+inline std::optional<PointArray> listed_points(PyObject* list) {
+  const auto count = static_cast<std::size_t>(PyList_GET_SIZE(list));
+  if (count == 0) return std::nullopt;
+  const Output<double, 2> output(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    PyObject* const row = PyList_GET_ITEM(list, i);
+    if (!(PyList_CheckExact(row) || PyTuple_CheckExact(row)) || PySequence_Fast_GET_SIZE(row) != 2) return std::nullopt;
+    for (int axis = 0; axis < 2; ++axis) {
+      double number;
+      if (!plain_number(PySequence_Fast_GET_ITEM(row, axis), number)) return std::nullopt;
+      output.data()[2 * i + axis] = number + 0.0;
+    }
+  }
+  return output.array();
+}
+
 inline std::optional<PointArray> plain_points(nb::handle xy) {
+  if (PyList_CheckExact(xy.ptr())) return listed_points(xy.ptr());
   Rows rows;
   if (!nb::try_cast(xy, rows, false)) return std::nullopt;
   return plain_copy(rows.shape(0), [&](std::size_t i) { return points_of(rows)[i]; });

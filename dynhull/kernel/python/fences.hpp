@@ -12,12 +12,12 @@ namespace dynhull {
 class FenceIndex {
   template <class Work>
   auto alone(std::size_t rows, Work work) {
-    return hull_->alone(rows, [&](Entities&, HullTree&) { return work(*fences_); });
+    return hull_->alone(rows, [&](Entities&, FramedTree&) { return work(*fences_); });
   }
 
  public:
   explicit FenceIndex(KeyedHull& hull) : hull_(&hull) {
-    hull_->alone(ALL_ROWS, [&](Entities& entities, HullTree&) {
+    hull_->alone(ALL_ROWS, [&](Entities& entities, FramedTree&) {
       auto fences = std::make_unique<Fences>(entities.slots());
       if (entities.attach(*fences)) fences_ = std::move(fences);
     });
@@ -28,7 +28,7 @@ class FenceIndex {
 
   void detach() {
     if (!std::exchange(attached_, false)) return;
-    hull_->alone(0, [](Entities& entities, HullTree&) { entities.detach(); });
+    hull_->alone(0, [](Entities& entities, FramedTree&) { entities.detach(); });
   }
 
   std::size_t size() {
@@ -82,7 +82,7 @@ class FenceIndex {
     });
     if (idle) return nb::none();
     const Crossings crossings =
-        hull_->alone(work, [&](Entities& entities, HullTree& tree) { return entities.take(tree, *fences_); });
+        hull_->alone(work, [&](Entities& entities, FramedTree& tree) { return entities.take(tree, *fences_); });
     if (crossings.rows.empty()) return nb::none();
     const std::size_t count = crossings.rows.size();
     const Output<std::int64_t> fences(count);
@@ -118,8 +118,8 @@ class FenceIndex {
       std::sort(inside->begin(), inside->end());
       inside->erase(std::unique(inside->begin(), inside->end()), inside->end());
     }
-    hull_->alone(ALL_ROWS, [&](Entities&, HullTree& tree) {
-      fences_->set(tree, fence, std::move(area), cross, own, inside ? &*inside : nullptr);
+    hull_->alone(ALL_ROWS, [&](Entities&, FramedTree& tree) {
+      fences_->set(tree.plane(), fence, std::move(area), cross, own, inside ? &*inside : nullptr);
     });
   }
 

@@ -4,8 +4,10 @@
 #include <memory>
 #include <utility>
 
-#include "../check.hpp"
+#include "../globe/framed_tree.hpp"
+#include "../query/layers.hpp"
 #include "../query/locate_index.hpp"
+#include "../query/sketch.hpp"
 #include "arrays.hpp"
 
 namespace dynhull {
@@ -20,28 +22,37 @@ inline HullTree tree_of(const nb::object& xy) {
   return tree_of(as_points(xy));
 }
 
+// The gnomonic projection as Python passes it: the centre, and the sine and the cosine of its latitude.
+inline Gnomonic gnomonic_of(const nb::object& parameters) {
+  using Pair = std::pair<double, double>;
+  const auto [center, sine, cosine] = nb::cast<std::tuple<Pair, Pair, Pair>>(parameters);
+  return {center.first, center.second, {sine.first, sine.second}, {cosine.first, cosine.second}};
+}
+inline nb::object globe_module(const char* name) { return nb::module_::import_("dynhull._globe").attr(name); }
+
 class Hull {
  public:
   Hull() = default;
   explicit Hull(HullTree tree) : tree_(std::move(tree)) {}
+  explicit Hull(Frame frame) : tree_(std::move(frame)) {}
 
   std::size_t size() { return settled().size(); }
   std::size_t distinct() { return settled().distinct(); }
-  std::uint64_t changes() { return settled().changes; }
-  void set_changes(std::uint64_t changes) { writable().changes = changes; }
+  std::uint64_t changes() { return settled().changes(); }
+  void set_changes(std::uint64_t changes) { writable().set_changes(changes); }
   void clear() { writable().clear(); }
   std::uint64_t count(nb::handle x, nb::handle y) {
-    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
+    const Point p = point(x, y);
     return settled().count(p);
   }
 
   bool insert(nb::handle x, nb::handle y) {
-    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
-    return writable().insert(p);
+    const Point p = point(x, y);
+    return alone_with(p, [&](FramedTree& tree) { return tree.insert(p); });
   }
 
   bool remove(nb::handle x, nb::handle y) {
-    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
+    const Point p = point(x, y);
     const HullTree::Removal removal = writable().remove(p);
     if (removal == HullTree::Removal::MISSING) {
       PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y).ptr());
@@ -74,7 +85,7 @@ class Hull {
     std::vector<Point> chain;
     {
       const ReadLock lock(lock_);
-      chain = tree_.chain(static_cast<Side>(side));
+      chain = tree_.plane().chain(static_cast<Side>(side));
     }
     return array_of(std::move(chain));
   }
@@ -83,7 +94,7 @@ class Hull {
     std::vector<Point> vertices;
     {
       const ReadLock lock(lock_);
-      vertices = vertices_of(tree_);
+      vertices = tree_.vertices();
     }
     return array_of(std::move(vertices));
   }
@@ -94,12 +105,10 @@ class Hull {
     refresh_index_for(count);
     {
       const ReadLock lock(lock_, count);
-      if (index_.fresh(tree_)) {
-        index_.locate(tree_, points_of(rows), count, output.data());
-      } else {
-        for (std::size_t i = 0; i < count; ++i)
-          output.data()[i] = static_cast<std::int8_t>(dynhull::locate(tree_.nodes(), points_of(rows)[i]).where);
-      }
+      if (tree_.frame().on_globe())
+        locate_projected(points_of(rows), count, output.data());
+      else
+        locate_places(points_of(rows), count, output.data());
     }
     return output.array();
   }
@@ -121,8 +130,9 @@ class Hull {
     {
       const ReadLock lock(lock_, count);
       auto* rows = reinterpret_cast<Point*>(output.data());
-      if (tree_.distinct() > 0)
-        for (std::size_t i = 0; i < count; ++i) rows[i] = dynhull::support(tree_.nodes(), points_of(directions)[i]);
+      if (tree_.size() > 0)
+        for (std::size_t i = 0; i < count; ++i)
+          rows[i] = dynhull::support(tree_.plane().nodes(), points_of(directions)[i]);
       else
         std::fill_n(rows, count, NO_EDGE.a);
     }
@@ -132,12 +142,20 @@ class Hull {
   EdgeArray tangents(const Rows& points) {
     const std::size_t count = points.shape(0);
     const Output<double, 2, 2> output(count);
-    {
+    const bool near = [&] {
       const ReadLock lock(lock_, count);
+      const Frame& frame = tree_.frame();
       auto* rows = reinterpret_cast<Edge*>(output.data());
-      for (std::size_t i = 0; i < count; ++i)
-        rows[i] = dynhull::tangents(tree_.nodes(), points_of(points)[i]).value_or(NO_EDGE);
-    }
+      bool all_near = true;
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::optional<Point> place = frame(points_of(points)[i]);
+        const std::optional<Edge> edge = place ? dynhull::tangents(tree_.plane().nodes(), *place) : std::nullopt;
+        rows[i] = edge ? Edge{tree_.given_at(edge->a), tree_.given_at(edge->b)} : NO_EDGE;
+        all_near &= place || !frame.projection();
+      }
+      return all_near;
+    }();
+    if (!near) checked(points, INSERT);
     return output.array();
   }
 
@@ -146,7 +164,8 @@ class Hull {
     const Output<double> output(count);
     {
       const ReadLock lock(lock_, count);
-      for (std::size_t i = 0; i < count; ++i) output.data()[i] = dynhull::distance(tree_.nodes(), points_of(points)[i]);
+      for (std::size_t i = 0; i < count; ++i)
+        output.data()[i] = dynhull::distance(tree_.plane().nodes(), points_of(points)[i]);
     }
     return output.array();
   }
@@ -159,46 +178,86 @@ class Hull {
       const ReadLock lock(lock_, count);
       auto* rows = reinterpret_cast<Edge*>(output.data());
       for (std::size_t i = 0; i < count; ++i)
-        rows[i] = intersect_line(tree_.nodes(), points_of(p)[i], points_of(q)[i]).value_or(NO_EDGE);
+        rows[i] = intersect_line(tree_.plane().nodes(), points_of(p)[i], points_of(q)[i]).value_or(NO_EDGE);
     }
     return output.array();
   }
 
+  std::vector<PointArray> layers(std::size_t count) {
+    std::vector<std::vector<Point>> layers;
+    {
+      const ReadLock lock(lock_);
+      layers = layers_of(tree_.plane(), count);
+    }
+    std::vector<PointArray> arrays;
+    for (std::vector<Point>& layer : layers) arrays.push_back(array_of(std::move(layer)));
+    return arrays;
+  }
+
+  DoubleArray influence() {
+    std::vector<double> areas;
+    {
+      const ReadLock lock(lock_);
+      areas = influence_of(tree_.plane());
+    }
+    const Output<double> output(areas.size());
+    std::copy(areas.begin(), areas.end(), output.data());
+    return output.array();
+  }
+
+  std::pair<PointArray, PointArray> sketch(std::size_t most) {
+    Sketch sketch;
+    {
+      const ReadLock lock(lock_);
+      sketch = sketch_of(tree_.plane(), most);
+    }
+    std::vector<Point> beyond;
+    for (const auto& [edge, farthest] : sketch.beyond) beyond.insert(beyond.end(), {edge.a, edge.b, farthest});
+    return {array_of(std::move(sketch.vertices)), array_of(std::move(beyond))};
+  }
+
   Hull* copy() {
-    auto other = std::make_unique<Hull>();
     const ReadLock lock(lock_);
-    other->tree_ = HullTree(tree_);
-    return other.release();
+    return new Hull(*this);
   }
 
   void check() {
     const ReadLock lock(lock_);
-    Check checked(tree_);
+    tree_.check();
   }
 
   std::pair<std::size_t, std::size_t> memory() {
-    const HullTree& tree = settled();
+    const FramedTree& tree = settled();
     return {tree.used_bytes(), tree.reserved_bytes()};
   }
 
  protected:
+  static constexpr std::int8_t PLUS_ONE = 1;
+  static constexpr Ops INSERT = {&PLUS_ONE, 0};
+
+  Hull(const Hull& other) : tree_(other.tree_) {}  // while the other one is locked
+
   static constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
   static constexpr Edge NO_EDGE = {{NOTHING, NOTHING}, {NOTHING, NOTHING}};
 
   std::int64_t apply(Ops ops, std::size_t ops_count, const nb::object& xy, bool ignore_missing,
                      std::optional<bool> together) {
-    const Rows rows = rows_of(xy);
+    const Rows rows = as_rows(xy);
     const std::size_t count = rows.shape(0);
     if (ops.step > 0 && ops_count != count) throw nb::value_error("ops and xy must have the same length");
+    const std::optional<Gnomonic> chosen = choose(rows, ops);
     const std::optional<Applied> applied = [&]() -> std::optional<Applied> {
       const WriteLock lock(lock_, count);
+      FramedTree::Choice choice(tree_, chosen);
       try {
-        return tree_.apply(ops, points_of(rows), count, ignore_missing, together);
+        const Applied applied = tree_.apply(ops, points_of(rows), count, ignore_missing, together);
+        if (applied.first_missing < 0 || ignore_missing) choice.keep();
+        return applied;
       } catch (const NotFinite&) {
         return {};
       }
     }();
-    if (!applied) return apply(ops, ops_count, as_points(xy), ignore_missing, together);
+    if (!applied) return apply(ops, ops_count, checked(rows, ops), ignore_missing, together);
     return rows_applied(*applied, rows, ignore_missing);
   }
 
@@ -210,30 +269,116 @@ class Hull {
     throw nb::python_error();
   }
 
+  // The points of an argument, not yet checked if it is a plain array; and the checked copy that Python makes.
+  Rows as_rows(const nb::object& xy) const {
+    Rows rows;
+    return is_plain_array(xy) && nb::try_cast(xy, rows, false) ? rows : nb::cast<Rows>(as_points(xy));
+  }
+  nb::object as_points(const nb::object& xy) const {
+    return tree_.frame().on_globe() ? globe_module("as_lonlat")(xy) : dynhull::as_points(xy);
+  }
+
+  // The checked copy of points that a batch has refused; raises the error that names the bad row.
+  nb::object checked(const Rows& rows, Ops ops) {
+    const std::size_t count = rows.shape(0);
+    const nb::object points = nb::cast(array_of({points_of(rows), points_of(rows) + count}));
+    if (!tree_.frame().on_globe()) return dynhull::as_points(points);
+    const Output<bool> inserted(count);
+    for (std::size_t i = 0; i < count; ++i) inserted.data()[i] = !ops.deletes(i);
+    return globe_module("refused")(points, inserted.array(), center(), "points row {}");
+  }
+
+  // A point of two arguments, checked but for the distance from the centre.
+  Point point(nb::handle x, nb::handle y) const {
+    if (!tree_.frame().on_globe()) return {coordinate(x, "x"), coordinate(y, "y")};
+    const Point p = {coordinate(x, "lon"), coordinate(y, "lat")};
+    if (!tree_.frame().has(p)) globe_module("as_place")(p.x, p.y);  // raises
+    return p;
+  }
+
+  // Calls `work` with the tree, to which it adds a point.
+  template <class Work>
+  bool alone_with(Point p, Work work) {
+    const std::optional<Gnomonic> chosen = choose(&p, 1, INSERT);
+    FramedTree& tree = writable();
+    FramedTree::Choice choice(tree, chosen);
+    try {
+      const bool changed = work(tree);
+      choice.keep();
+      return changed;
+    } catch (const NotFinite&) {
+    }
+    const Output<bool> inserted(1);
+    inserted.data()[0] = true;
+    globe_module("refused")(array_of({p}), inserted.array(), center(), "the point");
+    throw nb::value_error("another thread has moved the centre");
+  }
+
+  std::optional<std::pair<double, double>> center() {
+    const auto& projection = settled().frame().projection();
+    return projection ? std::optional(projection->center()) : std::nullopt;
+  }
+
+  // The projection that the points of a first batch choose; nothing if there is one already.
+  std::optional<Gnomonic> choose(const Point* points, std::size_t count, Ops ops) {
+    if (!settled().frame().on_globe() || tree_.frame().projection()) return {};
+    std::vector<Point> inserted;
+    for (std::size_t i = 0; i < count; ++i)
+      if (!ops.deletes(i)) inserted.push_back(points[i]);
+    const nb::object chosen = globe_module("chosen")(array_of(std::move(inserted)));
+    return chosen.is_none() ? std::nullopt : std::optional(gnomonic_of(chosen));
+  }
+  std::optional<Gnomonic> choose(const Rows& rows, Ops ops) { return choose(points_of(rows), rows.shape(0), ops); }
+
   // The tree, to read or to write while the caller holds the GIL.
-  const HullTree& settled() {
+  const FramedTree& settled() {
     lock_.await_readable();
     return tree_;
   }
-  HullTree& writable() {
+  FramedTree& writable() {
     lock_.await_writable();
     return tree_;
   }
 
   // Refreshes the index if that pays for the queries since the hull last changed.
   void refresh_index_for(std::size_t queries) {
-    if (settled().version() != asked_version_) queries_ = 0;
-    asked_version_ = tree_.version();
+    if (settled().plane().version() != asked_version_) queries_ = 0;
+    asked_version_ = tree_.plane().version();
     queries_ += queries;
-    if (!index_.stale(tree_, queries_)) return;
+    if (!index_.stale(tree_.plane(), queries_)) return;
     const WriteLock lock(lock_);
-    if (index_.stale(tree_, queries_)) index_.refresh(tree_, queries_);
+    if (index_.stale(tree_.plane(), queries_)) index_.refresh(tree_.plane(), queries_);
   }
 
-  HullTree tree_;
+  FramedTree tree_;
   ReadWriteLock lock_;
 
  private:
+  void locate_places(const Point* points, std::size_t count, std::int8_t* where) const {
+    if (index_.fresh(tree_.plane())) return index_.locate(tree_.plane(), points, count, where);
+    for (std::size_t i = 0; i < count; ++i)
+      where[i] = static_cast<std::int8_t>(dynhull::locate(tree_.plane().nodes(), points[i]).where);
+  }
+
+  void locate_projected(const Point* points, std::size_t count, std::int8_t* where) const {
+    std::fill_n(where, count, std::int8_t{-1});
+    if (!tree_.frame().projection()) return;
+    const Scratch<Point> places(count);
+    const Scratch<bool> has_place(count);
+    (*tree_.frame().projection())(points, count, places.data(), has_place.data());
+    const Scratch<std::uint32_t> rows(count);
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      places[near] = places[i];
+      rows[near] = static_cast<std::uint32_t>(i);
+      near += has_place[i];
+    }
+    if (near == count) return locate_places(places.data(), count, where);
+    const Scratch<std::int8_t> found(near);
+    locate_places(places.data(), near, found.data());
+    for (std::size_t i = 0; i < near; ++i) where[rows[i]] = found[i];
+  }
+
   LocateIndex index_;
   std::uint64_t asked_version_ = 0, queries_ = 0;
 };

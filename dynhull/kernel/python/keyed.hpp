@@ -39,6 +39,8 @@ class KeyedHull : public Hull {
 
  public:
   KeyedHull(std::string_view key_type, bool ordered) : entities_(key_type == "str", ordered) {}
+  KeyedHull(std::string_view key_type, bool ordered, Frame frame)
+      : Hull(std::move(frame)), entities_(key_type == "str", ordered) {}
 
   const char* key_type() const { return strings() ? "str" : "int"; }
   bool ordered() const { return entities_.ordered; }
@@ -55,26 +57,27 @@ class KeyedHull : public Hull {
 
   bool put(const nb::object& key, nb::handle x, nb::handle y, const nb::object& time, const nb::object& only) {
     return with_key(key, [&](const GivenKeys& given, const nb::object&) {
-      const Point place = {coordinate(x, "x"), coordinate(y, "y")};
+      const Point place = point(x, y);
       const double at = time_of(time);
-      Puts puts(&place, time.is_none() ? nullptr : &at, false, 1);
-      HullTree& tree = writable();
-      const std::uint64_t before = tree.changes;
-      given.with(strings(), [&](const auto& keys) { entities_.put(tree, keys, puts, only_of(only)); });
-      return tree.changes > before;
+      Puts puts(tree_.frame(), &place, time.is_none() ? nullptr : &at, false, 1);
+      return alone_with(place, [&](FramedTree& tree) {
+        const std::uint64_t before = tree.changes();
+        given.with(strings(), [&](const auto& keys) { entities_.put(tree, keys, puts, only_of(only)); });
+        return tree.changes() > before;
+      });
     });
   }
 
   bool remove(const nb::object& key) {
     return with_key(key, [&](const GivenKeys& given, const nb::object& checked) {
-      HullTree& tree = writable();
-      const std::uint64_t before = tree.changes;
+      FramedTree& tree = writable();
+      const std::uint64_t before = tree.changes();
       try {
         given.with(strings(), [&](const auto& keys) { entities_.remove(tree, keys, false); });
       } catch (const MissingKey&) {
         missing(checked);
       }
-      return tree.changes > before;
+      return tree.changes() > before;
     });
   }
 
@@ -161,17 +164,17 @@ class KeyedHull : public Hull {
     return names_of([&] { return std::vector<Point>(points_of(rows), points_of(rows) + rows.shape(0)); });
   }
   nb::list vertex_keys() {
-    return names_of([&] { return vertices_of(tree_); });
+    return names_of([&] { return tree_.vertices(); });
   }
 
   KeyedHull* copy() {
     const ReadLock lock(lock_);
-    return new KeyedHull(*this, tree_);
+    return new KeyedHull(*this);
   }
 
   void check() {
     const ReadLock lock(lock_);
-    const Check checked(tree_);
+    tree_.check();
     entities_.check(tree_);
   }
 
@@ -202,9 +205,11 @@ class KeyedHull : public Hull {
     return {used + entities_.bytes(), reserved + entities_.bytes()};
   }
 
- private:
-  KeyedHull(const KeyedHull& other, const HullTree& tree) : Hull(HullTree(tree)), entities_(other.entities_) {}
+ protected:
+  KeyedHull(const KeyedHull& other) : Hull(other), entities_(other.entities_) {}
+  void forget_names() { entities_.forget_names(); }
 
+ private:
   static Only only_of(const nb::object& only) {
     if (only.is_none()) return Only::ALL;
     return nb::cast<std::string_view>(only) == "absent" ? Only::ABSENT : Only::PRESENT;
@@ -227,9 +232,14 @@ class KeyedHull : public Hull {
 
   Counts put_all(const nb::object& keys, const nb::object& xy, const nb::object& times, Only only, bool or_none) {
     if (const auto counts = put_plain(keys, xy, times, only, or_none)) return *counts;
-    const nb::object checked =
-        entities_module("checked_puts")(keys, xy, times, key_type(), ordered(), nb::arg("or_none") = or_none);
-    return put_plain(checked[0], checked[1], checked[2], only, or_none).value();
+    const nb::object as_points =
+        tree_.frame().on_globe() ? globe_module("as_lonlat") : nb::module_::import_("dynhull.arrays").attr("as_points");
+    const nb::object rows = entities_module("checked_puts")(
+        keys, xy, times, key_type(), ordered(), nb::arg("or_none") = or_none, nb::arg("checked") = as_points);
+    if (const auto counts = put_plain(rows[0], rows[1], rows[2], only, or_none)) return *counts;
+    distinct_keys(rows[0]);
+    const nb::object points = checked(nb::cast<Rows>(rows[1]), INSERT);
+    return put_plain(rows[0], points, rows[2], only, or_none).value();
   }
 
   // Nothing unless all arguments are in a plain form, and the places and times are finite.
@@ -243,10 +253,15 @@ class KeyedHull : public Hull {
             ? ordered()
             : !is_plain_array(times) || !nb::try_cast(times, moments, false) || given->size() != moments.shape(0))
       return {};
+    const std::optional<Gnomonic> chosen = choose(rows, INSERT);
     try {
       const WriteLock lock(lock_, given->size());
-      Puts puts(points_of(rows), times.is_none() ? nullptr : moments.data(), or_none, given->size());
-      return given->with(strings(), [&](const auto& batch) { return entities_.put(tree_, batch, puts, only); });
+      FramedTree::Choice choice(tree_, chosen);
+      Puts puts(tree_.frame(), points_of(rows), times.is_none() ? nullptr : moments.data(), or_none, given->size());
+      const Counts counts =
+          given->with(strings(), [&](const auto& batch) { return entities_.put(tree_, batch, puts, only); });
+      choice.keep();
+      return counts;
     } catch (const NotFinite&) {
       return {};
     } catch (const DuplicateKey&) {

@@ -6,6 +6,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "../fence/simple_ring.hpp"
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
 #include "fences.hpp"
@@ -27,6 +28,12 @@ SignArray orientations(const Rows& a, const Rows& b, const Rows& c) {
       output.data()[i] = static_cast<std::int8_t>(orientation(points_of(a)[i], points_of(b)[i], points_of(c)[i]));
   }
   return output.array();
+}
+
+int turning(const Rows& ring) {
+  std::optional<nb::gil_scoped_release> release;
+  if (ring.shape(0) > FEW_ROWS) release.emplace();
+  return turning_if_simple({points_of(ring), ring.shape(0)});
 }
 
 std::optional<PointArray> convex_hull(const Rows& xy, std::optional<bool> discard, std::optional<bool> threads) {
@@ -88,6 +95,13 @@ nb::class_<Tree>& add_reads(nb::class_<Tree>& type) {
       .def("intersect_lines", &Tree::intersect_lines, "p"_a, "q"_a,
            "Where the line through p and q of each row enters and leaves the hull; NaN if it misses. p and q differ. "
            "O(log n) a row.")
+      .def("layers", &Tree::layers, "count"_a,
+           "The vertices of the outermost convex layers, each counter-clockwise from the least. O(log² n) a vertex.")
+      .def("influence", &Tree::influence,
+           "For each vertex the area that goes with it, rounded once. O(log² n) a vertex.")
+      .def("sketch", &Tree::sketch, "most"_a,
+           "At most that many vertices, at least 4; and three rows for each edge of theirs beyond which the hull has "
+           "others: its ends and the farthest of those. O(most log n).")
       .def("copy", &Tree::copy, "An independent tree of the same points. O(n).")
       .def("check", &Tree::check, "Raise AssertionError if an invariant is broken. O(n log n).")
       .def_prop_ro("memory", &Tree::memory, "The bytes that the tree uses, and the bytes that it reserves.");
@@ -219,22 +233,47 @@ void add_window_tree(nb::module_& module) {
            "Raise AssertionError if an invariant of the tree or of the window is broken. O(n log n).");
 }
 
+template <class Tree, class Base>
+void add_globe(nb::class_<Tree, Base>& type) {
+  type.def_prop_ro("center", &Tree::center, "The centre of the projection; None before the first points.")
+      .def("recenter", &Tree::recenter, nb::sig("def recenter(self, center: tuple[float, float]) -> None"), "center"_a,
+           "Project all places about another centre. ValueError if one is too far; nothing has changed. O(n log n).")
+      .def("copy", &Tree::copy, "An independent tree of the same places about the same centre.");
+}
+
 void add_globe(nb::module_& module) {
-  module.def("gnomonic", &gnomonic, "lonlat"_a, "lon"_a, "lat"_a, "sine"_a, "cosine"_a,
-             "The projections of places about a centre, given with the sine and the cosine of its latitude, NaN where "
-             "there is none; and where there is one.");
-  nb::class_<GivenPairs>(module, "Given", "The pairs of numbers given for places: see dynhull's class in Python.")
-      .def(nb::init<>())
-      .def_prop_ro("distinct", &GivenPairs::distinct, "The number of different pairs.")
-      .def("apply", &GivenPairs::apply, "ops"_a, "pairs"_a, "places"_a, "ignore_missing"_a,
-           "Add the rows with +1 and take those with -1, as a set. Returns which rows have an effect, and the places "
-           "whose least pair is another now.")
-      .def("counts", &GivenPairs::counts, "pairs"_a, "places"_a, "The number of copies of each row. O(1) a row.")
-      .def("at", &GivenPairs::at, "places"_a, "The least pair at each place. O(1) a row.")
-      .def("points", &GivenPairs::points, "All pairs in order, with multiplicity. O(n log n).")
-      .def("clear", &GivenPairs::clear, "Forget every pair.")
-      .def("copy", &GivenPairs::copy, "An independent copy. O(n).")
-      .def_prop_ro("memory", &GivenPairs::memory, "The bytes that are reserved.");
+  module.def("gnomonic", &gnomonic,
+             nb::sig("def gnomonic(lonlat: dynhull.arrays.Points, parameters: typing.Any) -> "
+                     "tuple[dynhull.arrays.Points, numpy.typing.NDArray[numpy.bool_]]"),
+             "lonlat"_a, "parameters"_a,
+             "The projections of places, NaN where there is none, and where there is one. The parameters are the "
+             "centre, and the sine and the cosine of its latitude as sums of two doubles.");
+  nb::class_<OnGlobe<Hull>, Hull> tree(module, "GlobeTree", "Places on the globe and their hull: see dynhull's class.");
+  tree.def(
+      "__init__", [](OnGlobe<Hull>* tree, const nb::object& center) { new (tree) OnGlobe<Hull>(center); },
+      nb::sig("def __init__(self, center: tuple[float, float] | None = None) -> None"), "center"_a = nb::none());
+  add_globe(tree);
+  nb::class_<OnGlobe<KeyedHull>, KeyedHull> entities(module, "GlobeEntities",
+                                                     "Entities on the globe: see dynhull's class in Python.");
+  entities.def(
+      "__init__",
+      [](OnGlobe<KeyedHull>* tree, std::string_view key_type, bool ordered, const nb::object& center) {
+        new (tree) OnGlobe<KeyedHull>(center, key_type, ordered);
+      },
+      nb::sig("def __init__(self, key_type: dynhull.keys.KeyType = 'str', ordered: bool = False, "
+              "center: tuple[float, float] | None = None) -> None"),
+      "key_type"_a = "str", "ordered"_a = false, "center"_a = nb::none());
+  add_globe(entities);
+  nb::class_<OnGlobe<Window>, Window> window(module, "GlobeWindowTree",
+                                             "A window on the globe: see dynhull's class in Python.");
+  window.def(
+      "__init__",
+      [](OnGlobe<Window>* tree, std::optional<double> max_age, std::optional<std::size_t> max_points,
+         const nb::object& center) { new (tree) OnGlobe<Window>(center, max_age, max_points); },
+      nb::sig("def __init__(self, max_age: float | None, max_points: int | None, "
+              "center: tuple[float, float] | None = None) -> None"),
+      "max_age"_a.none(), "max_points"_a.none(), "center"_a = nb::none());
+  add_globe(window);
 }
 
 void add_predicates(nb::module_& module) {
@@ -257,13 +296,17 @@ void add_predicates(nb::module_& module) {
               "d: tuple[float, float], z: tuple[float, float]) -> int"),
       "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` of each row of three arrays.");
+  module.def("turning_if_simple", &turning, "ring"_a,
+             "+1 for a ring of corners whose edges meet only at the ends of neighbours, and that has its inside on the "
+             "left; -1 if on the right; 0 for any other ring.");
   module.def("plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
              "a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.");
 }
 
 void add_arrays_and_static_hulls(nb::module_& module) {
   module.def("plain_points", &plain_points, "xy"_a,
-             "A copy of an (n, 2) array of finite doubles without negative zeros; None for any other argument.");
+             "A copy, without negative zeros, of an (n, 2) array of finite doubles or of a list of pairs of plain "
+             "numbers; None for any other argument.");
   module.def("packed_points", &packed_points, "packed"_a,
              "The points whose coordinates are these doubles, without negative zeros; None if one is not finite.");
   module.def("convex_hull", &convex_hull, "xy"_a, "discard"_a = nb::none(), "threads"_a = nb::none(),

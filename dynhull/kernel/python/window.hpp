@@ -14,6 +14,8 @@ class Window : public Hull {
  public:
   Window(std::optional<double> max_age, std::optional<std::size_t> max_points)
       : expiry_(max_age.value_or(INFINITE), max_points.value_or(Expiry::ANY_NUMBER)) {}
+  Window(std::optional<double> max_age, std::optional<std::size_t> max_points, Frame frame)
+      : Hull(std::move(frame)), expiry_(max_age.value_or(INFINITE), max_points.value_or(Expiry::ANY_NUMBER)) {}
 
   std::optional<double> max_age() const {
     return expiry_.max_age() == INFINITE ? std::nullopt : std::optional(expiry_.max_age());
@@ -32,21 +34,28 @@ class Window : public Hull {
   }
 
   std::int64_t add(const nb::object& xy, const nb::object& times) {
-    const Rows rows = rows_of(xy);
+    const Rows rows = as_rows(xy);
     const std::size_t count = rows.shape(0);
     std::optional<TimeRows> moments;
     if (!times.is_none()) moments = times_of(times, count);
     const double* const first = moments ? moments->data() : nullptr;
     const double last = moments && count > 0 ? first[count - 1] : Expiry::NEVER;
+    const std::optional<Gnomonic> chosen = choose(rows, INSERT);
     const std::optional<std::size_t> added = [&]() -> std::optional<std::size_t> {
       const WriteLock lock(lock_, rows_at(last, count));
+      FramedTree::Choice choice(tree_, chosen);
       try {
-        return expiry_.add(tree_, points_of(rows), first, count);
+        const std::size_t added = expiry_.add(tree_, points_of(rows), first, count);
+        choice.keep();
+        return added;
       } catch (const NotFinite&) {
         return {};
       }
     }();
-    return added ? static_cast<std::int64_t>(*added) : add(as_points(xy), as_times(times, count));
+    if (added) return static_cast<std::int64_t>(*added);
+    const nb::object points = as_points(nb::cast(array_of({points_of(rows), points_of(rows) + count})));
+    const nb::object checked_times = as_times(times, count);
+    return add(checked(nb::cast<Rows>(points), INSERT), checked_times);
   }
 
   std::size_t advance(double now) {
@@ -74,7 +83,7 @@ class Window : public Hull {
   }
 
   bool remove(nb::handle x, nb::handle y) {
-    const Point p = {coordinate(x, "x"), coordinate(y, "y")};
+    const Point p = point(x, y);
     const HullTree::Removal removal = expiry_.remove(writable(), p);
     if (removal == HullTree::Removal::MISSING) {
       PyErr_SetObject(PyExc_KeyError, nb::make_tuple(p.x, p.y).ptr());
@@ -84,7 +93,7 @@ class Window : public Hull {
   }
 
   std::int64_t remove_many(const nb::object& xy, bool ignore_missing) {
-    const Rows rows = rows_of(xy);
+    const Rows rows = as_rows(xy);
     const std::size_t count = rows.shape(0);
     const std::optional<Applied> applied = [&]() -> std::optional<Applied> {
       const WriteLock lock(lock_, count);
@@ -118,7 +127,7 @@ class Window : public Hull {
       const ReadLock lock(lock_);
       items = expiry_.items();
       now = known(expiry_.now());
-      totals = {tree_.changes, expiry_.expired, expiry_.evicted, expiry_.late};
+      totals = {tree_.changes(), expiry_.expired, expiry_.evicted, expiry_.late};
     }
     std::vector<Point> points;
     points.reserve(items.size());
@@ -130,22 +139,24 @@ class Window : public Hull {
     if (times.shape(0) != points.shape(0)) throw nb::value_error("points and times must have the same length");
     writable();
     expiry_.restore(tree_, points_of(points), times.data(), points.shape(0), now.value_or(Expiry::NEVER));
-    std::tie(tree_.changes, expiry_.expired, expiry_.evicted, expiry_.late) = totals;
+    std::uint64_t changes;
+    std::tie(changes, expiry_.expired, expiry_.evicted, expiry_.late) = totals;
+    tree_.set_changes(changes);
   }
 
   Window* copy() {
-    auto other = std::make_unique<Window>(max_age(), max_points());
     const ReadLock lock(lock_);
-    other->tree_ = HullTree(tree_);
-    other->expiry_ = Expiry(expiry_);
-    return other.release();
+    return new Window(*this);
   }
 
   void check() {
     const ReadLock lock(lock_);
-    Check checked(tree_);
+    tree_.check();
     expiry_.check(tree_);
   }
+
+ protected:
+  Window(const Window& other) : Hull(other), expiry_(other.expiry_) {}
 
  private:
   static std::optional<double> known(double time) { return time == Expiry::NEVER ? std::nullopt : std::optional(time); }

@@ -80,7 +80,8 @@ inline std::optional<Edge> tangents(const Nodes& nodes, Point p) {
 // The part of a side nearest to p, which is outside and sees the side: an edge if the nearest point is between its
 // ends, otherwise a vertex, twice. The distance first falls and then rises along the visible edges, and the hidden
 // edges are beyond them.
-inline Edge nearest(Cursor cursor, Side side, Point p) {
+template <class Trees>
+Edge nearest(Cursor<Trees> cursor, Side side, Point p) {
   while (!cursor.single) {
     const Point a = cursor.a, b = cursor.b;
     if (turned(side, orientation(a, b, p)) <= 0)
@@ -122,7 +123,8 @@ inline double distance(const Nodes& nodes, Point p) {
 }
 
 // The vertex of a side farthest from the line through p and q (p < q) on that side of the line; or an edge.
-inline Edge farthest(Cursor cursor, Side side, Point p, Point q) {
+template <class Trees>
+Edge farthest(Cursor<Trees> cursor, Side side, Point p, Point q) {
   while (!cursor.single) {
     const int turn = turned(side, cross_sign(p, q, cursor.a, cursor.b));
     if (turn == 0) return {cursor.a, cursor.b};
@@ -133,7 +135,8 @@ inline Edge farthest(Cursor cursor, Side side, Point p, Point q) {
 
 // The intersection of the line through p and q with a part of a chain that starts on the line's side `sign` and ends on
 // the other.
-inline Point crossing_point(Cursor cursor, Point p, Point q, int sign) {
+template <class Trees>
+Point crossing_point(Cursor<Trees> cursor, Point p, Point q, int sign) {
   while (true) {
     const Point a = cursor.a, b = cursor.b;
     const int at_b = sign * orientation(p, q, b);

@@ -131,6 +131,10 @@ struct Leaf {
 
   // The strict chain of the entries from..to, as a mask (Andrew 1979).
   Mask scan(Side side, unsigned from, unsigned to) const {
+    return scan(side, from, perhaps_vertices(side, from, to), to);
+  }
+  // The same of `from`, `to` and some entries between them.
+  Mask scan(Side side, unsigned from, Mask between, unsigned to) const {
     Mask mask = bit(from);
     unsigned top = from;
     const auto push = [&](unsigned i) {
@@ -143,7 +147,7 @@ struct Leaf {
       mask |= bit(i);
       top = i;
     };
-    for (Mask rest = perhaps_vertices(side, from, to); rest; rest &= rest - 1) push(lowest(rest));
+    for (; between; between &= between - 1) push(lowest(between));
     if (to > from) push(to);
     return mask;
   }

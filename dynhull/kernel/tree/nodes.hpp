@@ -36,6 +36,9 @@ class Nodes {
   Edge& bridge(Ref tree, Side side) { return bridges_[tree].side[side]; }
   const Edge& bridge(Ref tree, Side side) const { return bridges_[tree].side[side]; }
 
+  Ref child(Ref tree, int rank) const { return node(tree).child[rank]; }
+  Mask chain(Ref tree, Side side) const { return leaf(tree).chain[side]; }
+
   unsigned height(Ref tree) const { return is_leaf(tree) ? 0 : node(tree).height; }
   Ref parent(Ref tree) const { return is_leaf(tree) ? leaf(tree).parent : node(tree).parent; }
   void set_parent(Ref tree, Ref parent) { (is_leaf(tree) ? leaf(tree).parent : node(tree).parent) = parent; }
@@ -101,6 +104,9 @@ class Nodes {
     }
   }
 
+  // Greater than the number of every leaf and of every node.
+  std::uint32_t leaf_end() const { return leaves_.end(); }
+  std::uint32_t node_end() const { return nodes_.end(); }
   std::size_t leaf_count() const { return leaves_.used(); }
   std::size_t node_count() const { return nodes_.used(); }
   std::size_t used_bytes() const {

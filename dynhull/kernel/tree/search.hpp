@@ -1,19 +1,23 @@
 // Searches along chains: the cursor, tangents from a point, the bridge of two subtrees.
 #pragma once
 
+#include <vector>
+
 #include "nodes.hpp"
 
 namespace dynhull {
 
 // A binary search along the chain of a subtree, or along the part between two of its vertices. At every step (a, b) is
 // an edge of the chain, and the caller chooses the side of it that holds the vertex; when one vertex is left, it is a.
+// `Trees` holds the subtree: Nodes, or a view of them.
+template <class Trees>
 class Cursor {
  public:
   Point a, b;
   bool single = false;
 
-  Cursor(const Nodes& nodes, Ref tree, Side side, Point lowest = LOWEST, Point highest = HIGHEST)
-      : nodes_(nodes), side_(side), tree_(tree), lowest_(lowest), highest_(highest) {
+  Cursor(const Trees& trees, Ref tree, Side side, Point lowest = LOWEST, Point highest = HIGHEST)
+      : trees_(trees), side_(side), tree_(tree), lowest_(lowest), highest_(highest) {
     descend();
   }
 
@@ -23,7 +27,7 @@ class Cursor {
       halve();
     } else {
       highest_ = a;
-      tree_ = nodes_.node(tree_).child[0];
+      tree_ = trees_.child(tree_, 0);
       descend();
     }
   }
@@ -33,7 +37,7 @@ class Cursor {
       halve();
     } else {
       lowest_ = b;
-      tree_ = nodes_.node(tree_).child[1];
+      tree_ = trees_.child(tree_, 1);
       descend();
     }
   }
@@ -43,25 +47,24 @@ class Cursor {
   void descend() {
     if (lowest_ == highest_) return settle(lowest_);
     while (!is_leaf(tree_)) {
-      const Edge& edge = nodes_.bridge(tree_, side_);
+      const Edge& edge = trees_.bridge(tree_, side_);
       if (edge.b > highest_) {
-        tree_ = nodes_.node(tree_).child[0];
+        tree_ = trees_.child(tree_, 0);
       } else if (edge.a < lowest_) {
-        tree_ = nodes_.node(tree_).child[1];
+        tree_ = trees_.child(tree_, 1);
       } else {
         a = edge.a;
         b = edge.b;
         return;
       }
     }
-    const Leaf& leaf = nodes_.leaf(tree_);
-    leaf.fetch();
-    chain_ = leaf.chain[side_];
+    trees_.leaf(tree_).fetch();
+    chain_ = trees_.chain(tree_, side_);
     halve();
   }
   // Halves the rest of a leaf's chain by entries rather than by vertices, which needs no list of vertices.
   void halve() {
-    const Leaf& leaf = nodes_.leaf(tree_);
+    const Leaf& leaf = trees_.leaf(tree_);
     while (several(chain_)) {
       before_ = chain_ & below((lowest(chain_) + highest(chain_)) / 2 + 1);
       a = leaf[highest(before_)];
@@ -80,7 +83,7 @@ class Cursor {
     single = true;
   }
 
-  const Nodes& nodes_;
+  const Trees& trees_;
   Side side_;
   Ref tree_;
   Point lowest_, highest_;
@@ -88,7 +91,8 @@ class Cursor {
 };
 
 // The tangent point of the chain seen from p, which is right of the chain and outside it; the farther of two.
-inline Point tangent_to_left(Cursor cursor, Point p, Side side) {
+template <class Trees>
+Point tangent_to_left(Cursor<Trees> cursor, Point p, Side side) {
   while (!cursor.single) {
     if (turned(side, orientation(cursor.a, cursor.b, p)) >= 0)
       cursor.go_left();
@@ -99,7 +103,8 @@ inline Point tangent_to_left(Cursor cursor, Point p, Side side) {
 }
 
 // The tangent point of the chain seen from p, which is left of the chain and outside it; the farther of two.
-inline Point tangent_to_right(Cursor cursor, Point p, Side side) {
+template <class Trees>
+Point tangent_to_right(Cursor<Trees> cursor, Point p, Side side) {
   while (!cursor.single) {
     if (turned(side, orientation(cursor.a, cursor.b, p)) >= 0)
       cursor.go_right();
@@ -114,7 +119,8 @@ inline Point tangent_to_right(Cursor cursor, Point p, Side side) {
 // With (a, b) an edge of the left chain, the bridge starts at a or before exactly when some point of the right chain
 // is outside or on the line through a and b; likewise on the right. If both edges have each other's ends inside,
 // their lines cross between the chains, and the side of the separator on which they do decides.
-inline Edge find_bridge(Cursor left, Cursor right, Side side, Point separator) {
+template <class Trees>
+Edge find_bridge(Cursor<Trees> left, Cursor<Trees> right, Side side, Point separator) {
   while (true) {
     const Point a = left.a, b = left.b, c = right.a, d = right.b;
     if (left.single && right.single) return {a, c};
@@ -148,6 +154,23 @@ inline bool on_chain(const Nodes& nodes, Ref tree, Side side, Point p) {
   const Leaf& leaf = nodes.leaf(tree);
   const unsigned i = leaf.find(p);
   return leaf.holds(i, p) && (leaf.chain[side] & bit(i));
+}
+
+// Appends the vertices of a subtree's chain between two of them, left to right. O(log n) a vertex.
+template <class Trees>
+void collect(const Trees& trees, Ref tree, Side side, Point lowest, Point highest, std::vector<Point>& points) {
+  if (tree == NONE) return;
+  if (!is_leaf(tree)) {
+    const Edge& edge = trees.bridge(tree, side);
+    if (edge.a >= lowest) collect(trees, trees.child(tree, 0), side, lowest, std::min(edge.a, highest), points);
+    if (edge.b <= highest) collect(trees, trees.child(tree, 1), side, std::max(edge.b, lowest), highest, points);
+    return;
+  }
+  const Leaf& leaf = trees.leaf(tree);
+  for (Mask mask = trees.chain(tree, side); mask; mask &= mask - 1) {
+    const Point p = leaf[dynhull::lowest(mask)];
+    if (p >= lowest && p <= highest) points.push_back(p);
+  }
 }
 
 }  // namespace dynhull

@@ -4,7 +4,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "../hull_tree.hpp"
+#include "../globe/framed_tree.hpp"
 #include "horizon.hpp"
 #include "queue.hpp"
 #include "wheel.hpp"
@@ -50,8 +50,8 @@ class Expiry {
   // Adds the points that are not late and removes those that are too old or too many, as one batch. Copies points and
   // times first, so that other threads may change them; throws NotFinite if one is not finite. Without times, every
   // point has the time `now`. Returns the number of points added.
-  std::size_t add(HullTree& tree, const Point* points, const double* times, std::size_t count) {
-    Entering entering(*this, points, times, count);
+  std::size_t add(FramedTree& tree, const Point* points, const double* times, std::size_t count) {
+    Entering entering(*this, tree, points, times, count);
     Leaving leaving(*this);
     leaving.take_until(entering.limit());
     const std::size_t expired_now = leaving.size(), added = entering.size();
@@ -72,15 +72,15 @@ class Expiry {
   }
 
   // Moves the clock, which does not go back. Returns the number of points that left.
-  std::size_t advance(HullTree& tree, double now) {
+  std::size_t advance(FramedTree& tree, double now) {
     const std::size_t left = expire(tree, limit(now));
     now_ = now;
     return left;
   }
 
   // Removes the points of this time or before, without moving the clock. Returns their number.
-  std::size_t expire(HullTree& tree, double until) {
-    Entering nothing(*this, nullptr, nullptr, 0);
+  std::size_t expire(FramedTree& tree, double until) {
+    Entering nothing(*this, tree, nullptr, nullptr, 0);
     Leaving leaving(*this);
     leaving.take_until(until);
     apply(tree, leaving, nothing);
@@ -91,7 +91,7 @@ class Expiry {
   }
 
   // Removes the oldest copy of a point.
-  HullTree::Removal remove(HullTree& tree, Point p) {
+  HullTree::Removal remove(FramedTree& tree, Point p) {
     drop_tombstones(tree);
     Tombstones fresh = {{p, arrivals_}};
     const HullTree::Removal removal = tree.remove(p);
@@ -102,7 +102,7 @@ class Expiry {
   }
 
   // Removes the oldest copies of points as one batch, like HullTree::apply.
-  Applied remove(HullTree& tree, const Point* points, std::size_t count, bool ignore_missing) {
+  Applied remove(FramedTree& tree, const Point* points, std::size_t count, bool ignore_missing) {
     constexpr std::int8_t DELETE = -1;
     drop_tombstones(tree);
     const Scratch<Point> rows(count), sorted(count);
@@ -124,7 +124,7 @@ class Expiry {
   }
 
   // Removes every point. The clock and the totals stay.
-  void clear(HullTree& tree) {
+  void clear(FramedTree& tree) {
     tree.clear();
     queue_.clear();
     wheel_ = Wheel<Dated, OldestFirst>();
@@ -132,12 +132,12 @@ class Expiry {
   }
 
   // Fills an empty tree. The items are in order.
-  void restore(HullTree& tree, const Point* points, const double* times, std::size_t count, double now) {
+  void restore(FramedTree& tree, const Point* points, const double* times, std::size_t count, double now) {
     Queue<Dated> queue;
     queue.reserve(count);
     for (std::size_t i = 0; i < count; ++i) queue[i] = {points[i], times[i], i};
     queue.extend(count);
-    tree = HullTree(points, count);
+    tree.fill(points, count);
     queue_ = std::move(queue);
     arrivals_ = count;
     now_ = now;
@@ -179,7 +179,7 @@ class Expiry {
   }
 
   // Throws std::logic_error if an invariant is broken.
-  void check(const HullTree& tree) const {
+  void check(const FramedTree& tree) const {
     require(queue_.size() + wheel_.size() == tree.size() + tombstones_.size(),
             "an item without a point, or the reverse");
     require(tree.size() <= max_points_, "more points than are allowed");
@@ -212,18 +212,21 @@ class Expiry {
   // are committed; the others wait.
   class Entering {
    public:
-    Entering(Expiry& expiry, const Point* points, const double* times, std::size_t count)
+    Entering(Expiry& expiry, const FramedTree& tree, const Point* points, const double* times, std::size_t count)
         : queue_(expiry.queue_), before_(queue_.size()), newest_(expiry.now_) {
       queue_.reserve(count);
       Plain plain;
+      bool placed = true;
       double strange = 0;  // becomes NaN with a time that is not finite
       for (std::size_t i = 0; i < count; ++i) {
         const double time = times == nullptr ? expiry.now_ : times[i] + 0.0;
         if (times != nullptr) strange += time - time;
         queue_[before_ + i] = {plain(points[i]), time, expiry.arrivals_ + i};
+        placed &= tree.frame().has(queue_[before_ + i].p);
         newest_ = std::max(newest_, time);
       }
-      if (!plain.finite() || strange != 0) throw NotFinite();
+      if (!plain.finite() || !placed || strange != 0) throw NotFinite();
+      for (std::size_t i = before_; i < before_ + count; ++i) tree.require(queue_[i].p);  // not all reach the tree
       limit_ = expiry.limit(newest_);
       double last = before_ > 0 ? queue_[before_ - 1].time : NEVER;
       std::size_t end = before_;
@@ -367,7 +370,7 @@ class Expiry {
     }
   }
 
-  void apply(HullTree& tree, const Leaving& leaving, const Entering& entering) const {
+  void apply(FramedTree& tree, const Leaving& leaving, const Entering& entering) const {
     const std::size_t from = std::max(leaving.taken(), entering.before()), to = queue_.size();
     const std::size_t inserts = to - from + entering.others().size();
     const Scratch<Point> points(inserts + leaving.size());
@@ -391,7 +394,7 @@ class Expiry {
   }
 
   // Builds the order anew once most of its items are deleted.
-  void drop_tombstones(const HullTree& tree) {
+  void drop_tombstones(const FramedTree& tree) {
     if (tombstones_.size() <= tree.size() + MOST_TOMBSTONES) return;
     const std::vector<Dated> live = items();
     Queue<Dated> queue;

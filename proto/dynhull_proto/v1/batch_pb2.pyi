@@ -29,6 +29,7 @@ class Cause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     CAUSE_UNSPECIFIED: _ClassVar[Cause]
     CAUSE_BATCH: _ClassVar[Cause]
     CAUSE_EXPIRY: _ClassVar[Cause]
+    CAUSE_RECENTER: _ClassVar[Cause]
 
 class MissingPointPolicy(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -45,6 +46,7 @@ MISSING_KEY_POLICY_REFUSE: MissingKeyPolicy
 CAUSE_UNSPECIFIED: Cause
 CAUSE_BATCH: Cause
 CAUSE_EXPIRY: Cause
+CAUSE_RECENTER: Cause
 MISSING_POINT_POLICY_UNSPECIFIED: MissingPointPolicy
 MISSING_POINT_POLICY_REFUSE: MissingPointPolicy
 MISSING_POINT_POLICY_COUNT: MissingPointPolicy

@@ -10,6 +10,12 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
+class Frame(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    FRAME_UNSPECIFIED: _ClassVar[Frame]
+    FRAME_PLANE: _ClassVar[Frame]
+    FRAME_GEOGRAPHIC: _ClassVar[Frame]
+
 class Clock(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     CLOCK_UNSPECIFIED: _ClassVar[Clock]
@@ -34,6 +40,9 @@ class Identity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     IDENTITY_MULTISET: _ClassVar[Identity]
     IDENTITY_STRING_KEYS: _ClassVar[Identity]
     IDENTITY_INTEGER_KEYS: _ClassVar[Identity]
+FRAME_UNSPECIFIED: Frame
+FRAME_PLANE: Frame
+FRAME_GEOGRAPHIC: Frame
 CLOCK_UNSPECIFIED: Clock
 CLOCK_SERVER: Clock
 CLOCK_DATA: Clock
@@ -49,7 +58,7 @@ IDENTITY_STRING_KEYS: Identity
 IDENTITY_INTEGER_KEYS: Identity
 
 class Hull(_message.Message):
-    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time")
+    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time", "center")
     NAME_FIELD_NUMBER: _ClassVar[int]
     CONFIG_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
@@ -58,6 +67,7 @@ class Hull(_message.Message):
     CREATE_TIME_FIELD_NUMBER: _ClassVar[int]
     UID_FIELD_NUMBER: _ClassVar[int]
     CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
+    CENTER_FIELD_NUMBER: _ClassVar[int]
     name: str
     config: HullConfig
     revision: int
@@ -66,19 +76,32 @@ class Hull(_message.Message):
     create_time: _timestamp_pb2.Timestamp
     uid: str
     clock_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    center: LonLat
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ...) -> None: ...
 
 class HullConfig(_message.Message):
-    __slots__ = ("identity", "max_points", "window", "ordering")
+    __slots__ = ("identity", "max_points", "window", "ordering", "frame", "center")
     IDENTITY_FIELD_NUMBER: _ClassVar[int]
     MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
     WINDOW_FIELD_NUMBER: _ClassVar[int]
     ORDERING_FIELD_NUMBER: _ClassVar[int]
+    FRAME_FIELD_NUMBER: _ClassVar[int]
+    CENTER_FIELD_NUMBER: _ClassVar[int]
     identity: Identity
     max_points: int
     window: Window
     ordering: Ordering
-    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ...) -> None: ...
+    frame: Frame
+    center: LonLat
+    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ..., frame: _Optional[_Union[Frame, str]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ...) -> None: ...
+
+class LonLat(_message.Message):
+    __slots__ = ("longitude", "latitude")
+    LONGITUDE_FIELD_NUMBER: _ClassVar[int]
+    LATITUDE_FIELD_NUMBER: _ClassVar[int]
+    longitude: float
+    latitude: float
+    def __init__(self, longitude: _Optional[float] = ..., latitude: _Optional[float] = ...) -> None: ...
 
 class Window(_message.Message):
     __slots__ = ("max_age", "max_points", "clock", "max_skew", "ahead")

@@ -3,6 +3,7 @@ import datetime
 from dynhull_proto.v1 import batch_pb2 as _batch_pb2
 from dynhull_proto.v1 import hull_pb2 as _hull_pb2
 from dynhull_proto.v1 import points_pb2 as _points_pb2
+from google.protobuf import any_pb2 as _any_pb2
 from google.protobuf import duration_pb2 as _duration_pb2
 from google.protobuf import timestamp_pb2 as _timestamp_pb2
 from google.protobuf.internal import containers as _containers
@@ -65,17 +66,35 @@ class ListHullsResponse(_message.Message):
     next_page_token: str
     def __init__(self, hulls: _Optional[_Iterable[_Union[_hull_pb2.Hull, _Mapping]]] = ..., next_page_token: _Optional[str] = ...) -> None: ...
 
+class RecenterRequest(_message.Message):
+    __slots__ = ("name", "center")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    CENTER_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    center: _hull_pb2.LonLat
+    def __init__(self, name: _Optional[str] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ...) -> None: ...
+
+class RecenterResponse(_message.Message):
+    __slots__ = ("hull", "hull_changed")
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    HULL_CHANGED_FIELD_NUMBER: _ClassVar[int]
+    hull: _hull_pb2.Hull
+    hull_changed: bool
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., hull_changed: bool = ...) -> None: ...
+
 class ApplyRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence")
+    __slots__ = ("name", "batch", "producer", "sequence", "may_skip")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
+    may_skip: bool
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ...) -> None: ...
 
 class ApplyResponse(_message.Message):
     __slots__ = ("result",)
@@ -84,14 +103,16 @@ class ApplyResponse(_message.Message):
     def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ...) -> None: ...
 
 class ApplyTogetherRequest(_message.Message):
-    __slots__ = ("batches", "producer", "sequence")
+    __slots__ = ("batches", "producer", "sequence", "may_skip")
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     batches: _containers.RepeatedCompositeFieldContainer[HullBatch]
     producer: str
     sequence: int
-    def __init__(self, batches: _Optional[_Iterable[_Union[HullBatch, _Mapping]]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
+    may_skip: bool
+    def __init__(self, batches: _Optional[_Iterable[_Union[HullBatch, _Mapping]]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ...) -> None: ...
 
 class HullBatch(_message.Message):
     __slots__ = ("name", "batch")
@@ -108,16 +129,18 @@ class ApplyTogetherResponse(_message.Message):
     def __init__(self, results: _Optional[_Iterable[_Union[_batch_pb2.BatchResult, _Mapping]]] = ...) -> None: ...
 
 class IngestRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence")
+    __slots__ = ("name", "batch", "producer", "sequence", "may_skip")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
+    may_skip: bool
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ...) -> None: ...
 
 class IngestResponse(_message.Message):
     __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted")
@@ -150,18 +173,46 @@ class IngestResponse(_message.Message):
     def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ...) -> None: ...
 
 class StreamRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence")
+    __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    BATCHES_FIELD_NUMBER: _ClassVar[int]
+    ACCEPT_RESULTS_FIELD_NUMBER: _ClassVar[int]
+    MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ...) -> None: ...
+    batches: _containers.RepeatedCompositeFieldContainer[NumberedBatch]
+    accept_results: bool
+    may_skip: bool
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., batches: _Optional[_Iterable[_Union[NumberedBatch, _Mapping]]] = ..., accept_results: bool = ..., may_skip: bool = ...) -> None: ...
+
+class NumberedBatch(_message.Message):
+    __slots__ = ("batch", "sequence")
+    BATCH_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    batch: _batch_pb2.Batch
+    sequence: int
+    def __init__(self, batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class StreamResponse(_message.Message):
+    __slots__ = ("result", "sequence", "results", "max_batches", "max_message_bytes")
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    RESULTS_FIELD_NUMBER: _ClassVar[int]
+    MAX_BATCHES_FIELD_NUMBER: _ClassVar[int]
+    MAX_MESSAGE_BYTES_FIELD_NUMBER: _ClassVar[int]
+    result: _batch_pb2.BatchResult
+    sequence: int
+    results: _containers.RepeatedCompositeFieldContainer[NumberedResult]
+    max_batches: int
+    max_message_bytes: int
+    def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ..., sequence: _Optional[int] = ..., results: _Optional[_Iterable[_Union[NumberedResult, _Mapping]]] = ..., max_batches: _Optional[int] = ..., max_message_bytes: _Optional[int] = ...) -> None: ...
+
+class NumberedResult(_message.Message):
     __slots__ = ("result", "sequence")
     RESULT_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -547,8 +598,100 @@ class FrontierResponse(_message.Message):
     sharpe_ratios: _containers.RepeatedScalarFieldContainer[float]
     def __init__(self, revision: _Optional[int] = ..., efficient: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., turning_rates: _Optional[_Iterable[float]] = ..., dominated: _Optional[_Iterable[bool]] = ..., tangencies: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., sharpe_ratios: _Optional[_Iterable[float]] = ...) -> None: ...
 
+class QueryRequest(_message.Message):
+    __slots__ = ("reads",)
+    READS_FIELD_NUMBER: _ClassVar[int]
+    reads: _containers.RepeatedCompositeFieldContainer[Read]
+    def __init__(self, reads: _Optional[_Iterable[_Union[Read, _Mapping]]] = ...) -> None: ...
+
+class Read(_message.Message):
+    __slots__ = ("locate", "count", "get_positions", "support", "tangents", "distance", "intersect_lines", "get_hull", "sample_points", "get_measures", "separate", "phase_diagram", "frontier", "verify", "get_producer")
+    LOCATE_FIELD_NUMBER: _ClassVar[int]
+    COUNT_FIELD_NUMBER: _ClassVar[int]
+    GET_POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    SUPPORT_FIELD_NUMBER: _ClassVar[int]
+    TANGENTS_FIELD_NUMBER: _ClassVar[int]
+    DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    INTERSECT_LINES_FIELD_NUMBER: _ClassVar[int]
+    GET_HULL_FIELD_NUMBER: _ClassVar[int]
+    SAMPLE_POINTS_FIELD_NUMBER: _ClassVar[int]
+    GET_MEASURES_FIELD_NUMBER: _ClassVar[int]
+    SEPARATE_FIELD_NUMBER: _ClassVar[int]
+    PHASE_DIAGRAM_FIELD_NUMBER: _ClassVar[int]
+    FRONTIER_FIELD_NUMBER: _ClassVar[int]
+    VERIFY_FIELD_NUMBER: _ClassVar[int]
+    GET_PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    locate: LocateRequest
+    count: CountRequest
+    get_positions: GetPositionsRequest
+    support: SupportRequest
+    tangents: TangentsRequest
+    distance: DistanceRequest
+    intersect_lines: IntersectLinesRequest
+    get_hull: GetHullRequest
+    sample_points: SamplePointsRequest
+    get_measures: GetMeasuresRequest
+    separate: SeparateRequest
+    phase_diagram: PhaseDiagramRequest
+    frontier: FrontierRequest
+    verify: VerifyRequest
+    get_producer: GetProducerRequest
+    def __init__(self, locate: _Optional[_Union[LocateRequest, _Mapping]] = ..., count: _Optional[_Union[CountRequest, _Mapping]] = ..., get_positions: _Optional[_Union[GetPositionsRequest, _Mapping]] = ..., support: _Optional[_Union[SupportRequest, _Mapping]] = ..., tangents: _Optional[_Union[TangentsRequest, _Mapping]] = ..., distance: _Optional[_Union[DistanceRequest, _Mapping]] = ..., intersect_lines: _Optional[_Union[IntersectLinesRequest, _Mapping]] = ..., get_hull: _Optional[_Union[GetHullRequest, _Mapping]] = ..., sample_points: _Optional[_Union[SamplePointsRequest, _Mapping]] = ..., get_measures: _Optional[_Union[GetMeasuresRequest, _Mapping]] = ..., separate: _Optional[_Union[SeparateRequest, _Mapping]] = ..., phase_diagram: _Optional[_Union[PhaseDiagramRequest, _Mapping]] = ..., frontier: _Optional[_Union[FrontierRequest, _Mapping]] = ..., verify: _Optional[_Union[VerifyRequest, _Mapping]] = ..., get_producer: _Optional[_Union[GetProducerRequest, _Mapping]] = ...) -> None: ...
+
+class QueryResponse(_message.Message):
+    __slots__ = ("answers",)
+    ANSWERS_FIELD_NUMBER: _ClassVar[int]
+    answers: _containers.RepeatedCompositeFieldContainer[ReadAnswer]
+    def __init__(self, answers: _Optional[_Iterable[_Union[ReadAnswer, _Mapping]]] = ...) -> None: ...
+
+class ReadAnswer(_message.Message):
+    __slots__ = ("error", "locate", "count", "get_positions", "support", "tangents", "distance", "intersect_lines", "get_hull", "sample_points", "get_measures", "separate", "phase_diagram", "frontier", "verify", "get_producer")
+    ERROR_FIELD_NUMBER: _ClassVar[int]
+    LOCATE_FIELD_NUMBER: _ClassVar[int]
+    COUNT_FIELD_NUMBER: _ClassVar[int]
+    GET_POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    SUPPORT_FIELD_NUMBER: _ClassVar[int]
+    TANGENTS_FIELD_NUMBER: _ClassVar[int]
+    DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    INTERSECT_LINES_FIELD_NUMBER: _ClassVar[int]
+    GET_HULL_FIELD_NUMBER: _ClassVar[int]
+    SAMPLE_POINTS_FIELD_NUMBER: _ClassVar[int]
+    GET_MEASURES_FIELD_NUMBER: _ClassVar[int]
+    SEPARATE_FIELD_NUMBER: _ClassVar[int]
+    PHASE_DIAGRAM_FIELD_NUMBER: _ClassVar[int]
+    FRONTIER_FIELD_NUMBER: _ClassVar[int]
+    VERIFY_FIELD_NUMBER: _ClassVar[int]
+    GET_PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    error: ReadError
+    locate: LocateResponse
+    count: CountResponse
+    get_positions: GetPositionsResponse
+    support: SupportResponse
+    tangents: TangentsResponse
+    distance: DistanceResponse
+    intersect_lines: IntersectLinesResponse
+    get_hull: GetHullResponse
+    sample_points: SamplePointsResponse
+    get_measures: GetMeasuresResponse
+    separate: SeparateResponse
+    phase_diagram: PhaseDiagramResponse
+    frontier: FrontierResponse
+    verify: VerifyResponse
+    get_producer: GetProducerResponse
+    def __init__(self, error: _Optional[_Union[ReadError, _Mapping]] = ..., locate: _Optional[_Union[LocateResponse, _Mapping]] = ..., count: _Optional[_Union[CountResponse, _Mapping]] = ..., get_positions: _Optional[_Union[GetPositionsResponse, _Mapping]] = ..., support: _Optional[_Union[SupportResponse, _Mapping]] = ..., tangents: _Optional[_Union[TangentsResponse, _Mapping]] = ..., distance: _Optional[_Union[DistanceResponse, _Mapping]] = ..., intersect_lines: _Optional[_Union[IntersectLinesResponse, _Mapping]] = ..., get_hull: _Optional[_Union[GetHullResponse, _Mapping]] = ..., sample_points: _Optional[_Union[SamplePointsResponse, _Mapping]] = ..., get_measures: _Optional[_Union[GetMeasuresResponse, _Mapping]] = ..., separate: _Optional[_Union[SeparateResponse, _Mapping]] = ..., phase_diagram: _Optional[_Union[PhaseDiagramResponse, _Mapping]] = ..., frontier: _Optional[_Union[FrontierResponse, _Mapping]] = ..., verify: _Optional[_Union[VerifyResponse, _Mapping]] = ..., get_producer: _Optional[_Union[GetProducerResponse, _Mapping]] = ...) -> None: ...
+
+class ReadError(_message.Message):
+    __slots__ = ("code", "message", "details")
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    DETAILS_FIELD_NUMBER: _ClassVar[int]
+    code: int
+    message: str
+    details: _containers.RepeatedCompositeFieldContainer[_any_pb2.Any]
+    def __init__(self, code: _Optional[int] = ..., message: _Optional[str] = ..., details: _Optional[_Iterable[_Union[_any_pb2.Any, _Mapping]]] = ...) -> None: ...
+
 class WatchRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys")
+    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys", "outline_only")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -558,6 +701,7 @@ class WatchRequest(_message.Message):
     RESUME_FIELD_NUMBER: _ClassVar[int]
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    OUTLINE_ONLY_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
@@ -567,7 +711,8 @@ class WatchRequest(_message.Message):
     resume: WatchResume
     directions: _points_pb2.Points
     include_keys: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., include_keys: bool = ...) -> None: ...
+    outline_only: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., include_keys: bool = ..., outline_only: bool = ...) -> None: ...
 
 class WatchResume(_message.Message):
     __slots__ = ("uid", "revision")
@@ -578,7 +723,7 @@ class WatchResume(_message.Message):
     def __init__(self, uid: _Optional[str] = ..., revision: _Optional[int] = ...) -> None: ...
 
 class WatchResponse(_message.Message):
-    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures", "cause", "clock_time")
+    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures", "cause", "clock_time", "center")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
@@ -588,6 +733,7 @@ class WatchResponse(_message.Message):
     MEASURES_FIELD_NUMBER: _ClassVar[int]
     CAUSE_FIELD_NUMBER: _ClassVar[int]
     CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
+    CENTER_FIELD_NUMBER: _ClassVar[int]
     revision: int
     point_count: int
     snapshot: HullSnapshot
@@ -597,7 +743,8 @@ class WatchResponse(_message.Message):
     measures: _hull_pb2.Measures
     cause: _batch_pb2.Cause
     clock_time: _timestamp_pb2.Timestamp
-    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., cause: _Optional[_Union[_batch_pb2.Cause, str]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    center: _hull_pb2.LonLat
+    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., cause: _Optional[_Union[_batch_pb2.Cause, str]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ...) -> None: ...
 
 class HullSnapshot(_message.Message):
     __slots__ = ("vertices", "uid", "vertex_keys")

@@ -45,6 +45,13 @@ class HullServiceStub(object):
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
+    applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
+    GetProducer returns where to continue.
+
+    The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
+    answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
+
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
     is of one revision.
     """
@@ -69,6 +76,11 @@ class HullServiceStub(object):
                 '/dynhull.v1.HullService/ListHulls',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHullsRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHullsResponse.FromString,
+                _registered_method=True)
+        self.Recenter = channel.unary_unary(
+                '/dynhull.v1.HullService/Recenter',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterResponse.FromString,
                 _registered_method=True)
         self.Apply = channel.unary_unary(
                 '/dynhull.v1.HullService/Apply',
@@ -165,6 +177,11 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierResponse.FromString,
                 _registered_method=True)
+        self.Query = channel.stream_stream(
+                '/dynhull.v1.HullService/Query',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.QueryRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.QueryResponse.FromString,
+                _registered_method=True)
         self.Watch = channel.unary_stream(
                 '/dynhull.v1.HullService/Watch',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.SerializeToString,
@@ -197,6 +214,13 @@ class HullServiceServicer(object):
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
+    applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
+    GetProducer returns where to continue.
+
+    The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
+    answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
+
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
     is of one revision.
     """
@@ -217,6 +241,15 @@ class HullServiceServicer(object):
 
     def ListHulls(self, request, context):
         """Lists hulls by name, in pages. A caller with a token gets those it may read.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Recenter(self, request, context):
+        """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
+        that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
+        the new centre, or if there is no point to choose it from; then nothing changes.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -247,7 +280,8 @@ class HullServiceServicer(object):
 
     def Stream(self, request_iterator, context):
         """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
-        as in Ingest, after the acknowledgements of the batches before it.
+        as in Ingest, after the acknowledgements of the batches before it. A message can have several batches, and a response
+        several results: see StreamRequest.accept_results.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -268,7 +302,7 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def Count(self, request, context):
-        """Counts the multiplicity of points.
+        """Counts the multiplicity of points: on the globe, of these pairs of numbers.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -290,27 +324,32 @@ class HullServiceServicer(object):
 
     def Support(self, request, context):
         """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
+
+        A direction of a geographic hull is east and north at its centre; for a bearing b, (sin b, cos b). Of the great circles
+        at right angles to the one through the centre with this bearing, the farthest that meets the hull touches it there.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Tangents(self, request, context):
-        """Finds the tangent points from outside points. Exact.
+        """Finds the tangent points from outside points. Exact. Tangents of a geographic hull are great circles, and its points
+        are within 85 degrees of its centre.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Distance(self, request, context):
-        """Computes the distances of points to the hull.
+        """Computes the distances of points to the hull; of a geographic hull in metres, on WGS 84, within a micrometre.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def IntersectLines(self, request, context):
-        """Finds where lines enter and leave the hull.
+        """Finds where lines enter and leave the hull. Lines of a geographic hull are great circles, through places within 85
+        degrees of its centre. They enter and leave where their projections do, rounded to a few nanometres.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -332,7 +371,7 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def GetMeasures(self, request, context):
-        """Returns all measures of a hull.
+        """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -340,7 +379,12 @@ class HullServiceServicer(object):
 
     def Separate(self, request, context):
         """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
-        parts them. FAILED_PRECONDITION if one of them has no points.
+        parts them. FAILED_PRECONDITION if one of them has no points, or one is geographic and the other is not.
+
+        Two geographic hulls may have different centres. Whether they intersect is exact for their projections about the first
+        of three centres within 85 degrees of all vertices: that of the first hull, that of the other, their mean direction;
+        INVALID_ARGUMENT if there is none. Their distance is the least one of a vertex of one hull to the other hull, in
+        metres, as in Distance. Depth, normal and offset are NaN, and there are no closest points.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -358,6 +402,18 @@ class HullServiceServicer(object):
     def Frontier(self, request, context):
         """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
         a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Query(self, request_iterator, context):
+        """Answers many reads, of one or of many hulls, in the order in which they were sent. A message has any number of reads,
+        and its answers come in one or more responses. Each answer is that of the read's own method, at one revision. A refused
+        read is answered with its error, and the reads after it are answered as usual. A read that waits for a min_revision
+        delays those after it. The call ends as soon as a message is invalid as a whole, the server stops, or the token of the
+        caller is removed or loses the permission for the reads in progress. The client must read the answers: RESOURCE_EXHAUSTED
+        for one that does not, as in Watch.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -395,6 +451,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.ListHulls,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHullsRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHullsResponse.SerializeToString,
+            ),
+            'Recenter': grpc.unary_unary_rpc_method_handler(
+                    servicer.Recenter,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterResponse.SerializeToString,
             ),
             'Apply': grpc.unary_unary_rpc_method_handler(
                     servicer.Apply,
@@ -491,6 +552,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierResponse.SerializeToString,
             ),
+            'Query': grpc.stream_stream_rpc_method_handler(
+                    servicer.Query,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.QueryRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.QueryResponse.SerializeToString,
+            ),
             'Watch': grpc.unary_stream_rpc_method_handler(
                     servicer.Watch,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.FromString,
@@ -528,6 +594,13 @@ class HullService(object):
     1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
+
+    Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
+    applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
+    GetProducer returns where to continue.
+
+    The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
+    answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
 
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
     is of one revision.
@@ -604,6 +677,33 @@ class HullService(object):
             '/dynhull.v1.HullService/ListHulls',
             dynhull__proto_dot_v1_dot_hull__service__pb2.ListHullsRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.ListHullsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Recenter(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Recenter',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterResponse.FromString,
             options,
             channel_credentials,
             insecure,
@@ -1117,6 +1217,33 @@ class HullService(object):
             '/dynhull.v1.HullService/Frontier',
             dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.FrontierResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Query(request_iterator,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.stream_stream(
+            request_iterator,
+            target,
+            '/dynhull.v1.HullService/Query',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.QueryRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.QueryResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -46,6 +46,13 @@ class HullServiceStub:
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
+    applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
+    GetProducer returns where to continue.
+
+    The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
+    answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
+
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
     is of one revision.
     """
@@ -60,6 +67,11 @@ class HullServiceStub:
     """Deletes a hull and its points. Its watches end with NOT_FOUND."""
     ListHulls: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHullsRequest, _hull_service_pb2.ListHullsResponse]
     """Lists hulls by name, in pages. A caller with a token gets those it may read."""
+    Recenter: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.RecenterRequest, _hull_service_pb2.RecenterResponse]
+    """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
+    that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
+    the new centre, or if there is no point to choose it from; then nothing changes.
+    """
     Apply: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]
     """Applies one batch."""
     ApplyTogether: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyTogetherRequest, _hull_service_pb2.ApplyTogetherResponse]
@@ -72,26 +84,35 @@ class HullServiceStub:
     """
     Stream: _grpc.StreamStreamMultiCallable[_hull_service_pb2.StreamRequest, _hull_service_pb2.StreamResponse]
     """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
-    as in Ingest, after the acknowledgements of the batches before it.
+    as in Ingest, after the acknowledgements of the batches before it. A message can have several batches, and a response
+    several results: see StreamRequest.accept_results.
     """
     GetProducer: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetProducerRequest, _hull_service_pb2.GetProducerResponse]
     """Returns the last sequence number applied of a producer."""
     Locate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.LocateRequest, _hull_service_pb2.LocateResponse]
     """Locates points: inside, on the boundary or outside. Exact."""
     Count: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]
-    """Counts the multiplicity of points."""
+    """Counts the multiplicity of points: on the globe, of these pairs of numbers."""
     GetPositions: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetPositionsRequest, _hull_service_pb2.GetPositionsResponse]
     """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
     ReadEntities: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.ReadEntitiesRequest, _hull_service_pb2.ReadEntitiesResponse]
     """Sends all keys of a keyed hull at one revision, with their positions."""
     Support: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]
-    """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
+    """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
+
+    A direction of a geographic hull is east and north at its centre; for a bearing b, (sin b, cos b). Of the great circles
+    at right angles to the one through the centre with this bearing, the farthest that meets the hull touches it there.
+    """
     Tangents: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]
-    """Finds the tangent points from outside points. Exact."""
+    """Finds the tangent points from outside points. Exact. Tangents of a geographic hull are great circles, and its points
+    are within 85 degrees of its centre.
+    """
     Distance: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]
-    """Computes the distances of points to the hull."""
+    """Computes the distances of points to the hull; of a geographic hull in metres, on WGS 84, within a micrometre."""
     IntersectLines: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]
-    """Finds where lines enter and leave the hull."""
+    """Finds where lines enter and leave the hull. Lines of a geographic hull are great circles, through places within 85
+    degrees of its centre. They enter and leave where their projections do, rounded to a few nanometres.
+    """
     GetHull: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]
     """Returns the counts, vertices and measures of a hull."""
     SamplePoints: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]
@@ -99,10 +120,15 @@ class HullServiceStub:
     coordinates have the smallest hashes.
     """
     GetMeasures: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]
-    """Returns all measures of a hull."""
+    """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
     Separate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]
     """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
-    parts them. FAILED_PRECONDITION if one of them has no points.
+    parts them. FAILED_PRECONDITION if one of them has no points, or one is geographic and the other is not.
+
+    Two geographic hulls may have different centres. Whether they intersect is exact for their projections about the first
+    of three centres within 85 degrees of all vertices: that of the first hull, that of the other, their mean direction;
+    INVALID_ARGUMENT if there is none. Their distance is the least one of a vertex of one hull to the other hull, in
+    metres, as in Distance. Depth, normal and offset are NaN, and there are no closest points.
     """
     PhaseDiagram: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.PhaseDiagramRequest, _hull_service_pb2.PhaseDiagramResponse]
     """Interprets the hull as a binary phase diagram. Its points are entries: x is the composition, the share of the second
@@ -112,6 +138,14 @@ class HullServiceStub:
     Frontier: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.FrontierRequest, _hull_service_pb2.FrontierResponse]
     """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
     a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
+    """
+    Query: _grpc.StreamStreamMultiCallable[_hull_service_pb2.QueryRequest, _hull_service_pb2.QueryResponse]
+    """Answers many reads, of one or of many hulls, in the order in which they were sent. A message has any number of reads,
+    and its answers come in one or more responses. Each answer is that of the read's own method, at one revision. A refused
+    read is answered with its error, and the reads after it are answered as usual. A read that waits for a min_revision
+    delays those after it. The call ends as soon as a message is invalid as a whole, the server stops, or the token of the
+    caller is removed or loses the permission for the reads in progress. The client must read the answers: RESOURCE_EXHAUSTED
+    for one that does not, as in Watch.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]
     """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
@@ -141,6 +175,13 @@ class HullServiceAsyncStub(HullServiceStub):
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
+    applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
+    GetProducer returns where to continue.
+
+    The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
+    answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
+
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
     is of one revision.
     """
@@ -152,6 +193,11 @@ class HullServiceAsyncStub(HullServiceStub):
     """Deletes a hull and its points. Its watches end with NOT_FOUND."""
     ListHulls: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHullsRequest, _hull_service_pb2.ListHullsResponse]  # type: ignore[assignment]
     """Lists hulls by name, in pages. A caller with a token gets those it may read."""
+    Recenter: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.RecenterRequest, _hull_service_pb2.RecenterResponse]  # type: ignore[assignment]
+    """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
+    that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
+    the new centre, or if there is no point to choose it from; then nothing changes.
+    """
     Apply: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]  # type: ignore[assignment]
     """Applies one batch."""
     ApplyTogether: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyTogetherRequest, _hull_service_pb2.ApplyTogetherResponse]  # type: ignore[assignment]
@@ -164,26 +210,35 @@ class HullServiceAsyncStub(HullServiceStub):
     """
     Stream: _aio.StreamStreamMultiCallable[_hull_service_pb2.StreamRequest, _hull_service_pb2.StreamResponse]  # type: ignore[assignment]
     """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
-    as in Ingest, after the acknowledgements of the batches before it.
+    as in Ingest, after the acknowledgements of the batches before it. A message can have several batches, and a response
+    several results: see StreamRequest.accept_results.
     """
     GetProducer: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetProducerRequest, _hull_service_pb2.GetProducerResponse]  # type: ignore[assignment]
     """Returns the last sequence number applied of a producer."""
     Locate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.LocateRequest, _hull_service_pb2.LocateResponse]  # type: ignore[assignment]
     """Locates points: inside, on the boundary or outside. Exact."""
     Count: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.CountRequest, _hull_service_pb2.CountResponse]  # type: ignore[assignment]
-    """Counts the multiplicity of points."""
+    """Counts the multiplicity of points: on the globe, of these pairs of numbers."""
     GetPositions: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetPositionsRequest, _hull_service_pb2.GetPositionsResponse]  # type: ignore[assignment]
     """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
     ReadEntities: _aio.UnaryStreamMultiCallable[_hull_service_pb2.ReadEntitiesRequest, _hull_service_pb2.ReadEntitiesResponse]  # type: ignore[assignment]
     """Sends all keys of a keyed hull at one revision, with their positions."""
     Support: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]  # type: ignore[assignment]
-    """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
+    """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
+
+    A direction of a geographic hull is east and north at its centre; for a bearing b, (sin b, cos b). Of the great circles
+    at right angles to the one through the centre with this bearing, the farthest that meets the hull touches it there.
+    """
     Tangents: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.TangentsRequest, _hull_service_pb2.TangentsResponse]  # type: ignore[assignment]
-    """Finds the tangent points from outside points. Exact."""
+    """Finds the tangent points from outside points. Exact. Tangents of a geographic hull are great circles, and its points
+    are within 85 degrees of its centre.
+    """
     Distance: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.DistanceRequest, _hull_service_pb2.DistanceResponse]  # type: ignore[assignment]
-    """Computes the distances of points to the hull."""
+    """Computes the distances of points to the hull; of a geographic hull in metres, on WGS 84, within a micrometre."""
     IntersectLines: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.IntersectLinesRequest, _hull_service_pb2.IntersectLinesResponse]  # type: ignore[assignment]
-    """Finds where lines enter and leave the hull."""
+    """Finds where lines enter and leave the hull. Lines of a geographic hull are great circles, through places within 85
+    degrees of its centre. They enter and leave where their projections do, rounded to a few nanometres.
+    """
     GetHull: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHullRequest, _hull_service_pb2.GetHullResponse]  # type: ignore[assignment]
     """Returns the counts, vertices and measures of a hull."""
     SamplePoints: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]  # type: ignore[assignment]
@@ -191,10 +246,15 @@ class HullServiceAsyncStub(HullServiceStub):
     coordinates have the smallest hashes.
     """
     GetMeasures: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]  # type: ignore[assignment]
-    """Returns all measures of a hull."""
+    """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
     Separate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]  # type: ignore[assignment]
     """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
-    parts them. FAILED_PRECONDITION if one of them has no points.
+    parts them. FAILED_PRECONDITION if one of them has no points, or one is geographic and the other is not.
+
+    Two geographic hulls may have different centres. Whether they intersect is exact for their projections about the first
+    of three centres within 85 degrees of all vertices: that of the first hull, that of the other, their mean direction;
+    INVALID_ARGUMENT if there is none. Their distance is the least one of a vertex of one hull to the other hull, in
+    metres, as in Distance. Depth, normal and offset are NaN, and there are no closest points.
     """
     PhaseDiagram: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.PhaseDiagramRequest, _hull_service_pb2.PhaseDiagramResponse]  # type: ignore[assignment]
     """Interprets the hull as a binary phase diagram. Its points are entries: x is the composition, the share of the second
@@ -204,6 +264,14 @@ class HullServiceAsyncStub(HullServiceStub):
     Frontier: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.FrontierRequest, _hull_service_pb2.FrontierResponse]  # type: ignore[assignment]
     """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
     a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
+    """
+    Query: _aio.StreamStreamMultiCallable[_hull_service_pb2.QueryRequest, _hull_service_pb2.QueryResponse]  # type: ignore[assignment]
+    """Answers many reads, of one or of many hulls, in the order in which they were sent. A message has any number of reads,
+    and its answers come in one or more responses. Each answer is that of the read's own method, at one revision. A refused
+    read is answered with its error, and the reads after it are answered as usual. A read that waits for a min_revision
+    delays those after it. The call ends as soon as a message is invalid as a whole, the server stops, or the token of the
+    caller is removed or loses the permission for the reads in progress. The client must read the answers: RESOURCE_EXHAUSTED
+    for one that does not, as in Watch.
     """
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
     """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
@@ -232,6 +300,13 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
+    applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
+    GetProducer returns where to continue.
+
+    The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
+    answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
+
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
     is of one revision.
     """
@@ -259,6 +334,17 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.ListHullsResponse, _abc.Awaitable[_hull_service_pb2.ListHullsResponse]]:
         """Lists hulls by name, in pages. A caller with a token gets those it may read."""
+
+    @_abc_1.abstractmethod
+    def Recenter(
+        self,
+        request: _hull_service_pb2.RecenterRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.RecenterResponse, _abc.Awaitable[_hull_service_pb2.RecenterResponse]]:
+        """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
+        that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
+        the new centre, or if there is no point to choose it from; then nothing changes.
+        """
 
     @_abc_1.abstractmethod
     def Apply(
@@ -295,7 +381,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.StreamResponse], _abc.AsyncIterator[_hull_service_pb2.StreamResponse]]:
         """Applies many batches to one hull, in order, and acknowledges each after it is applied. A refused batch ends the call,
-        as in Ingest, after the acknowledgements of the batches before it.
+        as in Ingest, after the acknowledgements of the batches before it. A message can have several batches, and a response
+        several results: see StreamRequest.accept_results.
         """
 
     @_abc_1.abstractmethod
@@ -320,7 +407,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.CountRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.CountResponse, _abc.Awaitable[_hull_service_pb2.CountResponse]]:
-        """Counts the multiplicity of points."""
+        """Counts the multiplicity of points: on the globe, of these pairs of numbers."""
 
     @_abc_1.abstractmethod
     def GetPositions(
@@ -344,7 +431,11 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.SupportRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.SupportResponse, _abc.Awaitable[_hull_service_pb2.SupportResponse]]:
-        """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points."""
+        """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
+
+        A direction of a geographic hull is east and north at its centre; for a bearing b, (sin b, cos b). Of the great circles
+        at right angles to the one through the centre with this bearing, the farthest that meets the hull touches it there.
+        """
 
     @_abc_1.abstractmethod
     def Tangents(
@@ -352,7 +443,9 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.TangentsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.TangentsResponse, _abc.Awaitable[_hull_service_pb2.TangentsResponse]]:
-        """Finds the tangent points from outside points. Exact."""
+        """Finds the tangent points from outside points. Exact. Tangents of a geographic hull are great circles, and its points
+        are within 85 degrees of its centre.
+        """
 
     @_abc_1.abstractmethod
     def Distance(
@@ -360,7 +453,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.DistanceRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.DistanceResponse, _abc.Awaitable[_hull_service_pb2.DistanceResponse]]:
-        """Computes the distances of points to the hull."""
+        """Computes the distances of points to the hull; of a geographic hull in metres, on WGS 84, within a micrometre."""
 
     @_abc_1.abstractmethod
     def IntersectLines(
@@ -368,7 +461,9 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.IntersectLinesRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.IntersectLinesResponse, _abc.Awaitable[_hull_service_pb2.IntersectLinesResponse]]:
-        """Finds where lines enter and leave the hull."""
+        """Finds where lines enter and leave the hull. Lines of a geographic hull are great circles, through places within 85
+        degrees of its centre. They enter and leave where their projections do, rounded to a few nanometres.
+        """
 
     @_abc_1.abstractmethod
     def GetHull(
@@ -394,7 +489,7 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.GetMeasuresRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetMeasuresResponse, _abc.Awaitable[_hull_service_pb2.GetMeasuresResponse]]:
-        """Returns all measures of a hull."""
+        """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
 
     @_abc_1.abstractmethod
     def Separate(
@@ -403,7 +498,12 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.SeparateResponse, _abc.Awaitable[_hull_service_pb2.SeparateResponse]]:
         """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
-        parts them. FAILED_PRECONDITION if one of them has no points.
+        parts them. FAILED_PRECONDITION if one of them has no points, or one is geographic and the other is not.
+
+        Two geographic hulls may have different centres. Whether they intersect is exact for their projections about the first
+        of three centres within 85 degrees of all vertices: that of the first hull, that of the other, their mean direction;
+        INVALID_ARGUMENT if there is none. Their distance is the least one of a vertex of one hull to the other hull, in
+        metres, as in Distance. Depth, normal and offset are NaN, and there are no closest points.
         """
 
     @_abc_1.abstractmethod
@@ -425,6 +525,20 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_hull_service_pb2.FrontierResponse, _abc.Awaitable[_hull_service_pb2.FrontierResponse]]:
         """Interprets the hull as an efficient frontier. Its points have a positive risk x and a return y. FAILED_PRECONDITION if
         a risk is not positive (reason HULL_UNSUITABLE), or if rates are given and the hull has no points (HULL_EMPTY).
+        """
+
+    @_abc_1.abstractmethod
+    def Query(
+        self,
+        request_iterator: _MaybeAsyncIterator[_hull_service_pb2.QueryRequest],
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.QueryResponse], _abc.AsyncIterator[_hull_service_pb2.QueryResponse]]:
+        """Answers many reads, of one or of many hulls, in the order in which they were sent. A message has any number of reads,
+        and its answers come in one or more responses. Each answer is that of the read's own method, at one revision. A refused
+        read is answered with its error, and the reads after it are answered as usual. A read that waits for a min_revision
+        delays those after it. The call ends as soon as a message is invalid as a whole, the server stops, or the token of the
+        caller is removed or loses the permission for the reads in progress. The client must read the answers: RESOURCE_EXHAUSTED
+        for one that does not, as in Watch.
         """
 
     @_abc_1.abstractmethod

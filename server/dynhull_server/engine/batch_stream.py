@@ -1,10 +1,10 @@
 """Many batches of one caller to one hull, several of them in flight."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..state.events import Birth, Gone, Request, Stream, WriteBatch
+from ..state.events import Arrived, Birth, Gone, Request, Stream, WriteBatch
 from ..state.hull import Hull
 
 if TYPE_CHECKING:
@@ -36,17 +36,21 @@ class BatchStream:
         self._birth = birth
         self._notify = notify
 
-    def write(self, request: WriteBatch) -> None:
-        """Send a batch."""
-        self.batches += 1
-        self.rows += request.rows
-        stream = request.stream = self._stream
-        request.to, request.name = self, stream.name
-        if stream.hull is None:
-            request.birth = self._birth()
-        if stream.hull is None or stream.hull.timed:
-            request.arrived = self._engine.time()
-        self._engine.dispatch(request)
+    def write(self, requests: Sequence[WriteBatch]) -> None:
+        """Send batches that have arrived together."""
+        stream = self._stream
+        hull, name = stream.hull, stream.name
+        birth = self._birth() if hull is None else None
+        arrived = self._engine.time() if hull is None or hull.timed else 0
+        for request in requests:
+            self.rows += request.rows
+            request.to, request.name, request.stream = self, name, stream
+            request.birth, request.arrived = birth, arrived
+        self.batches += len(requests)
+        if len(requests) == 1:
+            self._engine.dispatch(requests[0])
+        elif requests:
+            self._engine.dispatch(Arrived(list(requests)))
 
     def answer(self, request: Request) -> None:
         """Take the answer to a batch."""

@@ -37,7 +37,7 @@ from ..state.events import (
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
-from ..state.records import DEFAULT, HullSettings, Kept
+from ..state.records import DEFAULT, HullRow, HullSettings, Kept
 from ..state.trip import Trip
 from ..storage.port import Contents, Progress, Storage
 from .batch_stream import BatchStream
@@ -61,6 +61,8 @@ TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
 TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
+# Seconds of loading between reports of the progress.
+LOAD = 0.1
 # Seconds between looks at the commit in progress.
 WATCH_SECONDS = 1.0
 
@@ -137,13 +139,11 @@ class Engine:
             keeps=self._storage.keeps,
         )
         progress(0, len(contents.hulls))
-        for done, row in enumerate(contents.hulls, start=1):
-            kept = await self.run(self.disk, partial(self._storage.read, row.number))
-            load = partial(HullState, self._limits, row.settings, kept, now=clock.monotonic())
-            state = await self.run(self._turns, load)
-            unsaved = sum(len(record.rows) for record in kept.records)
-            self._core.restore(row, state, unsaved)
-            progress(done, len(contents.hulls))
+        left = iter(contents.hulls)
+        while loaded := await self.run(self.disk, partial(self._load_some, left)):
+            for restored in loaded:
+                self._core.restore(*restored)
+            progress(len(self._core.hulls), len(contents.hulls))
         await self.run(self._turns, partial(self._restore_fences, contents))
         self._time = ServerTime(clock, self._core.latest_time)
         self._commits = GroupCommit(
@@ -160,6 +160,22 @@ class Engine:
         keeping = FenceKeeping(self, self._storage, clock, self._limits.fences)
         self._supervisor.every(keeping.SECONDS, "fences", keeping.round)
         return contents.notes
+
+    def _load_some(self, rows: Iterator[HullRow]) -> list[tuple[HullRow, HullState, int]]:
+        """Load the next hulls, for LOAD seconds: handing each to a thread takes longer than loading a small one.
+
+        Returns the hulls and the numbers of their points in batches since the last snapshot; none after the last.
+        """
+        clock = self._machine.clock
+        until = clock.monotonic() + LOAD
+        loaded = []
+        for row in rows:
+            kept = self._storage.read(row.number)
+            state = HullState(self._limits, row.settings, kept, now=clock.monotonic())
+            loaded.append((row, state, sum(len(record.rows) for record in kept.records)))
+            if clock.monotonic() > until:
+                break
+        return loaded
 
     def _restore_fences(self, contents: Contents) -> None:
         kept = [self._storage.read_fence(row.number) for row in contents.fences]

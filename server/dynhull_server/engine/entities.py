@@ -13,16 +13,16 @@ from dynhull.keys import take_keys
 
 from ..state.batch import NO_POINTS
 from ..state.contents.keyed import Found, Keyed
-from ..state.contents.live import AnyHull
 from ..state.errors import HullEmptyError
 from ..state.hull_state import Counts, HullState, VertexKeys
+from ..state.outline import Outline
 from ..state.records import Contents, Keys
 from ..state.sample import sample_rows
 from .live_hull import LiveHull
 from .steps import BLOCK, Run, in_blocks
 
 # Called with a hull and (n, 2) points; the answer has a row for each.
-Question = Callable[[AnyHull, Checked], npt.NDArray[Any]]
+Question = Callable[[Outline, Checked], npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,19 +61,20 @@ async def ask_of_keys(
     hull: LiveHull, min_revision: int, owner: LiveHull, owner_min_revision: int, keys: Keys, question: Question
 ) -> KeyAnswers:
     """Ask a hull about the positions of keys that it has itself, or another one."""
+    owner.require_frame_of(hull, "keys_of")
 
     def ask(state: HullState, keyed: HullState) -> tuple[Found, npt.NDArray[Any] | None, Points]:
         found = _keyed(keyed).find(keys)
-        if len(keys) > BLOCK:
+        if len(keys) > BLOCK or hull.geographic:
             return found, None, state.vertices()
-        return found, question(state.hull, _known(found)), NO_POINTS
+        return found, question(state.outline(), _known(found)), NO_POINTS
 
     counts, owner_counts, (found, answers, vertices) = await hull.read_beside(
         owner, ask, len(keys), min_revision, owner_min_revision
     )
     if answers is None:
         xy = _known(found)
-        answers = await hull.ask_vertices(vertices, lambda live, block: question(live, xy[block]), len(xy))
+        answers = await hull.ask_vertices(counts, vertices, lambda live, block: question(live, xy[block]), len(xy))
     return KeyAnswers(counts, answers, ~found.present, None if owner is hull else owner_counts)
 
 
@@ -90,7 +91,7 @@ async def support(
     def extreme(state: HullState) -> tuple[Points, VertexKeys]:
         if not len(state.hull):
             raise HullEmptyError(hull.name)
-        vertices = state.hull.support(directions)
+        vertices = state.outline().support(directions)
         return vertices, state.keys_at(vertices)
 
     if len(directions) <= BLOCK:
@@ -101,7 +102,7 @@ async def support(
     )
     if not len(vertices):
         raise HullEmptyError(hull.name)
-    outline = await hull.outline(vertices)
+    outline = await hull.outline(counts, vertices)
     extremes = await in_blocks(run, lambda rows: outline.support(directions[rows]), len(directions))
     return counts, extremes, vertex_keys[await run(partial(_rows_of, extremes, vertices))]
 

@@ -1,9 +1,11 @@
 """Background work on fences: who is inside is stored now and then, and old events are dropped."""
 
 from functools import partial
-from typing import TYPE_CHECKING
+from heapq import heappop, heappush
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..state.errors import FenceNotFoundError
+from ..state.fences.fence import Fence
 from ..state.limits import FenceLimits
 from ..storage.port import Storage
 from .fences import LiveFence
@@ -19,6 +21,20 @@ LEAST_EVENTS = 4096
 LOOKED_AT = 1000
 # Fences between two pauses, which let others run.
 FENCES_A_STEP = 1000
+
+
+class _Plan(NamedTuple):
+    """When the oldest event of a fence that is young enough will be too old.
+
+    Attributes:
+        fence: the fence.
+        due: that time.
+        age: the age at which events are too old.
+    """
+
+    fence: Fence
+    due: int
+    age: int
 
 
 class FenceKeeping:
@@ -38,53 +54,70 @@ class FenceKeeping:
         self._storage = storage
         self._clock = clock
         self._limits = limits
+        self._plans: dict[int, _Plan] = {}
+        self._due: list[tuple[int, int]] = []  # a heap of times and numbers; outdated where the plan has another time
+        engine.fences.stirred.update(dict.fromkeys(engine.core.fences.values()))
 
     async def round(self) -> None:
-        """Look at every fence once."""
+        """Look at the fences that have changed since the last round, and at those whose oldest events are too old."""
+        fences = self._engine.fences
+        stirred, fences.stirred = fences.stirred, {}
+        now = self._engine.time()
+        while self._due and self._due[0][0] <= now:
+            due, number = heappop(self._due)
+            plan = self._plans.get(number)
+            if plan is not None and plan.due == due:
+                del self._plans[number]
+                stirred[plan.fence] = None
         failure: Exception | None = None
-        for number, fence in enumerate(self._engine.fences.all(), start=1):
-            if number % FENCES_A_STEP == 0:
+        for count, fence in enumerate(stirred, start=1):
+            if count % FENCES_A_STEP == 0:
                 await self._clock.sleep(0)
-            if fence.fence.last < fence.fence.first and not fence.fence.unsaved:
+            if fence.ended or (fence.last < fence.first and not fence.unsaved):
                 continue
             try:
                 await self._keep(fence)
             except FenceNotFoundError:
                 continue
             except Exception as error:  # go on with the other fences
+                fences.stirred[fence] = None
                 failure = failure or error
         if failure is not None:
             raise failure
 
-    async def _keep(self, live: LiveFence) -> None:
-        fence = live.fence
-        first = await self._first(live)
+    async def _keep(self, fence: Fence) -> None:
+        first = await self._first(fence)
         stored = fence.last - fence.unsaved
         if fence.unsaved >= max(LEAST_EVENTS, fence.inside) or (first > stored + 1 and fence.unsaved):
-            await self._store(live)
+            await self._store(self._engine.fences.live(fence))
         if first > fence.first and not fence.ended:
-            boundary = self._storage.boundary(fence.number, first)
+            try:
+                boundary = self._storage.boundary(fence.number, first)
+            except KeyError:  # its deletion is committed, and about to be published
+                return
             if boundary > fence.first:
-                await live.drop_events(boundary)
+                await self._engine.fences.live(fence).drop_events(boundary)
 
-    async def _first(self, live: LiveFence) -> int:
+    async def _first(self, fence: Fence) -> int:
         """The sequence of the oldest event that the limits let stay."""
-        fence, limits = live.fence, self._limits
-        config = fence.row.config
+        config, limits = fence.row.config, self._limits
         most = min(config.max_events or limits.max_fence_events, limits.max_fence_events)
         first = max(fence.first, fence.last - most + 1)
         ages = [config.max_event_age, int(limits.max_fence_event_age * MICROSECONDS)]
         age = min((each for each in ages if each), default=0)
-        if not age:
+        plan = self._plans.get(fence.number)
+        if not age or (plan is not None and plan.age == age):
             return first
         oldest = self._engine.time() - age
         while first <= fence.last:
-            events = await live.events(first - 1, LOOKED_AT)
+            events = await self._engine.fences.live(fence).events(first - 1, LOOKED_AT)
             if not events:
                 break
-            young = next((event.sequence for event in events if event.time >= oldest), None)
+            young = next((event for event in events if event.time >= oldest), None)
             if young is not None:
-                return young
+                self._plans[fence.number] = _Plan(fence, young.time + age, age)
+                heappush(self._due, (young.time + age, fence.number))
+                return young.sequence
             first = events[-1].sequence + 1
         return first
 

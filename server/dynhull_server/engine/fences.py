@@ -66,7 +66,7 @@ class LiveFence:
 
     async def waiting(self) -> Inside:
         """As `inside`, with the times since when they wait for their dwell events."""
-        return await self._read(_waiting, rows=self.fence.inside)
+        return await self._read(who_waits, rows=self.fence.inside)
 
     async def acknowledge(self, consumer: str, sequence: int | None, uid: str = "") -> Consumer:
         """Acknowledge events for a consumer, which is created if it is new."""
@@ -127,6 +127,7 @@ class Fences:
 
     Attributes:
         events: the number of committed events by type, since the start.
+        stirred: the fences with new events or settings, until their keeping has seen them.
     """
 
     def __init__(self, engine: "Engine", storage: Storage) -> None:
@@ -134,17 +135,18 @@ class Fences:
         self._storage = storage
         self._live: dict[Fence, LiveFence] = {}
         self.events: Counter[EventType] = Counter()
+        self.stirred: dict[Fence, None] = {}
 
     def __len__(self) -> int:
         return len(self._engine.core.fences)
 
     def all(self) -> list[LiveFence]:
         """All fences, by name."""
-        return [self._live_fence(fence) for fence in list(self._engine.core.fences.values())]
+        return [self.live(fence) for fence in list(self._engine.core.fences.values())]
 
     def get(self, name: str) -> LiveFence:
         """The fence of that name, or raise FenceNotFoundError."""
-        return self._live_fence(self._engine.core.fence(name))
+        return self.live(self._engine.core.fence(name))
 
     def page(self, prefixes: Sequence[str], after: str, size: int) -> tuple[list[LiveFence], bool]:
         """At most `size` fences whose names follow `after`, and whether there are more.
@@ -167,12 +169,12 @@ class Fences:
         """Create a fence, or raise the error that refuses it."""
         engine = self._engine
         request = CreateFence(Waiter(), name, engine.time(), config, engine.birth(), rows=self._rows(config))
-        return self._live_fence(await engine.ask(request))
+        return self.live(await engine.ask(request))
 
     async def replace(self, name: str, config: FenceConfig) -> LiveFence:
         """Replace the area and the settings of a fence, or raise the error that refuses it."""
         request = ReplaceFence(Waiter(), name, self._engine.time(), config, rows=self._rows(config))
-        return self._live_fence(await self._engine.ask(request))
+        return self.live(await self._engine.ask(request))
 
     async def delete(self, name: str) -> None:
         """Delete a fence, or raise FenceNotFoundError or NotStoredError."""
@@ -185,6 +187,7 @@ class Fences:
         """Count the events of fences, and wake those who watch these."""
         for fence, events in stirred:
             self.events.update(event.type for event in events)
+            self.stirred[fence] = None
             live = self._live.get(fence)
             if live is not None:
                 live.moved()
@@ -198,7 +201,8 @@ class Fences:
         except HullNotFoundError:
             return 0
 
-    def _live_fence(self, fence: Fence) -> LiveFence:
+    def live(self, fence: Fence) -> LiveFence:
+        """The fence as its callers use it."""
         live = self._live.get(fence)
         if live is None:
             live = LiveFence(self._engine, self._storage, fence)
@@ -212,9 +216,11 @@ def _last(fence: Fence, events: Sequence[FenceEvent]) -> int:
     return events[-1].sequence if events else fence.last
 
 
-def _waiting(fence: Fence, events: Sequence[FenceEvent]) -> Inside:
+def who_waits(fence: Fence, events: Sequence[FenceEvent]) -> Inside:
+    """Who is inside, and since when; `events` are those that are not yet committed."""
     dwelling = fence.dwelling
     if dwelling is not None and events:
         dwelling = dwelling.copy()
         dwelling.follow(events)
-    return Inside(_last(fence, events), tuple(members(fence, dwelling)))
+    time = events[-1].time if events else fence.time
+    return Inside(_last(fence, events), tuple(members(fence, dwelling)), time)

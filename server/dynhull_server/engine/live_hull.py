@@ -15,7 +15,6 @@ from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
 from ..state.contents.keyed import KINDS
-from ..state.contents.live import AnyHull
 from ..state.errors import (
     HullEmptyError,
     HullNotFoundError,
@@ -23,14 +22,15 @@ from ..state.errors import (
     HullUnsuitableError,
     RevisionForgottenError,
 )
-from ..state.events import ReadHull, ReadTogether
+from ..state.events import ReadHull, ReadTogether, Recenter
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import HullSettings, Keys
+from ..state.outline import GlobeOutline, Outline
+from ..state.records import Center, HullSettings, Keys
 from ..state.sample import sample
 from .difference import Differences
 from .recalls import Recalls
-from .steps import BLOCK, in_blocks
+from .steps import BLOCK, FEW_ROWS, at_once, in_blocks
 from .verification import Verification, verify
 from .waiter import Waiter
 
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from .engine import Engine
 
 T = TypeVar("T")
+
+# The rows of a step that measures on the ellipsoid, which takes a tenth of a millisecond a row.
+MEASURED_BLOCK = 256
 
 
 class LiveHull:
@@ -55,7 +58,9 @@ class LiveHull:
         self._hull = hull
         self._recalls = recalls
         self._moved: asyncio.Event | None = None
-        self._outline: tuple[Points, DynamicHull] | None = None
+        self._outlined: asyncio.Event | None = None
+        self._last_outlined = hull.counts.outlined
+        self._outline: tuple[Points, Center | None, Outline] | None = None
 
     @property
     def name(self) -> str:
@@ -105,6 +110,22 @@ class LiveHull:
     def keyed(self) -> bool:
         """Whether the points have keys."""
         return self.settings.identity != "multiset"
+
+    @property
+    def geographic(self) -> bool:
+        """Whether the points are places on the globe."""
+        return self.settings.geographic
+
+    def require_plane(self) -> None:
+        """Raise HullUnsuitableError if the points are places on the globe."""
+        if self.geographic:
+            raise HullUnsuitableError(self.name, "is geographic, and this question is about points of a plane")
+
+    def require_frame_of(self, other: "LiveHull", field: str) -> None:
+        """Raise HullUnsuitableError if one hull is geographic, and the other one is not; `field` names this one."""
+        if self.geographic != other.geographic:
+            kind, kind_of_other = ("geographic", "a plane") if self.geographic else ("a plane", "geographic")
+            raise HullUnsuitableError(self.name, f"is {kind}, and {other.name!r} is {kind_of_other}", field=field)
 
     def require_keys(self, field: str) -> None:
         """Raise HullUnsuitableError if the points have no keys; `field` is that of the request which asks for them."""
@@ -160,7 +181,12 @@ class LiveHull:
         return await self.read(HullState.vertices, self.vertex_count // 2, min_revision)
 
     async def ask_rows(
-        self, question: Callable[[AnyHull, slice], T], rows: int, min_revision: int = 0
+        self,
+        question: Callable[[Outline, slice], T],
+        rows: int,
+        min_revision: int = 0,
+        *,
+        check: Callable[[Center], None] | None = None,
     ) -> tuple[Counts, T]:
         """Answer a query about many rows that depends only on the vertices.
 
@@ -168,19 +194,26 @@ class LiveHull:
             question: called with a hull of these vertices and a slice of the rows, once or several times.
             rows: the number of rows.
             min_revision: the least revision of the hull.
+            check: called with the centre of a geographic hull that has one; raises an error to refuse the query.
 
         Returns:
             The counts at the revision that answered, and an array of the answers.
         """
-        if rows <= BLOCK:  # delays later writes by some milliseconds only
-            return await self.read(lambda state: question(state.hull, slice(0, rows)), rows, min_revision)
+        if rows <= BLOCK and not self.geographic:  # delays later writes by some milliseconds only
+            return await self.read(lambda state: question(state.outline(), slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision)
-        return counts, await self.ask_vertices(vertices, question, rows)
+        if check is not None and counts.center is not None:
+            check(counts.center)
+        return counts, await self.ask_vertices(counts, vertices, question, rows)
 
-    async def ask_vertices(self, vertices: Points, question: Callable[[AnyHull, slice], T], rows: int) -> T:
+    async def ask_vertices(
+        self, counts: Counts, vertices: Points, question: Callable[[Outline, slice], T], rows: int
+    ) -> T:
         """Answer such a query for these vertices of the hull, outside of the trips."""
-        outline = await self.outline(vertices)
-        answers: T = await in_blocks(self._engine.aside, partial(question, outline), rows)
+        outline = await self.outline(counts, vertices)
+        block = MEASURED_BLOCK if self.geographic else BLOCK
+        run = at_once if rows <= FEW_ROWS and len(vertices) <= FEW_ROWS else self._engine.aside
+        answers: T = await in_blocks(run, partial(question, outline), rows, block)
         return answers
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
@@ -194,7 +227,7 @@ class LiveHull:
     async def support(self, directions: Checked, min_revision: int = 0) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
 
-        def extreme(hull: AnyHull, block: slice) -> Points:
+        def extreme(hull: Outline, block: slice) -> Points:
             if not len(hull):
                 raise HullEmptyError(self.name)
             return hull.support(directions[block])
@@ -206,7 +239,7 @@ class LiveHull:
         counts, (points, vertices, stored) = await self.read(
             lambda state: (state.hull.points(), state.vertices(), state.entities()), self.counts.points, min_revision
         )
-        return counts, await verify(points, vertices, self._engine.aside, stored)
+        return counts, await verify(points, vertices, self._engine.aside, stored, counts.center)
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
         """A sample of at most `size` of the points. Writes continue meanwhile."""
@@ -219,6 +252,20 @@ class LiveHull:
         """The last sequence number applied of a producer, 0 where there is none."""
         _, last = await self.read(lambda state: state.last_sequence(producer))
         return last
+
+    async def recenter(self, center: Center | None) -> tuple[Counts, bool]:
+        """Move the centre of a geographic hull, None to the mean direction of its points.
+
+        Returns the counts after it, and whether the vertices have changed.
+
+        Raises:
+            HullUnsuitableError: the hull is a plane, or cannot have this centre.
+            NotStoredError: the storage has failed.
+        """
+        result: tuple[Counts, bool] = await self._engine.ask(
+            Recenter(Waiter(), self.name, center, rows=self.counts.points)
+        )
+        return result
 
     # Revisions
 
@@ -257,16 +304,32 @@ class LiveHull:
         if self._hull.ended:
             raise HullNotFoundError(self.name)
 
+    async def outlined(self, revision: int) -> None:
+        """Wait until the vertices change after this revision; raise HullNotFoundError if the hull is deleted."""
+        while not self._hull.ended and self.counts.outlined <= revision:
+            if self._outlined is None:
+                self._outlined = asyncio.Event()
+            await self._outlined.wait()
+        if self._hull.ended:
+            raise HullNotFoundError(self.name)
+
     def moved(self) -> None:
         """Wake the waiting callers: the hull has a new revision, or was deleted."""
         if self._moved is not None:
             self._moved.set()
             self._moved = None
+        if self._outlined is not None and (self._hull.ended or self.counts.outlined != self._last_outlined):
+            self._outlined.set()
+            self._outlined = None
+        self._last_outlined = self.counts.outlined
 
-    async def outline(self, vertices: Points) -> DynamicHull:
+    async def outline(self, counts: Counts, vertices: Points) -> Outline:
         """A separate hull with these vertices, shared by large reads of one revision."""
-        if self._outline is None or self._outline[0] is not vertices:
-            made: DynamicHull = await self._engine.aside(partial(DynamicHull, vertices))
-            self._outline = vertices, made
-            return made
-        return self._outline[1]
+        held, center = self._outline, counts.center
+        if held is not None and held[0] is vertices and held[1] == center:
+            return held[2]
+        make = partial(GlobeOutline, vertices, center) if self.geographic else partial(DynamicHull, vertices)
+        run = at_once if len(vertices) <= FEW_ROWS else self._engine.aside
+        made: Outline = await run(make)
+        self._outline = vertices, center, made
+        return made

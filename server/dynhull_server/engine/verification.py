@@ -11,11 +11,12 @@ import numpy as np
 
 from dynhull import KERNEL
 from dynhull.arrays import Points
+from dynhull.globe import Gnomonic
 from dynhull.keys import PackedKeys
 from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
-from ..state.records import Contents
+from ..state.records import Center, Contents
 from . import chan_process
 from .steps import Run
 
@@ -53,17 +54,32 @@ class Verification:
         return self.difference is None and self.keys_equal
 
 
-async def verify(points: Points, vertices: Points, run: Run, entities: Contents | None = None) -> Verification:
+async def verify(
+    points: Points, vertices: Points, run: Run, entities: Contents | None = None, center: Center | None = None
+) -> Verification:
     """Compare the vertices of a live hull with the hull of `points`, computed in a thread by `run`.
 
-    With `entities`, the keys of a keyed hull, also compare their positions with `points`.
+    With `entities`, the keys of a keyed hull, also compare their positions with `points`. With `center`, the points are
+    places on the globe, and the hull is that of their projections.
     """
+    places = points if center is None else await run(partial(Gnomonic(center).project_all, points))
     keys_equal = entities is None or await run(partial(keys_match, entities, points))
     if KERNEL == "cpp" or len(points) < LARGE:  # the kernel releases the interpreter
-        recomputed, rounds, seconds = await run(partial(_recompute, points))
+        recomputed, rounds, seconds = await run(partial(_recompute, places))
     else:
-        recomputed, rounds, seconds = await _recompute_apart(points)
+        recomputed, rounds, seconds = await _recompute_apart(places)
+    if center is not None:
+        recomputed = await run(partial(_given_at, points, places, recomputed))
     return Verification(len(points), len(vertices), rounds, first_difference(vertices, recomputed), seconds, keys_equal)
+
+
+def _given_at(points: Points, places: Points, vertices: Points) -> Points:
+    """The vertices as they were given: the least pair at each of these projections, from the least vertex."""
+    order = np.lexsort((*points.T[::-1], *places.T[::-1]))
+    numbers = np.ascontiguousarray(places[order]).view(np.complex128).ravel()
+    given = points[order[np.searchsorted(numbers, np.ascontiguousarray(vertices).view(np.complex128).ravel())]]
+    start = int(np.lexsort(given.T[::-1])[0]) if len(given) else 0
+    return np.roll(given, -start, axis=0)
 
 
 def first_difference(live: Points, recomputed: Points) -> Difference | None:

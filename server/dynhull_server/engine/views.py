@@ -65,6 +65,16 @@ class View(Protocol):
     async def next(self) -> Event:
         """The change since the previous event; Progress where there is none."""
 
+    async def changed(self, revision: int) -> None:
+        """Wait until the part of the hull may have changed after a revision."""
+
+
+async def _changed(hull: LiveHull, revision: int, *, keys: bool) -> None:
+    if keys:  # vertices may have other keys
+        await hull.reached(revision + 1)
+    else:
+        await hull.outlined(revision)
+
 
 class VerticesView:
     """The vertices: a snapshot, then changes.
@@ -102,6 +112,10 @@ class VerticesView:
             return Progress(counts)
         change = await self._hull.differences.between(held, vertices, held_keys, keys)
         return Change(counts, held[change.removed], vertices, change, keys) if change else Progress(counts)
+
+    async def changed(self, revision: int) -> None:
+        """Wait until the vertices, or with keys the hull, may have changed."""
+        await _changed(self._hull, revision, keys=self._with_keys)
 
 
 class ResumedView(VerticesView):
@@ -156,7 +170,7 @@ class SketchView:
         self._held: _Looked = np.empty((0, 2)), None, None
 
     def _look(self, state: HullState) -> _Looked:
-        extremes = state.hull.support(self._directions) if len(state.hull) else np.empty((0, 2))
+        extremes = state.outline().support(self._directions) if len(state.hull) else np.empty((0, 2))
         vertices = state.vertices() if self._with_vertices else None
         return extremes, vertices, state.keys_at(extremes) if self._with_keys else None
 
@@ -172,6 +186,10 @@ class SketchView:
         if all(map(_same, before, self._held)):
             return Progress(counts)
         return Sketch(counts, *self._held)
+
+    async def changed(self, revision: int) -> None:
+        """Wait until the vertices, or with keys the hull, may have changed."""
+        await _changed(self._hull, revision, keys=self._with_keys)
 
 
 def _same(a: Points | VertexKeys | None, b: Points | VertexKeys | None) -> bool:

@@ -19,6 +19,7 @@ async def watch(
     min_revision: int = 0,
     min_interval: float = 0.0,
     progress_interval: float | None = None,
+    outline_only: bool = False,
 ) -> AsyncGenerator[Event, None]:
     """The present state, then an event for each new revision, or for several at once.
 
@@ -29,6 +30,7 @@ async def watch(
         min_revision: the least revision of the first event.
         min_interval: the least number of seconds between events.
         progress_interval: seconds without an event after which a Progress is sent; None for never.
+        outline_only: whether there is no event for revisions that leave what the watcher holds as it is.
 
     Raises:
         HullNotFoundError: the hull has been deleted.
@@ -43,12 +45,13 @@ async def watch(
         await asyncio.sleep(sent + min_interval - loop.time())
         try:
             async with asyncio.timeout_at(None if progress_interval is None else sent + progress_interval):
-                await hull.reached(counts.revision + 1)
+                await (view.changed(counts.revision) if outline_only else hull.reached(counts.revision + 1))
+                due = False
         except TimeoutError:
-            sent = loop.time()
-            yield Progress(counts)
-            continue
-        event = await view.next()
+            due = True
+        event = await view.next() if outline_only or not due else Progress(counts)
+        same = isinstance(event, Progress) and event.counts.center == counts.center
         counts = event.counts
-        sent = loop.time()
-        yield event
+        if due or not (outline_only and same):
+            sent = loop.time()
+            yield event

@@ -13,6 +13,8 @@ from .fences import LiveFence
 
 # The number of events that are sent together, at most.
 EVENTS_TOGETHER = 1000
+# Seconds between looks at a fence of which the storage has dropped what is still to be published as dropped.
+ABOUT_TO = 0.05
 
 
 @dataclass(slots=True)
@@ -62,13 +64,12 @@ async def watch_fence(
             continue
         await asyncio.sleep(sent + min_interval - loop.time())
         events = await fence.events(after, EVENTS_TOGETHER)
-        if not events:
+        response = following(after, events, fence.fence.first)
+        if response is None:
             if fence.fence.ended:
                 return
+            await asyncio.sleep(ABOUT_TO)
             continue
-        response = Sent(events[-1].sequence, events)
-        if events[0].sequence > after + 1:
-            response.lost = after + 1, events[0].sequence - 1
         if conflate:
             response.events = conflated(events)
             response.conflated = len(events) - len(response.events)
@@ -77,6 +78,21 @@ async def watch_fence(
         yield response
         if fence.fence.ended and after >= fence.fence.last:
             return
+
+
+def following(after: int, events: list[FenceEvent], first: int) -> Sent | None:
+    """What is sent after a sequence, None if that is nothing.
+
+    Args:
+        after: the last sequence that the watcher has.
+        events: the events after it that are kept.
+        first: the sequence of the oldest event that is kept; that of the next event if there is none.
+    """
+    oldest = events[0].sequence if events else first
+    lost = (after + 1, oldest - 1) if oldest > after + 1 else None
+    if not events and lost is None:
+        return None
+    return Sent(events[-1].sequence if events else oldest - 1, events, lost)
 
 
 def conflated(events: list[FenceEvent]) -> list[FenceEvent]:

@@ -110,6 +110,10 @@ class Rights:
         """The prefixes of the readable names that begin with `prefix`."""
         return self._access.readable(prefix)
 
+    def forget(self) -> None:
+        """Forget what was granted, because nothing that needed it is in progress."""
+        self._granted.clear()
+
     def change(self, access: Access) -> None:
         """Replace the permissions, or raise PermissionDeniedError if they do not allow what was granted."""
         self._access = access

@@ -1,12 +1,13 @@
 """Answers computed from the vertices of hulls, in steps, because they take long for large hulls."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DynamicHull, measure
+from dynhull import DynamicHull, gjk, globe, measure
 from dynhull.arrays import Points
 from dynhull.envelope import Frontier, PhaseDiagram
 from dynhull.margin import max_margin
@@ -14,18 +15,33 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
 from ..engine.steps import BLOCK, Run, in_blocks
+from ..state.batch import NO_POINTS
+from ..state.frames import out_of_reach
 from ..state.hull_state import Counts
+from .decode import InvalidFieldError
 from .encode import encode_measures, encode_points
 
 Encoding = points_pb2.PointEncoding
 
 
-async def measures(counts: Counts, vertices: Points, encoding: Encoding, run: Run) -> pb.GetMeasuresResponse:
+async def measures(
+    counts: Counts, vertices: Points, encoding: Encoding, run: Run, *, geographic: bool
+) -> pb.GetMeasuresResponse:
     """All measures of a hull."""
+    if geographic:
+        return pb.GetMeasuresResponse(
+            revision=counts.revision,
+            measures=await encode_measures(vertices, run, geographic=True),
+            diameter=await run(partial(globe.diameter, vertices)),
+            width=math.nan,
+            min_circle_x=math.nan,
+            min_circle_y=math.nan,
+            min_circle_radius=math.nan,
+        )
     (x, y), radius = await run(partial(measure.min_circle, vertices))
     return pb.GetMeasuresResponse(
         revision=counts.revision,
-        measures=await encode_measures(vertices, run),
+        measures=await encode_measures(vertices, run, geographic=False),
         diameter=await run(partial(measure.diameter, vertices)),
         width=await run(partial(measure.width, vertices)),
         min_box=encode_points(await run(partial(measure.min_box, vertices)), encoding),
@@ -54,6 +70,53 @@ def separation(
         offset=found.offset,
         closest=encode_points(found.points, encoding),
     )
+
+
+def separation_on_globe(
+    counts: Counts, vertices: Points, other_counts: Counts, other_vertices: Points, encoding: Encoding
+) -> pb.SeparateResponse:
+    """The separation of two non-empty geographic hulls, whose centres may differ.
+
+    Raises:
+        InvalidFieldError: no centre has both of them within reach.
+    """
+    frame = _common_frame(counts, vertices, other_counts, other_vertices)
+    hulls = DynamicHull(frame.project(vertices)[0]), DynamicHull(frame.project(other_vertices)[0])
+    apart = not gjk.intersect(*hulls)
+    nearest = 0.0
+    if apart:
+        nearest = min(
+            float(globe.distance(vertices, other_vertices).min()), float(globe.distance(other_vertices, vertices).min())
+        )
+    nan = math.nan
+    return pb.SeparateResponse(
+        revision=counts.revision,
+        other_revision=other_counts.revision,
+        intersect=not apart,
+        distance=nearest,
+        depth=nan,
+        normal_x=nan,
+        normal_y=nan,
+        offset=nan,
+        closest=encode_points(NO_POINTS, encoding),
+    )
+
+
+def _common_frame(counts: Counts, vertices: Points, other_counts: Counts, other_vertices: Points) -> globe.Gnomonic:
+    """A projection of both hulls: about the centre of one of them, or the mean direction of the vertices."""
+    both = np.concatenate((vertices, other_vertices))
+    for center in (counts.center, other_counts.center):
+        assert center is not None  # there are vertices
+        frame = globe.Gnomonic(center)
+        if out_of_reach(frame, both) is None:
+            return frame
+    frame = globe.Gnomonic.about(both)
+    misplaced = out_of_reach(frame, both)
+    if misplaced is not None:
+        raise InvalidFieldError(
+            "other_name", misplaced.place, f"the two hulls are too far apart to compare: {misplaced.problem}"
+        )
+    return frame
 
 
 async def phase_diagram(

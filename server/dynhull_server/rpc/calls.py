@@ -10,6 +10,8 @@ from typing import Any
 
 import grpc
 from google.protobuf.message import DecodeError, Message
+from google.rpc import code_pb2
+from google.rpc.status_pb2 import Status
 from grpc_status import rpc_status
 
 from ..state.errors import LimitExceededError
@@ -100,6 +102,17 @@ class Call:
                 return
             yield message
 
+    @property
+    def max_message_bytes(self) -> int:
+        """The size of the largest message."""
+        return self._calls.max_message_bytes
+
+    def note_refusal(self, method: str, status: Status) -> str:
+        """Log a refused part of the call as a refused call would be. Returns the name of its code."""
+        code: str = code_pb2.Code.Name(status.code)
+        self._calls.note(status.message, method, code, self._context)
+        return code
+
     def serialize(self, message: Message) -> bytes:
         """The bytes of a message. Raises LimitExceededError if it is too large to send."""
         data: bytes = message.SerializeToString()
@@ -107,15 +120,16 @@ class Call:
             raise LimitExceededError("max_message_bytes", self._calls.max_message_bytes)
         return data
 
-    async def write(self, message: Message) -> None:
-        """Send a message. Waits while the client does not read."""
+    async def write(self, message: Message | bytes) -> None:
+        """Send a message, or the bytes of one. Waits while the client does not read."""
+        data = message if isinstance(message, bytes) else self.serialize(message)
         try:
-            await self._context.write(self.serialize(message))
+            await self._context.write(data)
         except grpc.aio.InternalError:
             # The client has disconnected during the write.
             raise asyncio.CancelledError from None
 
-    async def write_within(self, seconds: float, message: Message) -> None:
+    async def write_within(self, seconds: float, message: Message | bytes) -> None:
         """Send a message. Raises LimitExceededError if that takes longer, or the error of `end`.
 
         The client receives the message and then the error, because gRPC cannot cancel a message in part.
@@ -219,6 +233,11 @@ class Calls:
         """Begin a call that needs no token, at any time."""
         return Call(self, context, UNAUTHENTICATED_CALLER)
 
+    def note(self, what: str, method: str, code: str, context: Context) -> None:
+        """Log a refusal that may be of interest to the operator."""
+        if code in SUSPICIOUS:
+            self._refusals.add(what, method, code, context.peer())
+
     def refused_elsewhere(self) -> Callable[[str, str, str], None]:
         """A function for other threads, to report a refused request for metrics: its reason, code and peer."""
         loop = asyncio.get_running_loop()
@@ -253,8 +272,7 @@ class Calls:
         except ANSWERED as error:
             status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
             code = status.code.name
-            if code in SUSPICIOUS:
-                self._refusals.add(status.details, method, code, context.peer())
+            self.note(status.details, method, code, context)
             await context.abort(status.code, status.details, status.trailing_metadata)
         except asyncio.CancelledError:
             code = "CANCELLED"
@@ -272,9 +290,12 @@ class Calls:
 
 
 class Cutoff:
-    """The context manager of `Call.cutoff`; a class for speed, because each message of a stream uses one."""
+    """The context manager of `Call.cutoff`; a class for speed, because each message of a stream uses one.
 
-    __slots__ = ("_call", "_task")
+    A block within another one leaves its end to that one.
+    """
+
+    __slots__ = ("_call", "_nested", "_task")
 
     def __init__(self, call: Call) -> None:
         self._call = call
@@ -283,9 +304,12 @@ class Cutoff:
         if self._call.ending is not None:
             raise self._call.ending
         self._task = _current_task()
+        self._nested = self._task in self._call.waiting
         self._call.waiting.add(self._task)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if self._nested:
+            return
         self._call.waiting.discard(self._task)
         if isinstance(error, asyncio.CancelledError) and self._call.ending and self._task.uncancel() == 0:
             raise self._call.ending from None

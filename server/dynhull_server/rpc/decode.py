@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 
+from ..state.frames import off_globe
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
@@ -67,6 +68,13 @@ def decode_sequence(producer: str, sequence: int) -> int:
     return sequence
 
 
+def decode_may_skip(producer: str, may_skip: bool) -> bool:
+    """Whether numbers of the producer may be skipped."""
+    if may_skip and not producer:
+        raise InvalidFieldError("may_skip", may_skip, "only numbers of a producer can be skipped")
+    return may_skip
+
+
 def decode_page(
     request: hull_service_pb2.ListHullsRequest | fence_service_pb2.ListFencesRequest,
 ) -> tuple[str, str, int]:
@@ -98,6 +106,13 @@ def decode_points(points: points_pb2.Points, field: str) -> Points:
         given = np.array(np.frombuffer(packed, "<f8") if packed else coordinates, float).reshape(-1, 2)
         raise _bad_row(~np.isfinite(given).all(axis=1), field, given, "coordinates must be finite")
     return xy
+
+
+def require_places(lonlat: Points, field: str) -> None:
+    """Refuse (n, 2) pairs unless all are a longitude and a latitude."""
+    misplaced = off_globe(lonlat)
+    if misplaced is not None:
+        raise InvalidFieldError(field, misplaced.place, misplaced.problem, misplaced.row)
 
 
 def decode_directions(directions: points_pb2.Points) -> Points:

@@ -23,7 +23,6 @@ INITIALS: dict[int, Initial] = {
     fence_pb2.FENCE_INITIAL_NONE: "none",
 }
 KINDS: dict[str, SubjectKind] = {"subject_hull": "hull", "subject_prefix": "prefix", "other_hull": "other"}
-NOT_YET = "this server does not support it"
 BYTES_PER_POINT = 16
 
 
@@ -151,11 +150,6 @@ def _refuse_contradictions(config: FenceConfig) -> None:
             raise InvalidFieldError("config.margin", config.margin, "must be positive with without_self")
         if not config.closed:
             raise InvalidFieldError("config.boundary", "FENCE_BOUNDARY_OPEN", "closed with without_self")
-        if config.dwell:
-            raise InvalidFieldError("config.dwell", config.dwell, f"with without_self {NOT_YET}")
-    for field, value in (("config.confirmations", config.confirmations), ("config.min_dwell", config.min_dwell)):
-        if value:
-            raise InvalidFieldError(field, value, NOT_YET)
 
 
 def _refuse_for_other_hull(config: FenceConfig) -> None:

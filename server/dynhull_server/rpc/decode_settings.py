@@ -1,11 +1,14 @@
 """Conversion of the settings of a hull."""
 
+import numpy as np
 from google.protobuf.duration_pb2 import Duration
 
+from dynhull.globe import as_center
 from dynhull_proto.v1 import hull_pb2
 
 from ..state.admission import GREATEST_TIME
-from ..state.records import Clock, HullSettings, Identity, Window
+from ..state.frames import off_globe
+from ..state.records import Center, Clock, Frame, HullSettings, Identity, Window
 from .decode import LARGEST_INTEGER, InvalidFieldError
 
 IDENTITIES: dict[int, Identity] = {
@@ -18,6 +21,11 @@ CLOCKS: dict[int, Clock] = {
     hull_pb2.CLOCK_UNSPECIFIED: "server",
     hull_pb2.CLOCK_SERVER: "server",
     hull_pb2.CLOCK_DATA: "data",
+}
+FRAMES: dict[int, Frame] = {
+    hull_pb2.FRAME_UNSPECIFIED: "plane",
+    hull_pb2.FRAME_PLANE: "plane",
+    hull_pb2.FRAME_GEOGRAPHIC: "geographic",
 }
 MICROSECONDS = 1_000_000
 NANOSECONDS = 1_000  # in a microsecond
@@ -36,7 +44,24 @@ def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
     if by_event_time and identity == "multiset":
         raise InvalidFieldError("config.ordering", "ORDERING_EVENT_TIME", "points without keys have no order")
     window = _decode_window(config.window) if config.HasField("window") else None
-    return HullSettings(identity, config.max_points, window, by_event_time)
+    frame = FRAMES.get(config.frame)
+    if frame is None:
+        raise InvalidFieldError("config.frame", config.frame, "not a frame that this server supports")
+    center = decode_center(config.center, "config.center") if config.HasField("center") else None
+    if center is not None and frame == "plane":
+        raise InvalidFieldError("config.center", center, "only a geographic hull has a centre")
+    return HullSettings(identity, config.max_points, window, by_event_time, frame, center)
+
+
+def decode_center(place: hull_pb2.LonLat, field: str) -> Center:
+    """The centre of a hull, with a longitude from -180 to below 180."""
+    center = place.longitude, place.latitude
+    if not np.isfinite(center).all():
+        raise InvalidFieldError(field, center, "longitude and latitude must be finite")
+    misplaced = off_globe(np.array([center]))
+    if misplaced is not None:
+        raise InvalidFieldError(field, center, misplaced.problem)
+    return as_center(center)
 
 
 def _decode_window(window: hull_pb2.Window) -> Window:

@@ -1,10 +1,11 @@
 """Conversion of values to messages."""
 
+import math
 from functools import partial
 
 import numpy as np
 
-from dynhull import measure
+from dynhull import globe, measure
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
@@ -16,7 +17,7 @@ from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
 from ..state.contents.keyed import Found
 from ..state.hull_state import Cause, Counts, VertexKeys
-from ..state.records import NO_TIME, Contents, HullSettings, Identity, Keys, Times
+from ..state.records import NO_TIME, Center, Contents, Frame, HullSettings, Identity, Keys, Times
 
 IDENTITIES: dict[Identity, hull_pb2.Identity] = {
     "multiset": hull_pb2.IDENTITY_MULTISET,
@@ -28,7 +29,10 @@ CAUSES: dict[Cause | None, batch_pb2.Cause] = {
     None: batch_pb2.CAUSE_UNSPECIFIED,
     "batch": batch_pb2.CAUSE_BATCH,
     "expiry": batch_pb2.CAUSE_EXPIRY,
+    "recenter": batch_pb2.CAUSE_RECENTER,
 }
+
+FRAMES: dict[Frame, hull_pb2.Frame] = {"plane": hull_pb2.FRAME_PLANE, "geographic": hull_pb2.FRAME_GEOGRAPHIC}
 
 
 def encode_points(xy: Points, encoding: points_pb2.PointEncoding) -> points_pb2.Points:
@@ -66,7 +70,12 @@ def encode_times(times: Times, encoding: points_pb2.PointEncoding) -> points_pb2
 
 def encode_settings(settings: HullSettings) -> hull_pb2.HullConfig:
     """The settings of a hull."""
-    config = hull_pb2.HullConfig(identity=IDENTITIES[settings.identity], max_points=settings.max_points)
+    config = hull_pb2.HullConfig(
+        identity=IDENTITIES[settings.identity],
+        max_points=settings.max_points,
+        frame=FRAMES[settings.frame],
+        center=encode_center(settings.center),
+    )
     if settings.identity != "multiset":
         by_time = settings.by_event_time
         config.ordering = hull_pb2.ORDERING_EVENT_TIME if by_time else hull_pb2.ORDERING_ARRIVAL
@@ -83,6 +92,11 @@ def encode_settings(settings: HullSettings) -> hull_pb2.HullConfig:
     return config
 
 
+def encode_center(center: Center | None) -> hull_pb2.LonLat | None:
+    """The centre of a hull, if it has one."""
+    return None if center is None else hull_pb2.LonLat(longitude=center[0], latitude=center[1])
+
+
 def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     """A hull with its counts at one revision."""
     message = hull_pb2.Hull(
@@ -92,6 +106,7 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
         point_count=counts.points,
         distinct_point_count=counts.distinct,
         uid=hull.uid,
+        center=encode_center(counts.center),
     )
     message.create_time.FromDatetime(hull.created)
     if counts.clock is not None:
@@ -125,13 +140,16 @@ def encode_entities(
     )
 
 
-async def encode_measures(vertices: Points, run: Run) -> hull_pb2.Measures:
+async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
     """The measures of the hull with these vertices, one step per measure."""
-    x, y = await run(partial(measure.centroid, vertices))
-    min_x, min_y, max_x, max_y = await run(partial(measure.bounds, vertices))
+    area, perimeter = (globe.area, globe.perimeter) if geographic else (measure.area, measure.perimeter)
+    x = y = min_x = min_y = max_x = max_y = math.nan
+    if not geographic:
+        x, y = await run(partial(measure.centroid, vertices))
+        min_x, min_y, max_x, max_y = await run(partial(measure.bounds, vertices))
     return hull_pb2.Measures(
-        area=await run(partial(measure.area, vertices)),
-        perimeter=await run(partial(measure.perimeter, vertices)),
+        area=await run(partial(area, vertices)),
+        perimeter=await run(partial(perimeter, vertices)),
         centroid_x=x,
         centroid_y=y,
         min_x=min_x,
@@ -181,6 +199,8 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
     message = hull_service_pb2.WatchResponse(
         revision=counts.revision, point_count=counts.points, cause=CAUSES[counts.cause]
     )
+    if counts.center is not None:
+        message.center.longitude, message.center.latitude = counts.center
     if counts.clock is not None:
         message.clock_time.FromMicroseconds(counts.clock)
     match event:
@@ -210,7 +230,7 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
 
 
 async def encode_watched(
-    event: Event, encoding: points_pb2.PointEncoding, run: Run, *, measures: bool
+    event: Event, encoding: points_pb2.PointEncoding, run: Run, *, measures: bool, geographic: bool
 ) -> hull_service_pb2.WatchResponse:
     """The message of an event; with `measures`, those of the hull if the event has its vertices.
 
@@ -222,7 +242,7 @@ async def encode_watched(
     else:
         message = encode_event(event, encoding)
     if measures and not isinstance(event, Progress) and event.vertices is not None:
-        message.measures.CopyFrom(await encode_measures(event.vertices, run))
+        message.measures.CopyFrom(await encode_measures(event.vertices, run, geographic=geographic))
     return message
 
 

@@ -1,6 +1,7 @@
 """HullService, one method per RPC of dynhull.v1. The .proto files document the methods."""
 
 import time
+from collections.abc import Iterator
 from contextlib import aclosing
 from functools import partial
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from dynhull.arrays import Checked
 from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1 import points_pb2
 
 from ..engine import entities
 from ..engine.engine import Engine
@@ -17,14 +19,16 @@ from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..state.errors import HullEmptyError
+from ..state.frames import require_lines, require_reach
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
-from .decode_settings import decode_settings
+from .decode_settings import decode_center, decode_settings
 from .metrics import Metrics
+from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .status import ANSWERED, PartRefusedError
-from .writing import StreamedBatches, decode_together, decode_write
+from .writing import MOST_IN_A_MESSAGE, StreamedBatches, decode_together, decode_write
 
 # The side of a missing key.
 MISSING_SIDE = -128
@@ -47,6 +51,7 @@ class HullService:
         self._metrics = metrics
         self._create_on_write = create_on_write
         self._max_watch_lag = max_watch_lag
+        self._queried = {kind: getattr(self, method) for kind, method in METHODS.items()}
 
     # Hulls
 
@@ -70,6 +75,12 @@ class HullService:
             next_page_token=hulls[-1].name if more else "",
         )
 
+    async def Recenter(self, request: pb.RecenterRequest, call: Call) -> pb.RecenterResponse:
+        hull = self._engine.get(self._written(call, request.name))
+        center = decode_center(request.center, "center") if request.HasField("center") else None
+        counts, hull_changed = await hull.recenter(center)
+        return pb.RecenterResponse(hull=encode.encode_hull(hull, counts), hull_changed=hull_changed)
+
     # Writes
 
     async def Apply(self, request: pb.ApplyRequest, call: Call) -> pb.ApplyResponse:
@@ -77,7 +88,9 @@ class HullService:
         name = self._written(call, request.name)
         if not request.HasField("batch"):
             raise decode.InvalidFieldError("batch", "", "a batch is required")
-        write = decode_write(request, call.message_bytes, decode.decode_producer(request.producer), call.owner)
+        producer = decode.decode_producer(request.producer)
+        may_skip = decode.decode_may_skip(producer, request.may_skip)
+        write = decode_write(request, call.message_bytes, producer, call.owner, may_skip)
         try:
             applied = await self._engine.apply(name, write, create=self._create_on_write)
         except Exception:
@@ -132,13 +145,12 @@ class HullService:
     async def Stream(self, _: object, call: Call) -> None:
         call.batches = 0
         with await self._batches(call) as streamed:
+            if streamed.several:
+                most_bytes = call.max_message_bytes
+                await call.write(pb.StreamResponse(max_batches=MOST_IN_A_MESSAGE, max_message_bytes=most_bytes))
             while await streamed.more():
-                for sequence, applied in streamed.applied():
-                    call.batches += 1
-                    response = pb.StreamResponse()
-                    if sequence:
-                        response.sequence = sequence
-                    encode.encode_applied(applied, response.result)
+                for response in _acknowledgements(streamed):
+                    call.batches += len(response.results) or 1
                     await call.write(response)
 
     async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
@@ -160,13 +172,13 @@ class HullService:
             return pb.LocateResponse(
                 revision=found.counts.revision, sides=found.rows.tobytes(), keys_revision=_keys_revision(found)
             )
-        xy = Checked(decode.decode_points(request.points, "points"))
+        xy = _places(hull, request.points)
         counts, sides = await hull.ask_rows(lambda live, rows: live.locate(xy[rows]), len(xy), request.min_revision)
         return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
 
     async def Count(self, request: pb.CountRequest, call: Call) -> pb.CountResponse:
         hull = self._read(call, request.name)
-        xy = Checked(decode.decode_points(request.points, "points"))
+        xy = _places(hull, request.points)
         counts, times = await hull.count(xy, request.min_revision)
         return pb.CountResponse(revision=counts.revision, counts=times)
 
@@ -209,9 +221,12 @@ class HullService:
     async def Tangents(self, request: pb.TangentsRequest, call: Call) -> pb.TangentsResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        xy = Checked(decode.decode_points(request.points, "points"))
+        xy = _places(hull, request.points)
         counts, tangents = await hull.ask_rows(
-            lambda live, rows: live.tangents(xy[rows]), len(xy), request.min_revision
+            lambda live, rows: live.tangents(xy[rows]),
+            len(xy),
+            request.min_revision,
+            check=lambda center: require_reach(center, "points", xy.points),
         )
         return pb.TangentsResponse(
             revision=counts.revision,
@@ -227,7 +242,7 @@ class HullService:
             return pb.DistanceResponse(
                 revision=found.counts.revision, distances=found.rows, keys_revision=_keys_revision(found)
             )
-        xy = Checked(decode.decode_points(request.points, "points"))
+        xy = _places(hull, request.points)
         counts, distances = await hull.ask_rows(
             lambda live, rows: live.distance(xy[rows]), len(xy), request.min_revision
         )
@@ -237,8 +252,14 @@ class HullService:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         p, q = map(Checked, decode.decode_lines(request))
+        if hull.geographic:
+            decode.require_places(p.points, "origins")
+            decode.require_places(q.points, "targets")
         counts, crossings = await hull.ask_rows(
-            lambda live, rows: live.intersect_lines(p[rows], q[rows]), len(p), request.min_revision
+            lambda live, rows: live.intersect_lines(p[rows], q[rows]),
+            len(p),
+            request.min_revision,
+            check=lambda center: require_lines(center, p.points, q.points),
         )
         return pb.IntersectLinesResponse(
             revision=counts.revision,
@@ -259,7 +280,7 @@ class HullService:
             )
         else:
             counts, vertices = await hull.vertices(request.min_revision)
-        measures = await encode.encode_measures(vertices, self._run(len(vertices)))
+        measures = await encode.encode_measures(vertices, self._run(len(vertices)), geographic=hull.geographic)
         return pb.GetHullResponse(
             hull=encode.encode_hull(hull, counts),
             vertices=encode.encode_points(vertices, encoding),
@@ -271,11 +292,12 @@ class HullService:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         counts, vertices = await hull.vertices(request.min_revision)
-        return await answers.measures(counts, vertices, encoding, self._run(len(vertices)))
+        return await answers.measures(counts, vertices, encoding, self._run(len(vertices)), geographic=hull.geographic)
 
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
         encoding = decode.decode_encoding(request.encoding)
+        other.require_frame_of(hull, "other_name")
         counts, other_counts, (vertices, other_vertices) = await hull.read_beside(
             other,
             lambda state, beside: (state.vertices(), beside.vertices()),
@@ -286,13 +308,15 @@ class HullService:
         for each, found in ((hull, vertices), (other, other_vertices)):
             if not len(found):
                 raise HullEmptyError(each.name)
+        separation = answers.separation_on_globe if hull.geographic else answers.separation
         response: pb.SeparateResponse = await self._engine.aside(
-            lambda: answers.separation(counts, vertices, other_counts, other_vertices, encoding)
+            lambda: separation(counts, vertices, other_counts, other_vertices, encoding)
         )
         return response
 
     async def PhaseDiagram(self, request: pb.PhaseDiagramRequest, call: Call) -> pb.PhaseDiagramResponse:
         hull = self._read(call, request.name)
+        hull.require_plane()
         encoding = decode.decode_encoding(request.encoding)
         entries = decode.decode_read(request.entries, "entries", ENTRIES)
         counts, vertices = await hull.vertices(request.min_revision)
@@ -302,6 +326,7 @@ class HullService:
 
     async def Frontier(self, request: pb.FrontierRequest, call: Call) -> pb.FrontierResponse:
         hull = self._read(call, request.name)
+        hull.require_plane()
         encoding = decode.decode_encoding(request.encoding)
         points = decode.decode_read(request.points, "points", RISKS)
         rates = decode.decode_rates(request.rates)
@@ -334,6 +359,12 @@ class HullService:
         counts, points = await hull.sample(size, request.min_revision)
         return pb.SamplePointsResponse(revision=counts.revision, points=encode.encode_points(points, encoding))
 
+    async def Query(self, _: object, call: Call) -> None:
+        answers = Answers(call, self._queried, self._engine, self._metrics, self._max_watch_lag)
+        async for message in call.messages():
+            with call.cutoff():
+                await answers.answer(message.reads)
+
     async def Watch(self, request: pb.WatchRequest, call: Call) -> None:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
@@ -356,6 +387,7 @@ class HullService:
             min_revision=request.min_revision,
             min_interval=decode.decode_rate(request.max_events_per_second),
             progress_interval=decode.decode_interval(request),
+            outline_only=request.outline_only,
         )
         with self._metrics.watcher() as watcher:
             async with aclosing(events):
@@ -363,7 +395,11 @@ class HullService:
                     with call.cutoff():
                         event = await anext(events)
                         message = await encode.encode_watched(
-                            event, encoding, self._engine.aside, measures=request.include_measures
+                            event,
+                            encoding,
+                            self._engine.aside,
+                            measures=request.include_measures,
+                            geographic=hull.geographic,
                         )
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
@@ -402,6 +438,29 @@ class HullService:
             )
         name = self._written(call, first.name)
         return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)
+
+
+def _acknowledgements(streamed: StreamedBatches) -> Iterator[pb.StreamResponse]:
+    """The responses for the batches applied since the last call."""
+    response = pb.StreamResponse()
+    for sequence, applied in streamed.applied():
+        result = response.results.add() if streamed.several else response
+        if sequence:
+            result.sequence = sequence
+        encode.encode_applied(applied, result.result)
+        if not streamed.several:
+            yield response
+            response = pb.StreamResponse()
+    if streamed.several:
+        yield response
+
+
+def _places(hull: LiveHull, points: points_pb2.Points) -> Checked:
+    """The points of a request about a hull: in a geographic one, places on the globe."""
+    xy = decode.decode_points(points, "points")
+    if hull.geographic:
+        decode.require_places(xy, "points")
+    return Checked(xy)
 
 
 def _keys_revision(found: KeyAnswers) -> int:

@@ -34,6 +34,7 @@ REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 FINISHED = {
     "CreateHull",
     "DeleteHull",
+    "Recenter",
     "ListHulls",
     "Apply",
     "ApplyTogether",

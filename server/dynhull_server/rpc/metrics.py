@@ -3,7 +3,7 @@
 import asyncio
 import heapq
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any
@@ -54,6 +54,12 @@ class Metrics:
         self._events = Counter(
             "dynhull_watch_events", "Events sent to watchers, by kind.", ["kind"], registry=self.registry
         )
+        self._reads = Counter(
+            "dynhull_query_reads",
+            "Reads answered in Query calls, by method and status.",
+            ["method", "code"],
+            registry=self.registry,
+        )
         self._verifications = Counter(
             "dynhull_verifications",
             "Hulls compared with Chan's algorithm, by origin of the request and outcome.",
@@ -83,6 +89,11 @@ class Metrics:
         calls, durations = ended
         calls.inc()
         durations.observe(seconds)
+
+    def queried(self, counts: Mapping[tuple[str, str], int]) -> None:
+        """Count reads of a Query call, by method and status."""
+        for labels, count in counts.items():
+            self._reads.labels(*labels).inc(count)
 
     def verified(self, origin: str, equal: bool, seconds: float = 0.0) -> None:
         """Count a verification."""

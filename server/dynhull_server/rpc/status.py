@@ -23,6 +23,7 @@ from ..state.errors import (
     HullUnsuitableError,
     InvalidBatchError,
     InvalidFenceError,
+    InvalidPlaceError,
     KeyMissingError,
     KeyRepeatedError,
     LimitExceededError,
@@ -148,6 +149,8 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case FenceReplacedError():
             metadata = {"field": "uid", "value": error.name, "uid": error.uid}
             return _status(code.OUT_OF_RANGE, str(error), "FENCE_REPLACED", metadata)
+        case InvalidPlaceError():
+            return _invalid_field(within, InvalidFieldError(error.field, error.value, error.problem, error.row), where)
         case InvalidFenceError():
             return _invalid_field("config.", InvalidFieldError(error.field, error.value, error.problem), where)
         case HullFencedError():

@@ -20,17 +20,19 @@ from .metrics import Metrics
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
 MOST_ROWS = 131_072
 MOST_BATCHES = 1_024
+# The most batches of a message: a trip runs them on the event loop, each in some 10 µs.
+MOST_IN_A_MESSAGE = 256
 
 
-def decode_write(request: Any, message_bytes: int, producer: str, owner: str) -> WriteBatch:
+def decode_write(request: Any, message_bytes: int, producer: str, owner: str, may_skip: bool) -> WriteBatch:
     """The batch of a request, decoded when it runs; `owner` is the caller that the producer belongs to."""
-    batch = request.batch
     return WriteBatch(
         message_bytes // decode.BYTES_PER_POINT,  # an estimate: reading the points would copy them
-        lambda: decode_batch(batch),
+        partial(decode_batch, request.batch),
         producer,
         decode.decode_sequence(producer, request.sequence),
         owner,
+        may_skip,
     )
 
 
@@ -40,9 +42,10 @@ def decode_together(
     """The batches of a request to the hulls of these names, decoded when they run."""
     producer = decode.decode_producer(request.producer)
     sequence = decode.decode_sequence(producer, request.sequence)
+    may_skip = decode.decode_may_skip(producer, request.may_skip)
     parts = []
     for name, each in zip(names, request.batches, strict=True):
-        part = WriteBatch(0, partial(decode_batch, each.batch), producer, sequence, owner)
+        part = WriteBatch(0, partial(decode_batch, each.batch), producer, sequence, owner, may_skip)
         part.name = name
         parts.append(part)
     return WriteTogether(parts, rows=message_bytes // decode.BYTES_PER_POINT)
@@ -63,6 +66,7 @@ class StreamedBatches:
 
     Attributes:
         name: the name of the hull.
+        several: whether messages may have several batches, and responses have several results.
 
     Raises:
         HullNotFoundError: no hull has that name, and `create` is False.
@@ -72,6 +76,8 @@ class StreamedBatches:
         self._call = call
         self.name = name
         self._producer = decode.decode_producer(first.producer)
+        self._may_skip = decode.decode_may_skip(self._producer, first.may_skip)
+        self.several = isinstance(first, hull_service_pb2.StreamRequest) and first.accept_results
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._room = asyncio.Event()
@@ -141,10 +147,38 @@ class StreamedBatches:
             raise decode.InvalidFieldError("name", name, f"this call writes to {self.name!r}")
         if producer and producer != self._producer:
             raise decode.InvalidFieldError("producer", producer, f"the producer of this call is {self._producer!r}")
+        if message.may_skip and not self._may_skip:
+            raise decode.InvalidFieldError("may_skip", value=True, problem="the first message of the call decides it")
+        several = () if isinstance(message, hull_service_pb2.IngestRequest) else message.batches
+        if several:
+            self._take_several(message, several)
+            return
         if not message.HasField("batch"):
             if message.sequence:
                 raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")
             return
-        request = decode_write(message, self._call.message_bytes, self._producer, self._call.owner)
-        self._arrivals.append(time.perf_counter())
-        self._batches.write(request)
+        self._send([self._decoded(message, self._call.message_bytes)])
+
+    def _take_several(self, message: hull_service_pb2.StreamRequest, several: Sequence[Any]) -> None:
+        if not self.several:
+            problem = "only in a call whose first message has accept_results"
+            raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
+        if len(several) > MOST_IN_A_MESSAGE:
+            problem = f"a message has at most {MOST_IN_A_MESSAGE}"
+            raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
+        if message.HasField("batch") or message.sequence:
+            raise decode.InvalidFieldError("batches", f"{len(several)} batches", "use batch or batches, not both")
+        size = self._call.message_bytes // len(several)
+        requests: list[WriteBatch] = []
+        try:
+            for each in several:
+                requests.append(self._decoded(each, size))  # noqa: PERF401  # those before an invalid one are sent
+        finally:
+            self._send(requests)
+
+    def _decoded(self, request: Any, size: int) -> WriteBatch:
+        return decode_write(request, size, self._producer, self._call.owner, self._may_skip)
+
+    def _send(self, requests: list[WriteBatch]) -> None:
+        self._arrivals.extend([time.perf_counter()] * len(requests))
+        self._batches.write(requests)

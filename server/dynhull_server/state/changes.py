@@ -8,9 +8,10 @@ from .fences.records import (
     DropEvents,
     DropFence,
     PutConsumer,
+    PutDelays,
 )
 from .records import Append, Create, Delete
 
 HullChange = Create | Append | Delete
-FenceChange = AddFence | ChangeFence | DropFence | AppendEvents | DropEvents | PutConsumer | DropConsumer
+FenceChange = AddFence | ChangeFence | DropFence | AppendEvents | PutDelays | DropEvents | PutConsumer | DropConsumer
 Change = HullChange | FenceChange

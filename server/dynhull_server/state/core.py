@@ -34,6 +34,7 @@ from .errors import (
     words,
 )
 from .events import (
+    Arrived,
     Commit,
     Committed,
     Compute,
@@ -50,6 +51,7 @@ from .events import (
     NotExamined,
     ReadHull,
     ReadTogether,
+    Recenter,
     Reply,
     Request,
     Retried,
@@ -65,7 +67,7 @@ from .fences.fence import Fence
 from .fences.line import Line
 from .fences.line_trip import MOST_DUE, Ground, LineTrip
 from .fences.pair import Pair
-from .fences.queues import SPANNING, components, merged
+from .fences.queues import SPANNING, components, depends_on, merged
 from .fences.requests import (
     PREFIX,
     STRUCTURAL,
@@ -84,7 +86,7 @@ from .fences.subjects import Subjects
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
-from .records import DEFAULT, Append, HullRow, Kept, Record
+from .records import DEFAULT, NO_TIME, Append, HullRow, Kept, Record
 from .trip import Leg, Place, Trip, write
 
 if TYPE_CHECKING:
@@ -98,6 +100,8 @@ SMALL = 128
 SMALL_TRIP = 1024
 # The most points that the requests of one trip read or write together, unless a single request exceeds it.
 TRIP_ROWS = 2**18
+# The most fences that one trip creates or deletes, and the most corners of their areas, unless one alone has more.
+FENCES_TOGETHER, CORNERS_TOGETHER = 64, 2**14
 # Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 # Microseconds before those who have been inside of a fence for long are looked at again.
@@ -173,11 +177,13 @@ class Core:
         self._due: list[tuple[int, int, str]] = []
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
             WriteBatch: self._asked,
+            Arrived: self._arrived,
             WriteTogether: self._asked_together,
             ReadHull: self._asked,
             ReadTogether: self._asked_together,
             CreateHull: self._asked,
             DeleteHull: self._asked,
+            Recenter: self._asked,
             CreateFence: self._asked_of_fence,
             ReplaceFence: self._asked_of_fence,
             DeleteFence: self._asked_of_fence,
@@ -203,6 +209,32 @@ class Core:
         self._handlers[type(event)](event, effects)
         return effects
 
+    def check(self) -> None:
+        """Raise AssertionError if names share queues otherwise than the fences demand. No trip is in progress.
+
+        O(hulls and fences).
+        """
+        names = [*self._hulls, *(PREFIX + name for name in self._fences)]
+        for group, fences in components(names, self._fences.values()):
+            queue = self._queues[group[0]]
+            assert all(self._queues[name] is queue for name in group), group
+            if queue.line is None:
+                assert not fences, group
+                assert queue.name == group[0], group
+                continue
+            line, anew = queue.line, Line(fences, group)
+            assert queue.name in line.names, group
+            assert anew.names.keys() <= line.names.keys(), group
+            assert all(self._queues.get(name) is queue for name in line.names), line.names
+            assert line.fences == anew.fences, group
+            assert line.subjects == anew.subjects, group
+            assert {name: set(each) for name, each in line.pairs.items() if each} == {
+                name: set(each) for name, each in anew.pairs.items()
+            }, group
+            assert {name: each.fences for name, each in line.areas.items()} == {
+                name: each.fences for name, each in anew.areas.items()
+            }, group
+
     # Committed state
 
     @property
@@ -214,7 +246,7 @@ class Core:
     def latest_time(self) -> int | None:
         """The latest time of the server's clock that a hull has recorded, None if there is none. O(hulls)."""
         clocks = [hull.counts.clock for hull in self._hulls.values() if hull.state.contents.follows_server]
-        clocks += [fence.time for fence in self._fences.values() if fence.last or fence.row.waits.time]
+        clocks += [fence.time for fence in self._fences.values() if fence.time != NO_TIME]
         return max((clock for clock in clocks if clock is not None), default=None)
 
     def get(self, name: str) -> Hull:
@@ -291,7 +323,9 @@ class Core:
 
     # Requests
 
-    def _asked(self, request: CreateHull | DeleteHull | Expire | ReadHull | WriteBatch, effects: list[Effect]) -> None:
+    def _asked(
+        self, request: CreateHull | DeleteHull | Expire | ReadHull | Recenter | WriteBatch, effects: list[Effect]
+    ) -> None:
         name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
         queue = self._queues.get(name) or self._queue(name)
         if queue.trip is None and not queue.waiting and not self._stopping and not request.abandoned:
@@ -306,6 +340,11 @@ class Core:
                     self._rest(queue)
             return
         queue.waiting.append(request)
+        self._go_on([queue], effects)
+
+    def _arrived(self, event: Arrived, effects: list[Effect]) -> None:
+        queue = self._queue(event.batches[0].name)
+        queue.waiting += event.batches
         self._go_on([queue], effects)
 
     def _asked_together(self, request: Together, effects: list[Effect]) -> None:
@@ -455,10 +494,40 @@ class Core:
         if len(queues) == 1:
             queue = queues[0]
             return _take(queue, lambda request: len(self._at(_names(request))) > 1)
+        if isinstance(queues[0].waiting[0], CreateFence):
+            return self._taken_creations(queues, queues[0].waiting[0])
         if isinstance(queues[0].waiting[0], FenceRequest) or any(queue.line is not None for queue in queues):
             requests = [queue.waiting.pop(0) for queue in queues][:1]
             return requests, requests[0].rows
         return _take_together(queues)
+
+    def _taken_creations(self, queues: list[_Queue], first: CreateFence) -> tuple[list[Request], int]:
+        """A request to create a fence, and those behind it that create others around the same hulls.
+
+        The queues of the others are added to `queues`.
+        """
+        taken: list[CreateFence] = []
+        own, *shared = self._at(first.names)
+        corners, following = 0, first
+        while True:
+            taken.append(following)
+            corners += following.config.corners
+            for queue in self._at(following.names):
+                del queue.waiting[0]
+            if own.line is not None or first.config.kind == "prefix" or len(taken) == FENCES_TOGETHER:
+                break
+            candidate = shared[0].waiting[0] if shared[0].waiting else None
+            if not isinstance(candidate, CreateFence) or candidate.config.kind == "prefix":
+                break
+            following, (its_own, *others) = candidate, self._at(candidate.names)
+            if its_own in queues or its_own.line is not None or its_own.trip is not None or set(others) != set(shared):
+                break
+            if any(not queue.waiting or queue.waiting[0] is not candidate for queue in (its_own, *others)):
+                break
+            if corners + candidate.config.corners > CORNERS_TOGETHER:
+                break
+            queues.append(its_own)
+        return list(taken), max(request.rows for request in taken)
 
     def _begin(self, queues: list[_Queue], requests: list[Request], rows: int, effects: list[Effect]) -> Trip:
         trip = self._new_trip(queues, requests)
@@ -472,12 +541,12 @@ class Core:
         return trip
 
     def _new_trip(self, queues: list[_Queue], requests: list[Request]) -> Trip:
-        place = None
-        if queues[0].hull is None and len(queues) == 1:
-            place = Place(self._next_number, self._no_more_hulls(), self._limits)
-            self._next_number += 1
-            self._creating += 1
         if all(queue.line is None for queue in queues) and not isinstance(requests[0], FenceRequest):
+            place = None
+            if queues[0].hull is None and len(queues) == 1:
+                place = Place(self._next_number, self._no_more_hulls(), self._limits)
+                self._next_number += 1
+                self._creating += 1
             legs = [Leg(queue.name, queue.hull, keeps=self._keeps) for queue in queues]
             trip = Trip(legs, requests, self._now, FIRST_PAUSE, place)
         else:
@@ -502,6 +571,11 @@ class Core:
         self._go_on(trip.queues, effects)
 
     def _ran(self, trip: Trip, effects: list[Effect]) -> None:
+        if isinstance(trip, LineTrip) and trip.left:
+            for request in reversed(trip.left):
+                if not request.abandoned:
+                    for queue in self._at(_names(request)):
+                        queue.waiting.insert(0, request)
         if trip.torn:
             self._fail(trip, MemoryError("a batch was applied in part"), effects)
             return
@@ -739,15 +813,15 @@ class Core:
                 names |= dict.fromkeys(request.names[1:])
             else:
                 names |= dict.fromkeys(_names(request))
-        number, refusal = 0, None
-        if isinstance(requests[0], CreateFence):
-            number, most = self._next_number, self._limits.fences.max_fences
-            self._next_number += 1
-            self._fencing += 1
-            if len(self._fences) + self._fencing > most:
-                refusal = LimitExceededError("max_fences", most)
-            if requests[0].config.kind == "prefix":
-                self._prefixes.setdefault(PREFIX + requests[0].name, requests[0].config.subjects)
+        numbers: dict[str, int] = {}
+        for request in requests:
+            if isinstance(request, CreateFence):
+                self._fencing += 1
+                if len(self._fences) + self._fencing <= self._limits.fences.max_fences:
+                    numbers[request.name] = self._next_number
+                    self._next_number += 1
+                if request.config.kind == "prefix" and request.name not in self._fences:
+                    self._prefixes.setdefault(PREFIX + request.name, request.config.subjects)
         births = {
             name
             for request in requests
@@ -760,7 +834,7 @@ class Core:
             places[name] = Place(self._next_number, self._no_more_hulls(), self._limits)
             self._next_number += 1
             self._creating += 1
-        ground = Ground(lines, places, fences, number, refusal, self._limits.fences)
+        ground = Ground(lines, places, fences, numbers, self._limits.fences)
         legs = [Leg(name, self._hulls.get(name), keeps=self._keeps) for name in names]
         return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)
 
@@ -775,6 +849,7 @@ class Core:
     def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
         """Publish what a trip has committed of fences, and join or part the queues."""
         stirred = []
+        moved = any(leg.area is not leg.fence.area for leg in trip.fence_legs.values())
         trip.dismiss()
         for leg in trip.fence_legs.values():
             fence = leg.fence
@@ -782,20 +857,82 @@ class Core:
                 self._fences[fence.name] = fence
                 for subjects in fence.subjects.values():
                     subjects.fences[fence.number] = fence
+            changed = leg.row is not fence.row
             leg.publish()
             if leg.deleted:
                 del self._fences[fence.name]
                 self._prefixes.pop(PREFIX + fence.name, None)
                 for subjects in fence.subjects.values():
                     subjects.dropped(fence)
-            if leg.events:
+            if leg.events or changed:
                 stirred.append((fence, leg.events))
         if stirred:
             effects.append(Stir(stirred))
         if trip.structural:
-            fences = {fence.name: fence for line in trip.lines for fence in line.fences.values() if not fence.ended}
-            fences |= {leg.fence.name: leg.fence for leg in trip.fence_legs.values() if leg.created}
-            trip.queues = self._regroup(trip.queues, fences.values(), trip)
+            self._rejoin(trip, moved=moved)
+
+    def _rejoin(self, trip: LineTrip, *, moved: bool) -> None:
+        """Join and part queues after fences were created or deleted, or have moved to the area of another hull."""
+        created = [leg.fence for leg in trip.fence_legs.values() if leg.created]
+        deleted = [leg.fence for leg in trip.fence_legs.values() if leg.deleted]
+        if not (created or deleted or moved):
+            return
+        home = max(
+            (queue for queue in trip.queues if queue.line is not None),
+            key=lambda queue: len(queue.line.fences),
+            default=None,
+        )
+        if home is not None and home.line is not None and not moved:
+            if created and all(fence.row.config.kind != "prefix" for fence in created):
+                self._join(trip, home, home.line, created)
+                return
+            if not created and len(deleted) < len(home.line.fences) and all(map(_is_leaf, deleted)):
+                self._part(trip, home, home.line, deleted)
+                return
+        fences = {fence.name: fence for line in trip.lines for fence in line.fences.values() if not fence.ended}
+        fences |= {fence.name: fence for fence in created}
+        trip.queues = self._regroup(trip.queues, fences.values(), trip)
+
+    def _join(self, trip: LineTrip, home: _Queue, line: Line, fences: list[Fence]) -> None:
+        """Let the queues of the hulls that new fences depend on, all the same ones, become part of a line.
+
+        O(names and fences of the other queues, and requests).
+        """
+        joined = self._at(name for fence in fences for name in (PREFIX + fence.name, *depends_on(fence)))
+        waiting = merged([queue.waiting for queue in joined])
+        for queue in joined:
+            queue.waiting = []
+            if queue is home:
+                continue
+            names = dict.fromkeys([queue.name]) if queue.line is None else queue.line.names
+            for fence in () if queue.line is None else queue.line.fences.values():
+                line.add(fence)
+            if queue.guests is not None:
+                home.guests = (home.guests or set()) | queue.guests
+            line.names |= names
+            self._queues |= dict.fromkeys(names, home)
+        for fence in fences:
+            line.add(fence)
+        home.waiting = waiting
+        trip.queues = [home, *(queue for queue in trip.queues if queue not in joined)]
+
+    def _part(self, trip: LineTrip, home: _Queue, line: Line, fences: list[Fence]) -> None:
+        """Take deleted fences from a line that stays together without them. O(fences and requests)."""
+        parted = []
+        for fence in fences:
+            line.remove(fence)
+            name = PREFIX + fence.name
+            del line.names[name]
+            queue = self._queues[name] = _Queue(name)
+            queue.trip = trip
+            parted.append(queue)
+        home.name = next(iter(line.names))
+        trip.queues = [home, *parted]
+        waiting, home.waiting = home.waiting, []
+        for request in waiting:
+            for queue in self._at(_names(request)):
+                if queue in trip.queues:  # in others it has never ceased to wait
+                    queue.waiting.append(request)
 
     def _regroup(self, queues: list[_Queue], fences: "Iterable[Fence]", trip: Trip | None = None) -> list[_Queue]:
         """Make queues of these ones: one for all names that fences join, one for each other name.
@@ -871,6 +1008,9 @@ class Core:
         """Give subjects their restored indexes."""
         for name, index in restored.indexes.items():
             subjects[name].index = index
+            subjects[name].follow_state()
+            for fence in subjects[name].fences.values():
+                subjects[name].note_delays(fence)
         for fence in {fence.number: fence for each in subjects.values() for fence in each.fences.values()}.values():
             fence.count_inside()
 
@@ -895,13 +1035,13 @@ class Core:
     def _pass_time(self, fence: Fence, event: Tick, effects: list[Effect]) -> None:
         """Begin the events of those who have been inside of a fence for long enough."""
         due = fence.next_due
-        if due is None or due > event.time or fence.dwelling is None:
+        if due is None or due > event.time:
             self._plan_fence(fence)
             return
         # It is looked at again even if the request is refused, because the storage cannot be read.
         fence.due = event.time + LOOK_AGAIN
         heappush(self._due, (fence.due, fence.number, PREFIX + fence.name))
-        rows = min(len(fence.dwelling), MOST_DUE)
+        rows = min(fence.waiting, MOST_DUE)
         self._asked_of_fence(PassTime(event.to, fence.name, event.time, fence, rows=rows), effects)
 
     def _plan_fence(self, fence: Fence) -> None:
@@ -928,6 +1068,11 @@ class Core:
             # Requests that wait for a trip are refused after it, so that the answers of a stream keep their order.
 
 
+def _is_leaf(fence: Fence) -> bool:
+    """Whether a fence joins no hulls: its line stays together without it."""
+    return fence.row.config.kind != "prefix" and len(set(depends_on(fence))) == 1
+
+
 def _names(request: Any) -> "Sequence[str]":
     """The names that a request concerns."""
     match request:
@@ -944,23 +1089,30 @@ def _names(request: Any) -> "Sequence[str]":
 def _take(queue: _Queue, spans: "Callable[[Request], bool]") -> tuple[list[Request], int]:
     """The requests of the next trip, and their points: at most TRIP_ROWS.
 
-    A DeleteHull is always alone, and so are requests that change lines. Requests to several hulls stay if they wait in
-    other queues too, which `spans` decides.
+    A DeleteHull is always alone, and so are requests that change lines, but some that delete different fences run
+    together. Requests to several hulls stay if they wait in other queues too, which `spans` decides.
     """
     waiting, queue.waiting = queue.waiting, []
     requests: list[Request] = []
     rows = 0
+    deleted: set[str] = set()
     for i, request in enumerate(waiting):
         if request.abandoned or (type(request) is WriteBatch and request.stream and request.stream.stopped):
             continue
-        deletes = type(request) is DeleteHull or isinstance(request, STRUCTURAL)
+        alone = type(request) is DeleteHull or isinstance(request, STRUCTURAL)
+        if type(request) is DeleteFence:
+            joins = len(requests) == len(deleted) < FENCES_TOGETHER and request.name not in deleted
+        else:
+            joins = not (alone or deleted)
         stays = isinstance(request, SPANNING) and spans(request)
-        if stays or (requests and (deletes or rows + request.rows > TRIP_ROWS)):
+        if stays or (requests and not (joins and rows + request.rows <= TRIP_ROWS)):
             queue.waiting = waiting[i:]
             break
         requests.append(request)
         rows += request.rows
-        if deletes:
+        if type(request) is DeleteFence:
+            deleted.add(request.name)
+        elif alone:
             queue.waiting = waiting[i + 1 :]
             break
     return requests, rows

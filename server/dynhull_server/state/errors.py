@@ -60,6 +60,24 @@ class InvalidBatchError(RefusedError):
         self.problem = problem
 
 
+class InvalidPlaceError(RefusedError):
+    """A request has a place that the geographic hull cannot answer for.
+
+    Attributes:
+        field: the path of the field in the request.
+        row: its row.
+        value: the place.
+        problem: the reason.
+    """
+
+    def __init__(self, field: str, row: int, value: object, problem: str) -> None:
+        super().__init__(f"{field} row {row} is {value}: {problem}")
+        self.field = field
+        self.row = row
+        self.value = value
+        self.problem = problem
+
+
 class KeyRepeatedError(InvalidBatchError):
     """A batch names a key twice.
 

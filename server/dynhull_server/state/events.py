@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from .changes import Change
-from .records import DEFAULT, HullSettings, Kept
+from .records import DEFAULT, Center, HullSettings, Kept
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,6 +76,19 @@ class DeleteHull(Request):
 
 
 @dataclass(slots=True, eq=False)
+class Recenter(Request):
+    """Move the centre of a geographic hull. The result is its counts, and whether its vertices have changed.
+
+    Attributes:
+        name: its name.
+        center: the new centre; None for the mean direction of its points.
+    """
+
+    name: str
+    center: Center | None
+
+
+@dataclass(slots=True, eq=False)
 class WriteBatch(Request):
     """Apply a batch of about `rows` points. The result is an `Applied`.
 
@@ -84,6 +97,7 @@ class WriteBatch(Request):
         producer: the producer that numbers it; empty where it is not numbered.
         sequence: its number.
         owner: the caller that the producer belongs to.
+        may_skip: whether numbers may be skipped.
         name: the name of the hull. The engine sets this, the attributes below and `to`.
         arrived: the time of its arrival by the server's clock, in microseconds since 1970.
         birth: the origin of the hull, if a missing hull shall be created; None if it shall be refused.
@@ -96,6 +110,7 @@ class WriteBatch(Request):
     producer: str = ""
     sequence: int = 0
     owner: str = ""
+    may_skip: bool = False
     name: str = field(default="", init=False)
     arrived: int = field(default=0, init=False)
     birth: Birth | None = field(default=None, init=False)
@@ -183,6 +198,13 @@ class Stream:
 
 
 @dataclass(slots=True)
+class Arrived:
+    """Batches of one stream have arrived together. Each is a request as if it had arrived alone."""
+
+    batches: list[WriteBatch]
+
+
+@dataclass(slots=True)
 class Gone:
     """A caller no longer waits."""
 
@@ -264,7 +286,7 @@ class Stopping:
     """The server shuts down: begin no more trips."""
 
 
-Event = Request | Gone | Computed | Committed | Failed | Examined | NotExamined | Retried | Tick | Stopping
+Event = Request | Arrived | Gone | Computed | Committed | Failed | Examined | NotExamined | Retried | Tick | Stopping
 
 
 # Effects.

@@ -1,6 +1,5 @@
 """Vertices at earlier revisions, for watchers that resume."""
 
-from collections import deque
 from dataclasses import dataclass
 
 from dynhull.arrays import Points
@@ -33,7 +32,7 @@ class History:
 
     def __init__(self, most_bytes: int, vertices: Points, first: int = 0) -> None:
         self._most_bytes = most_bytes
-        self._entries = deque([Entry(first, None, vertices)])
+        self._entries = [Entry(first, None, vertices)]  # a deque takes 600 bytes, and most hulls need one entry
         self._bytes = ENTRY_BYTES
 
     def record(self, first: int, vertices: Points) -> None:
@@ -41,7 +40,7 @@ class History:
         self._entries.append(Entry(first, None, vertices))
         self._bytes += ENTRY_BYTES + vertices.nbytes
         while self._bytes > self._most_bytes and len(self._entries) > 1:
-            self._bytes -= ENTRY_BYTES + self._entries.popleft().vertices.nbytes
+            self._bytes -= ENTRY_BYTES + self._entries.pop(0).vertices.nbytes
 
     def changed(self, revision: int) -> None:
         """Record that the vertices have changed at this revision."""

@@ -7,22 +7,24 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import KeyedHull
 from dynhull.arrays import Points
 
 from .batch import Applied
 from .contents import replayed
+from .contents.live import AnyKeyedHull
+from .contents.places import GeographicHull
 from .errors import HullUnsuitableError, MisfitError, RefusedError
 from .history import History
 from .limits import Limits
+from .outline import GlobeOutline, Outline
 from .producers import Producers
-from .records import Contents, Expiry, HullSettings, Kept, Record
+from .records import Center, Contents, Expiry, HullSettings, Kept, Record
 
 if TYPE_CHECKING:
     from .contents.live import AnyHull
     from .events import WriteBatch
 
-Cause = Literal["batch", "expiry"]
+Cause = Literal["batch", "expiry", "recenter"]
 
 
 @dataclass(slots=True)
@@ -35,6 +37,8 @@ class Counts:
         distinct: the number of distinct points.
         clock: the clock of the hull, None for a hull without a clock so far.
         cause: what made the revision; None for revision 0, and where that is no longer known.
+        center: the centre of a geographic hull; None for a hull without one.
+        outlined: the revision at which the vertices or the centre changed last, or a later one.
     """
 
     revision: int
@@ -42,6 +46,8 @@ class Counts:
     distinct: int
     clock: int | None = None
     cause: Cause | None = None
+    center: Center | None = None
+    outlined: int = 0
 
 
 # The keys of vertices: an array of str, or of uint64.
@@ -62,8 +68,12 @@ class HullState:
         most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self.contents = contents = replayed(kept, settings, most_points)
         self.hull: AnyHull = contents.hull
-        self.counts = Counts(kept.last_revision, len(self.hull), self.hull.distinct, contents.clock, _last_cause(kept))
-        self._producers = Producers(limits.max_producers, limits.max_producers_per_caller, _last_sequences(kept), now)
+        last, cause = kept.last_revision, _last_cause(kept)
+        self._follow_center()
+        self.counts = Counts(last, len(self.hull), self.hull.distinct, contents.clock, cause, self.center, last)
+        self._producers = Producers(
+            limits.max_producers, limits.max_producers_per_caller, _last_sequences(kept), _skipping(kept), now
+        )
         self._vertices = self.hull.vertices()
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
@@ -71,6 +81,13 @@ class HullState:
         self._vertex_keys: VertexKeys | None = None
         self._keys_as_of = -1
         self._history = History(limits.history_bytes, self._vertices, self.counts.revision)
+        self._outline: tuple[Points, Center | None, GlobeOutline] | None = None
+
+    @property
+    def center(self) -> Center | None:
+        """The centre of a geographic hull; None for a plane, and for a hull without points that has none so far."""
+        globe = self.contents.globe
+        return None if globe is None else globe.center
 
     @property
     def vertex_count(self) -> int:
@@ -105,7 +122,9 @@ class HullState:
             SequenceGapError: batches before it are missing.
             LimitExceededError: the hull has too many producers to add one.
         """
-        return not write.producer or self._producers.is_new(write.producer, write.sequence, write.owner, now)
+        return not write.producer or self._producers.is_new(
+            write.producer, write.sequence, write.owner, now, may_skip=write.may_skip
+        )
 
     def duplicate(self) -> Applied:
         """The result of a batch that has already been applied."""
@@ -154,13 +173,15 @@ class HullState:
             self.torn = False
             raise
         if write.producer:
-            self._producers.applied(write.producer, write.sequence, write.owner, now)
+            self._producers.applied(write.producer, write.sequence, write.owner, now, may_skip=write.may_skip)
         if gone:
             applied.expired = gone
+        chosen = self.center if self._follow_center() else None
         self._applied(applied.points, "batch", hull_changed=applied.hull_changed)
         if records is not None:
             rows = contents.rows(batch, applied)
-            records.append(Record(applied.revision, rows, write.producer, write.sequence, contents.clock))
+            numbered = write.producer, write.sequence
+            records.append(Record(applied.revision, rows, *numbered, contents.clock, chosen, may_skip=write.may_skip))
         self.torn = False
         return applied
 
@@ -179,13 +200,41 @@ class HullState:
         self.torn = False
         return 0 if rows is None else rows.points
 
+    def recenter(self, center: Center | None, records: list[Record] | None) -> bool:
+        """Move the centre as a revision of its own, by default to the mean direction of the points.
+
+        Returns whether the vertices have changed.
+
+        Raises:
+            MisfitError: the hull is a plane, or cannot have this centre; nothing has changed.
+        """
+        changes = self.hull.changes
+        rows = self.contents.recenter(center)
+        self._follow_center()
+        hull_changed = self.hull.changes != changes
+        self._applied(len(self.hull), "recenter", hull_changed=hull_changed)
+        if records is not None:
+            records.append(Record(self.counts.revision, rows, clock=self.contents.clock, center=self.center))
+        return hull_changed
+
+    def _follow_center(self) -> bool:
+        """Take over the centre of the hull. Returns whether it is a new one."""
+        globe = self.contents.globe
+        if globe is None:
+            return False
+        assert isinstance(self.hull, GeographicHull)  # it has a frame
+        return globe.follow(self.hull.center)
+
     def _applied(self, points: int, cause: Cause, *, hull_changed: bool) -> None:
         """Update the counts and the history after a change."""
         revision = self.counts.revision + 1
+        outlined = self.counts.outlined
         if hull_changed:
-            self._changed_at = revision
+            outlined = self._changed_at = revision
             self._history.changed(revision)
-        self.counts = Counts(revision, points, self.hull.distinct, self.contents.clock, cause)
+        if self.center != self.counts.center:
+            outlined = revision
+        self.counts = Counts(revision, points, self.hull.distinct, self.contents.clock, cause, self.center, outlined)
 
     # Reads
 
@@ -197,6 +246,15 @@ class HullState:
             self._vertices_as_of = self.hull.changes
             self._history.record(self._changed_at, self._vertices)
         return self._vertices
+
+    def outline(self) -> Outline:
+        """What answers queries that depend on the vertices alone: the hull itself or, on the globe, its outline."""
+        if isinstance(self.hull, GeographicHull):
+            vertices, center = self.vertices(), self.center
+            if self._outline is None or self._outline[0] is not vertices or self._outline[1] != center:
+                self._outline = vertices, center, GlobeOutline(vertices, center)
+            return self._outline[2]
+        return self.hull
 
     def vertex_keys(self) -> VertexKeys:
         """The key at each vertex of a keyed hull; the same array object while no vertex has changed its key."""
@@ -211,15 +269,15 @@ class HullState:
 
     def entities(self) -> Contents | None:
         """The keys of a keyed hull with their positions, None for a hull without keys. O(n log n)."""
-        return self.contents.stored() if isinstance(self.hull, KeyedHull) else None
+        return self.contents.stored() if isinstance(self.hull, AnyKeyedHull) else None
 
     def keys_at(self, places: Points) -> VertexKeys:
         """The key at each of some places of a keyed hull, all of which have one."""
         return self._key_array(self._keyed.keys_at(places))
 
     @property
-    def _keyed(self) -> KeyedHull:
-        assert isinstance(self.hull, KeyedHull)  # nobody asks others for keys
+    def _keyed(self) -> AnyKeyedHull:
+        assert isinstance(self.hull, AnyKeyedHull)  # nobody asks others for keys
         return self.hull
 
     def _key_array(self, keys: Sequence[str | int | None]) -> VertexKeys:
@@ -235,13 +293,23 @@ class HullState:
 
     def kept(self) -> Kept:
         """The hull at this revision, for a snapshot. O(n)."""
-        return Kept(self.counts.revision, self.contents.stored(), self._producers.state(), clock=self.contents.clock)
+        return Kept(
+            self.counts.revision,
+            self.contents.stored(),
+            self._producers.state(),
+            clock=self.contents.clock,
+            center=self.center,
+            skipping=self._producers.skipping(),
+        )
 
 
 def _last_cause(kept: Kept) -> Cause | None:
     if not kept.records:
         return None
-    return "expiry" if isinstance(kept.records[-1].rows, Expiry) else "batch"
+    last = kept.records[-1]
+    if last.center is not None and not len(last.rows):
+        return "recenter"
+    return "expiry" if isinstance(last.rows, Expiry) else "batch"
 
 
 def _last_sequences(kept: Kept) -> dict[str, int]:
@@ -250,3 +318,7 @@ def _last_sequences(kept: Kept) -> dict[str, int]:
         if record.producer:
             last[record.producer] = record.sequence
     return last
+
+
+def _skipping(kept: Kept) -> frozenset[str]:
+    return kept.skipping | {record.producer for record in kept.records if record.may_skip}

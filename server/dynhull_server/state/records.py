@@ -12,6 +12,8 @@ from dynhull.keys import PackedKeys
 Identity = Literal["multiset", "str", "int"]
 Clock = Literal["server", "data"]
 Condition = Literal["absent", "present"]
+Frame = Literal["plane", "geographic"]
+Center = tuple[float, float]  # longitude and latitude in degrees
 Keys = PackedKeys | npt.NDArray[np.uint64]
 Times = npt.NDArray[np.int64]  # microseconds since 1970
 NO_TIME = -(2**63)
@@ -46,12 +48,21 @@ class HullSettings:
         max_points: the limit on its points, 0 for the server's own.
         window: the window over its points, or None.
         by_event_time: whether a position with an earlier event time than the stored one changes nothing.
+        frame: what coordinates mean: a plane, or longitude and latitude in degrees ("geographic").
+        center: the centre that a geographic hull begins with; None for its first points to choose.
     """
 
     identity: Identity = "multiset"
     max_points: int = 0
     window: Window | None = None
     by_event_time: bool = False
+    frame: Frame = "plane"
+    center: Center | None = None
+
+    @property
+    def geographic(self) -> bool:
+        """Whether its points are places on the globe."""
+        return self.frame == "geographic"
 
 
 DEFAULT = HullSettings()
@@ -149,6 +160,8 @@ class Record:
         producer: the producer that numbered the batch; empty where it has no number.
         sequence: its number.
         clock: the hull's clock after it, in microseconds since 1970; None for a hull without a clock.
+        center: the centre of a geographic hull, where this revision sets or moves it before its rows; otherwise None.
+        may_skip: whether numbers of the producer may be skipped.
     """
 
     revision: int
@@ -156,6 +169,8 @@ class Record:
     producer: str = ""
     sequence: int = 0
     clock: int | None = None
+    center: Center | None = None
+    may_skip: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +229,8 @@ class Kept:
         producers: the last sequence number of each producer at that revision.
         records: the batches after it, in order.
         clock: the hull's clock at that revision, in microseconds since 1970; None for a hull without a clock.
+        center: the centre of a geographic hull at that revision; None if it has none so far.
+        skipping: the producers whose numbers may be skipped.
     """
 
     revision: int = 0
@@ -221,6 +238,8 @@ class Kept:
     producers: dict[str, int] = field(default_factory=dict)
     records: list[Record] = field(default_factory=list)
     clock: int | None = None
+    center: Center | None = None
+    skipping: frozenset[str] = frozenset()
 
     @property
     def last_revision(self) -> int:

@@ -1,6 +1,7 @@
 """One batch to each of several hulls: all of them are applied, or none."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 from .batch import Applied
@@ -14,12 +15,16 @@ T = TypeVar("T")
 
 
 def apply_together(
-    request: WriteTogether, hulls: list[Hull], records: list[list[Record] | None], now: float
+    request: WriteTogether,
+    hulls: list[Hull],
+    records: list[list[Record] | None],
+    now: float,
+    expired: Callable[[Hull], None],
 ) -> list[Applied]:
     """Apply each part of the request to its hull, as the next revision of each.
 
     Every part is checked before one is applied, because a hull cannot take back a batch. If memory runs out between two
-    parts, all hulls are torn.
+    parts, all hulls are torn. `expired` is called with each hull whose points have left before its batch.
 
     Raises:
         Exception: a part is refused. No hull has changed, unless they are torn.
@@ -36,8 +41,8 @@ def apply_together(
     batches = _of_each(request, states, lambda part, state: state.checked(part))
     results: list[Applied] = []
     try:
-        for part, state, batch, kept in zip(request.parts, states, batches, records, strict=True):
-            results.append(state.apply_decoded(part, batch, now, kept))
+        for part, hull, batch, kept in zip(request.parts, hulls, batches, records, strict=True):
+            results.append(hull.state.apply_decoded(part, batch, now, kept, partial(expired, hull)))
     except BaseException:
         if results:
             for state in states:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from .batch import Applied, Batch, KeyedBatch
 from .changes import Change
-from .errors import HullExistsError, HullNotFoundError
-from .events import CreateHull, DeleteHull, Expire, ReadHull, ReadTogether, Request, WriteBatch, WriteTogether
+from .errors import HullExistsError, HullNotFoundError, HullUnsuitableError, MisfitError
+from .events import CreateHull, DeleteHull, Expire, ReadHull, ReadTogether, Recenter, Request, WriteBatch, WriteTogether
 from .hull import Hull
-from .hull_state import HullState
+from .hull_state import Counts, HullState
 from .limits import Limits
 from .records import DEFAULT, Append, Create, Delete, HullRow, HullSettings, Kept, Record
 from .together import apply_together
@@ -157,6 +157,8 @@ class Trip:
                 return leg.after
             case Expire():
                 return self._expire(request, leg)
+            case Recenter():
+                return self._recenter(request, leg)
             case DeleteHull():
                 if leg.after is None:
                     raise HullNotFoundError(leg.name)
@@ -197,11 +199,19 @@ class Trip:
                 raise HullNotFoundError(leg.name)
             hulls.append(leg.after)
         try:
-            request.result = apply_together(request, hulls, [leg.records for leg in ordered], self._now)
+            journals = [self._journal(leg) for leg in ordered]
+            request.result = apply_together(request, hulls, journals, self._now, self._left)
         finally:
             self.torn = any(hull.state.torn for hull in hulls)
         for leg, applied in zip(ordered, request.result, strict=True):
             self._count(leg, applied)
+
+    def _journal(self, leg: Leg) -> list[Record] | None:
+        """The list that receives the batches of one of several hulls; None where the storage keeps none."""
+        return leg.records
+
+    def _left(self, hull: Hull) -> None:
+        """Called where points have left one of several hulls before its batch."""
 
     def _read_together(self, request: ReadTogether) -> object:
         legs = {leg.name: leg for leg in self.legs}
@@ -226,6 +236,17 @@ class Trip:
         self.applied |= expired > 0
         leg.unsaved += expired
         return expired
+
+    def _recenter(self, request: Recenter, leg: Leg) -> tuple[Counts, bool]:
+        hull = leg.after
+        if hull is None:
+            raise HullNotFoundError(leg.name)
+        try:
+            hull_changed = hull.state.recenter(request.center, leg.records)
+        except MisfitError as misfit:
+            raise HullUnsuitableError(leg.name, str(misfit), field=misfit.field) from None
+        self.applied = True
+        return hull.state.counts, hull_changed
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
         place, birth = self.place, request.birth

@@ -16,12 +16,13 @@ from ..state.fences.records import (
     Inside,
     KeptFence,
     PutConsumer,
+    PutDelays,
 )
 from ..state.records import Append, Create, Delete, HullRow, Kept, Record
 from .port import NEWEST, Contents, DamagedError, NotCommittedError, Progress, Step
 
 KEPT_SNAPSHOTS = 2
-FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | DropEvents | PutConsumer | DropConsumer
+FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | PutDelays | DropEvents | PutConsumer | DropConsumer
 
 
 @dataclass(slots=True)
@@ -126,7 +127,7 @@ class MemoryStorage:
             if not self.keeps:
                 raise DamagedError(f"who is inside of {fence.row.name} was not kept")
             events = [event for event in fence.events if event.sequence > fence.inside.sequence]
-            return replace(fence, events=events, consumers=dict(fence.consumers))
+            return replace(fence, events=events, consumers=dict(fence.consumers), delays=dict(fence.delays))
 
     def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
         """Events of a fence."""
@@ -232,7 +233,7 @@ class MemoryStorage:
                 del self._fences[change.number]
             case ChangeFence():
                 self._fences[change.row.number].row = change.row
-            case AppendEvents() | DropEvents() | PutConsumer() | DropConsumer():
+            case AppendEvents() | PutDelays() | DropEvents() | PutConsumer() | DropConsumer():
                 self._change(self._fences[change.number], change)
 
     def _append(self, change: Append) -> None:
@@ -240,14 +241,24 @@ class MemoryStorage:
         hull.last = change.records[-1].revision
         hull.records += change.records
 
-    def _change(self, fence: KeptFence, change: AppendEvents | DropEvents | PutConsumer | DropConsumer) -> None:
+    def _change(
+        self, fence: KeptFence, change: AppendEvents | PutDelays | DropEvents | PutConsumer | DropConsumer
+    ) -> None:
         match change:
             case AppendEvents():
                 fence.events += change.events
+            case PutDelays():
+                for subject, delay in change.delays.items():
+                    if delay is None:
+                        fence.delays.pop(subject, None)
+                    else:
+                        fence.delays[subject] = delay
             case DropEvents():
                 dropped = max(self._boundary(fence, change.first) - fence.first, 0)
                 del fence.events[:dropped]
                 fence.first += dropped
+                if not self.keeps:  # nobody asks who is inside, but later events follow this one
+                    fence.inside = Inside(fence.first - 1)
             case PutConsumer():
                 fence.consumers[change.consumer.name] = change.consumer
             case DropConsumer():

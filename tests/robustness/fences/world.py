@@ -1,26 +1,27 @@
 """A model of hulls with keys and of fences, and random requests to them."""
 
 import random
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from judge import Disk, Point, Rings, Shape, apart, exact, halves, hull, shape_of_hull
+from sides import Disk, Point, Rings, Shape, apart, hull, shape_of_hull
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Batch, KeyedBatch
 from dynhull_server.state.events import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
-from dynhull_server.state.fences.requests import CreateFence, DeleteFence, PutConsumer, ReplaceFence
-from dynhull_server.state.records import HullSettings
+from dynhull_server.state.fences.requests import CreateFence, DeleteFence, PassTime, PutConsumer, ReplaceFence
+from dynhull_server.state.records import NO_TIME, HullSettings
 
 KEYED, ZONE = ("k/a", "k/b", "k/c"), "zone"
 GUEST = "k/c"  # it comes and goes
 HULLS = (*KEYED, ZONE)
 KEYS = [f"é{i}" for i in range(8)]
-FENCES = ["f0", "f1", "f2"]
+FENCES = ["f0", "f1", "f2", "f3", "f4"]
 TICK = 100_000
 NONE = np.empty((0, 2))
 NO_KEYS = PackedKeys(b"", b"")
@@ -32,6 +33,19 @@ SHAPES = [
 ]
 
 Positions = dict[str, dict[str, Point]]
+Subject = tuple[str, str]
+
+
+def halves(length: float) -> int:
+    """A length in halves: all coordinates and lengths are multiples of a half."""
+    doubled = int(2 * length)
+    assert doubled == 2 * length
+    return doubled
+
+
+def exact(xy: Iterable[float]) -> Point:
+    x, y = xy
+    return halves(x), halves(y)
 
 
 @cache
@@ -43,11 +57,26 @@ def fixed_shape(area: CircleArea | PolygonArea) -> Shape:
 
 
 @dataclass
+class Delayed:
+    """A change of side that is no event yet."""
+
+    since: int
+    reports: int
+    cause: int
+
+
+@dataclass
 class FenceModel:
-    """A fence: its settings, who is inside, and its events."""
+    """A fence: its settings, who is inside as its events say and by its area alone, and its events."""
 
     config: FenceConfig
-    inside: set[tuple[str, str]] = field(default_factory=set)
+    uid: str
+    inside: set[Subject] = field(default_factory=set)
+    beyond: set[Subject] = field(default_factory=set)
+    delays: dict[Subject, Delayed] = field(default_factory=dict)
+    stays: dict[Subject, int] = field(default_factory=dict)  # since when who has not made a dwell event
+    told: set[Subject] = field(default_factory=set)  # in the present trip
+    time: int = NO_TIME
     near: bool = False
     events: list[FenceEvent] = field(default_factory=list)
     last: int = 0
@@ -65,6 +94,7 @@ class World:
         self.zone: list[Point] = []
         self.revisions = dict.fromkeys(HULLS, 0)
         self.fences: dict[str, FenceModel] = {}
+        self.time = 0  # of the present request
 
     # Areas
 
@@ -79,7 +109,13 @@ class World:
 
     # Changes, each with the events that follow from it
 
+    def trip(self) -> None:
+        """Requests follow that are committed together."""
+        for fence in self.fences.values():
+            fence.told.clear()
+
     def committed(self, request: Any) -> None:
+        self.time = request.parts[0].arrived if isinstance(request, WriteTogether) else _time_of(request)
         match request:
             case WriteBatch():
                 self._write([request])
@@ -89,7 +125,7 @@ class World:
                 if request.result:
                     before = self._now()
                     self._expire(request.name, request.time)
-                    self._judge(before, Cause.EXPIRED)
+                    self._judge(before)
             case CreateHull():
                 self._come(request.name)
             case DeleteHull():
@@ -100,6 +136,9 @@ class World:
                 self._replace(request)
             case DeleteFence():
                 del self.fences[request.name]
+            case PassTime():
+                if self.fences[request.name].uid == request.fence.row.uid:
+                    self._pass_time(request.name)
             case PutConsumer():
                 fence = self.fences[request.name]
                 known = fence.consumers.get(request.consumer, 0)
@@ -107,15 +146,19 @@ class World:
 
     def _write(self, parts: list[WriteBatch], *, together: bool = False) -> None:
         before = self._now()
+        removed: dict[str, set[str]] = {}
         for part in parts:
             if self._ends(part):
                 self._expire(part.name, part.arrived)
                 if not together:
-                    self._judge(before, Cause.EXPIRED)
+                    self._judge(before)
                     before = self._now()
         for part in parts:
+            batch = part.make()
+            if isinstance(batch, KeyedBatch):  # who has expired is not removed
+                removed[part.name] = set(batch.removes) & self.positions[part.name].keys()
             self._apply(part)
-        self._judge(before, Cause.REMOVED)  # of several hulls together, those whose time has come too
+        self._judge(before, removed, {part.name: _put(part) for part in parts})
 
     def _come(self, name: str) -> None:
         self.there.add(name)
@@ -128,8 +171,9 @@ class World:
         for fence in self.fences.values():
             left = sorted((key for subject, key in fence.inside if subject == name), key=str.encode)
             for key in left:
-                fence.inside.remove((name, key))
                 self._tell(fence, EventType.EXIT, (name, key), keys[key], None, int(Cause.REMOVED))
+            fence.beyond = {each for each in fence.beyond if each[0] != name}
+            fence.delays = {each: delay for each, delay in fence.delays.items() if each[0] != name}
 
     def subjects(self, config: FenceConfig) -> list[str]:
         return [name for name in KEYED if name in self.there and config.compares(name)]
@@ -178,8 +222,13 @@ class World:
         positions = {name: dict(keys) for name, keys in self.positions.items()}
         return positions, {name: self.shape(fence.config) for name, fence in self.fences.items()}
 
-    def _judge(self, before: tuple[Positions, dict[str, Shape]], gone: Cause) -> None:
-        """Make the events of the difference between two states."""
+    def _judge(
+        self,
+        before: tuple[Positions, dict[str, Shape]],
+        removed: dict[str, set[str]] | None = None,
+        put: dict[str, set[str]] | None = None,
+    ) -> None:
+        """Make the events of the difference between two states, given which keys were removed, and which put."""
         places, shapes = before
         for name, fence in self.fences.items():
             if fence.config.kind == "other":
@@ -188,17 +237,18 @@ class World:
             area = self.shape(fence.config) != shapes[name]
             for subject in self.subjects(fence.config):
                 was, now = places[subject], self.positions[subject]
-                if not area and was == now:
-                    continue
+                reports = (put or {}).get(subject, set())
                 for key in sorted(was.keys() | now.keys(), key=str.encode):
                     cause = Cause(0)
                     if key not in was:
                         cause = Cause.APPEARED
                     elif key not in now:
-                        cause = gone
+                        cause = Cause.REMOVED if key in (removed or {}).get(subject, ()) else Cause.EXPIRED
                     elif was[key] != now[key]:
                         cause = Cause.MOVED
-                    self._look(fence, (subject, key), was.get(key), now.get(key), int(cause), area=area)
+                    if area or was != now or key in reports:
+                        own = key in reports
+                        self._look(fence, (subject, key), was.get(key), now.get(key), int(cause), area=area, own=own)
 
     def _look_at_pair(self, fence: FenceModel, cause: int) -> None:
         if self.near(fence.config) != fence.near:
@@ -215,8 +265,9 @@ class World:
         cause: int,
         *,
         area: bool,
+        own: bool,
     ) -> None:
-        config, inside = fence.config, subject in fence.inside
+        config, inside = fence.config, subject in fence.beyond
         shape = self.shape(config, subject[1])
         if now is None:
             after = False
@@ -224,15 +275,57 @@ class World:
             after = not shape.farther(now, halves(config.margin), closed=config.closed)
         else:
             after = shape.holds(now, closed=config.closed)
+        (fence.beyond.add if after else fence.beyond.discard)(subject)
         kind = None
-        if after != inside:
+        if now is None and subject in fence.delays:
+            self._drop(fence, subject, cause)
+        elif (config.delays or subject in fence.delays) and after != inside and now is not None:
+            self._turn(fence, subject, cause | (Cause.AREA if area else 0))
+        elif after != inside:
             kind = EventType.ENTER if after else EventType.EXIT
+        elif subject in fence.delays:
+            pass
         elif config.crosses and not inside and was is not None and now is not None and was != now:
             kind = EventType.CROSS if shape.passed(was, now) else None
-        if kind is None:
+        if kind is not None:
+            self._tell(fence, kind, subject, was, now, cause | (Cause.AREA if area else 0))
+        if own and subject in fence.delays and fence.delays[subject].reports < config.confirmations:
+            fence.delays[subject].reports += 1
+            self._end(fence, subject, 0)
+
+    def _turn(self, fence: FenceModel, subject: Subject, cause: int) -> None:
+        """A subject has changed its side; on the one that the events say, it is back."""
+        if fence.delays.pop(subject, None) is None:
+            fence.time = max(fence.time, self.time)
+            fence.delays[subject] = Delayed(fence.time, 0, cause)
+
+    def _drop(self, fence: FenceModel, subject: Subject, cause: int) -> None:
+        """A subject is gone before its change of side was an event."""
+        del fence.delays[subject]
+        if subject in fence.inside:
+            self._tell(fence, EventType.EXIT, subject, None, None, cause)
+
+    def _end(self, fence: FenceModel, subject: Subject, more: int) -> None:
+        """Make the event of a change of side if nothing is missing any more."""
+        delay, config, time = fence.delays.get(subject), fence.config, max(fence.time, self.time)
+        if delay is None or delay.reports < config.confirmations or time - delay.since < config.min_dwell:
             return
-        (fence.inside.add if after else fence.inside.discard)(subject)
-        self._tell(fence, kind, subject, was, now, cause | (Cause.AREA if area else 0))
+        del fence.delays[subject]
+        kind = EventType.EXIT if subject in fence.inside else EventType.ENTER
+        place = self.positions[subject[0]][subject[1]]
+        self._tell(fence, kind, subject, None, place, delay.cause | more, first=delay.since)
+
+    def _pass_time(self, name: str) -> None:
+        fence = self.fences[name]
+        if fence.config.min_dwell:
+            for subject in sorted(fence.delays, key=_in_order):
+                if self.time - fence.delays[subject].since >= fence.config.min_dwell:
+                    self._end(fence, subject, int(Cause.TIME))
+        if fence.config.dwell:
+            for subject, since in sorted(fence.stays.items(), key=lambda each: _in_order(each[0])):
+                if self.time - since >= fence.config.dwell and subject not in fence.told:
+                    place = self.positions[subject[0]][subject[1]]
+                    self._tell(fence, EventType.DWELL, subject, None, place, int(Cause.TIME), first=since)
 
     def _tell(
         self,
@@ -242,10 +335,14 @@ class World:
         was: Point | None,
         now: Point | None,
         cause: int,
+        first: int = NO_TIME,
     ) -> None:
         area = fence.config.area_hull
         name, key = subject or ("", None)
         fence.last += 1
+        fence.time = max(fence.time, self.time)
+        if key is not None:
+            self._follow(fence, kind, (name, key))
         fence.events.append(
             FenceEvent(
                 fence.last,
@@ -257,15 +354,31 @@ class World:
                 self.revisions[area] if area else 0,
                 None if now is None else (now[0] / 2, now[1] / 2),
                 None if was is None else (was[0] / 2, was[1] / 2),
-                None,
-                0,
-                0,
+                None if now is None else self._rounded_distance(fence.config, key, now),
+                NO_TIME,
+                fence.time,
+                first,
             )
         )
 
+    def _follow(self, fence: FenceModel, kind: EventType, subject: Subject) -> None:
+        fence.told.add(subject)
+        if kind is EventType.ENTER:
+            fence.inside.add(subject)
+            fence.stays[subject] = fence.time
+        elif kind is EventType.EXIT:
+            fence.inside.remove(subject)
+            fence.stays.pop(subject, None)
+        elif kind is EventType.DWELL:
+            del fence.stays[subject]
+
+    def _rounded_distance(self, config: FenceConfig, key: str | None, place: Point) -> float:
+        return self.shape(config, key).distance(place, closed=config.closed)
+
     def _create(self, request: CreateFence) -> None:
         config = request.config
-        fence = self.fences[request.name] = FenceModel(config)
+        fence = self.fences[request.name] = FenceModel(config, request.birth.uid)
+        fence.time = self.time if config.dwell else NO_TIME
         told = config.initial == "events"
         if config.kind == "other":
             fence.near = self.near(config)
@@ -274,9 +387,11 @@ class World:
         for name in self.subjects(config):
             for key, place in sorted(self.positions[name].items(), key=lambda each: each[0].encode()):
                 if self.shape(config, key).holds(place, closed=config.closed):
-                    fence.inside.add((name, key))
+                    fence.beyond.add((name, key))
                     if told:
                         self._tell(fence, EventType.ENTER, (name, key), None, place, int(Cause.CREATED))
+                    fence.inside.add((name, key))
+                    fence.stays[name, key] = self.time
         if config.initial == "snapshot":
             self._tell(fence, EventType.SNAPSHOT, None, None, None, int(Cause.CREATED))
 
@@ -284,19 +399,44 @@ class World:
         fence = self.fences[request.name]
         if fence.config == request.config:
             return
+        anew = fence.config.dwell != request.config.dwell
+        if anew and request.config.dwell:
+            fence.time = max(fence.time, self.time)
         fence.config = request.config
         if fence.config.kind == "other":
             self._look_at_pair(fence, int(Cause.CHANGED))
         for name in self.subjects(fence.config):
             for key, place in sorted(self.positions[name].items(), key=lambda each: each[0].encode()):
-                self._look(fence, (name, key), place, place, int(Cause.CHANGED), area=False)
+                self._look_again(fence, (name, key), place)
+        for subject in sorted(fence.delays, key=_in_order):
+            self._end(fence, subject, int(Cause.CHANGED))
+        if anew:
+            fence.stays = dict.fromkeys(fence.inside, fence.time)
+
+    def _look_again(self, fence: FenceModel, subject: Subject, place: Point) -> None:
+        self._look(fence, subject, place, place, int(Cause.CHANGED), area=False, own=False)
+
+
+def _time_of(request: Any) -> int:
+    time: int = getattr(request, "arrived" if isinstance(request, WriteBatch) else "time", 0)
+    return time
+
+
+def _in_order(subject: Subject) -> tuple[str, bytes]:
+    return subject[0], subject[1].encode()
+
+
+def _put(part: WriteBatch) -> set[str]:
+    batch = part.make()
+    return set(batch.keys) if isinstance(batch, KeyedBatch) else set()
 
 
 class Chance:
     """Draws requests."""
 
-    def __init__(self, rng: random.Random, world: World) -> None:
+    def __init__(self, rng: random.Random, world: World, *, rules: bool = False) -> None:
         self._rng = rng
+        self._rules = rules  # whether fences wait: for reports, or for the time that `PassTime` says
         self._world = world
         self._births = 0
 
@@ -361,7 +501,23 @@ class Chance:
         if isinstance(area, HullArea) and area.without_self:
             closed, margin = True, margin or 0.5
         crosses = closed and not isinstance(area, HullArea) and rng.random() < 0.5
-        return FenceConfig(area, kind, subjects, closed, margin, initial=initial, crosses=crosses)
+        dwell, confirmations, min_dwell = 0, 0, 0
+        if self._rules and rng.random() < 0.5:
+            dwell = rng.choice([0, TICK, 4 * TICK])
+            confirmations = rng.choice([0, 0, 2, 3])
+            min_dwell = rng.choice([0, 0, TICK, 3 * TICK])
+        return FenceConfig(
+            area,
+            kind,
+            subjects,
+            closed,
+            margin,
+            initial=initial,
+            crosses=crosses,
+            dwell=dwell,
+            confirmations=confirmations,
+            min_dwell=min_dwell,
+        )
 
     def _area(self, chosen: str, subjects: str) -> Any:
         rng = self._rng
@@ -376,6 +532,20 @@ class Chance:
         rings = tuple(np.array(ring, "<f8").tobytes() for ring in rng.choice(SHAPES))
         more = ((np.array([[9, 9], [11, 9], [9, 11]], "<f8").tobytes(),),) if rng.random() < 0.3 else ()
         return PolygonArea((rings, *more))
+
+    def burst(self, time: int, to: Any) -> list[Any]:
+        """Requests to create fences around the same hulls, or to delete fences, all at once; some of them twice."""
+        names = self._rng.choices(FENCES, k=self._rng.randrange(2, 6))
+        if self._rng.random() < 0.5:
+            return [DeleteFence(to, name, time) for name in names]
+        config = self.config()
+        margins = self._rng.choices([0.0, 1.0], k=len(names)) if config.kind == "hull" else [config.margin] * len(names)
+        if isinstance(config.area, HullArea):
+            margins = [config.margin] * len(names)
+        return [
+            CreateFence(to, name, time, replace(config, margin=margin), self.birth())
+            for name, margin in zip(names, margins, strict=True)
+        ]
 
     def of_fences(self, time: int, to: Any) -> Any:
         rng = self._rng

@@ -20,6 +20,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 IN_FLIGHT = 12
+SEVERAL = 5  # batches in a message, at most
 BREATH = 0.004  # seconds between the batches or calls of an actor, which leave the processor to the others
 PATIENCE = 60.0  # seconds, for anything to happen at all
 # What a client gets when a server dies, stalls, or is cut off; all of it may be tried again.
@@ -86,7 +87,12 @@ def persist(method: Callable[..., Any], request: Any) -> Any:
 
 
 class Writer(Actor):
-    """Numbers its batches, each to all of `hulls`; `batches` holds every batch it has sent, in order."""
+    """Numbers its batches, each to all of `hulls`; `batches` holds every batch it has sent, in order.
+
+    With a `stride` the numbers skip: only each so many is used.
+    """
+
+    stride = 1
 
     def __init__(self, shared: Shared, name: str, hulls: tuple[str, ...]) -> None:
         super().__init__(shared, name)
@@ -104,7 +110,8 @@ class Writer(Actor):
         # Read one after the other: what the first has, the others have, too.
         numbers = [last_sequence(stub, hull, self.name) for hull in self.hulls]
         require(numbers == sorted(numbers), f"{self.name}: a batch is only in some of {self.hulls}: {numbers}")
-        last = numbers[-1]
+        require(not numbers[-1] % self.stride, f"{self.name}: number {numbers[-1]} was never sent")
+        last = numbers[-1] // self.stride
         require(last >= self.acknowledged, f"{self.name}: batch {self.acknowledged} was acknowledged and is lost")
         require(last <= len(self.batches), f"{self.name}: batch {last} was never sent")
         while self.acknowledged < last:
@@ -129,30 +136,48 @@ def last_sequence(stub: HullServiceStub, hull: str, producer: str) -> int:
 
 
 class Streamer(Writer):
-    """Keeps a few batches under way, in a stream to one hull."""
+    """Keeps a few batches under way, in a stream to one hull; with `several`, a few in each message."""
 
+    several = False
     _revision = 0
 
     def write(self, stub: HullServiceStub) -> None:
         room = threading.Semaphore(IN_FLIGHT)
-        for response in stub.Stream(self._requests(self.acknowledged, room), timeout=30):
-            room.release()
-            self.acknowledge(response.result)
-            require(response.sequence == self.acknowledged, f"{self.name}: acknowledged out of order")
-            require(response.result.revision > self._revision, f"{self.name}: a revision was given twice")
-            self._revision = response.result.revision
+        announced = threading.Event()
+        for response in stub.Stream(self._requests(self.acknowledged, room, announced), timeout=30):
+            if response.max_batches:
+                announced.set()
+                continue
+            for each in response.results if self.several else [response]:
+                room.release()
+                self.acknowledge(each.result)
+                require(each.sequence == self.acknowledged * self.stride, f"{self.name}: acknowledged out of order")
+                require(each.result.revision > self._revision, f"{self.name}: a revision was given twice")
+                self._revision = each.result.revision
 
-    def _requests(self, sequence: int, room: threading.Semaphore) -> Iterator[pb.StreamRequest]:
-        yield pb.StreamRequest(name=self.hulls[0], producer=self.name)
+    def _requests(self, sent: int, room: threading.Semaphore, announced: threading.Event) -> Iterator[pb.StreamRequest]:
+        may_skip = self.stride > 1
+        yield pb.StreamRequest(name=self.hulls[0], producer=self.name, accept_results=self.several, may_skip=may_skip)
+        if self.several and not announced.wait(10):
+            return
         while True:
-            if not room.acquire(timeout=10):
+            numbered = []
+            for _ in range(1 + sent % SEVERAL if self.several else 1):
+                if not room.acquire(timeout=0 if numbered else 10):
+                    break
+                if sent == len(self.batches):
+                    if not self.shared.gate.is_set():
+                        break
+                    self.batches.append(self.create_batch())
+                sent += 1
+                batch = self.encode(self.batches[sent - 1])
+                numbered.append(pb.NumberedBatch(batch=batch, sequence=sent * self.stride))
+            if not numbered:
                 return
-            sequence += 1
-            if sequence > len(self.batches):
-                if not self.shared.gate.is_set():
-                    return
-                self.batches.append(self.create_batch())
-            yield pb.StreamRequest(batch=self.encode(self.batches[sequence - 1]), sequence=sequence)
+            if self.several:
+                yield pb.StreamRequest(batches=numbered)
+            else:
+                yield pb.StreamRequest(batch=numbered[0].batch, sequence=numbered[0].sequence)
 
     def encode(self, batch: Any) -> batch_pb2.Batch:
         raise NotImplementedError
@@ -163,6 +188,8 @@ class PointWriter(Streamer):
 
     def __init__(self, shared: Shared, number: int, hull: str, seed: int) -> None:
         super().__init__(shared, f"writer-{number}", (hull,))
+        self.several = number % 2 > 0
+        self.stride = 3 if number % 4 == 1 else 1
         self._random = np.random.default_rng(seed)
         self._own: list[tuple[float, float]] = []
 

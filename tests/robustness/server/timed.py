@@ -30,6 +30,8 @@ def wall() -> int:
 class TimedWriter(Streamer):
     """Writes to a hull of its own, and compares what each acknowledgement says with the model."""
 
+    several = True
+
     def __init__(self, shared: Shared, kind: Kind, seed: int) -> None:
         super().__init__(shared, f"writer-of-{kind.name}", (kind.name,))
         self.timelines = [Timeline(kind, self.batches, 0)]
@@ -212,7 +214,7 @@ class ModelledHull:
         require(right, f"{self.watcher.name}: at revision {seen.revision} it is not the hull of batches {numbers}")
 
     def _is_outline(self, seen: Seen, entities: dict[Key, Entity]) -> bool:
-        vertices, keys = outline(entities)
+        vertices, keys = outline(self.kind, entities)
         named = not self.kind.keyed or seen.keys == keys
         return seen.points == len(entities) and np.array_equal(seen.vertices, vertices) and named
 

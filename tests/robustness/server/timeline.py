@@ -26,6 +26,7 @@ STRINGS, INTEGERS = hull_pb2.IDENTITY_STRING_KEYS, hull_pb2.IDENTITY_INTEGER_KEY
 POINTS = hull_pb2.IDENTITY_MULTISET
 DATA, SERVER = hull_pb2.CLOCK_DATA, hull_pb2.CLOCK_SERVER
 KEYS = 300
+MIDDLE = 180.0, 10.0  # of the places on the globe
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,7 @@ class Kind:
     max_age: int = 0
     max_points: int = 0
     deadlines: bool = False
+    geographic: bool = False
 
     @property
     def keyed(self) -> bool:
@@ -50,6 +52,8 @@ class Kind:
 
     def config(self) -> hull_pb2.HullConfig:
         config = hull_pb2.HullConfig(identity=self.identity)
+        if self.geographic:
+            config.frame = hull_pb2.FRAME_GEOGRAPHIC
         if self.clock:
             config.window.clock, config.window.max_points = self.clock, self.max_points
             config.window.max_age.FromMicroseconds(self.max_age)
@@ -64,6 +68,8 @@ TIMED = [
     Kind("timed/data-points", POINTS, clock=DATA, max_age=3 * SECOND, max_points=200),
     Kind("timed/server", INTEGERS, clock=SERVER, max_age=3 * SECOND // 2, deadlines=True),
     Kind("timed/server-points", POINTS, clock=SERVER, max_age=6 * SECOND // 5),
+    Kind("globe/deadlines", STRINGS, deadlines=True, geographic=True),
+    Kind("globe/data-points", POINTS, clock=DATA, max_age=3 * SECOND, max_points=200, geographic=True),
 ]
 FLEETS = [Kind(f"fleet/{each}", INTEGERS, timed=False) for each in "ab"]
 
@@ -136,13 +142,20 @@ class Timeline:
         return Contents(self.kind, entities)
 
 
-def outline(entities: dict[Key, Entity]) -> tuple[np.ndarray, tuple[Key, ...]]:
-    """The vertices, and the least key at each."""
+def outline(kind: Kind, entities: dict[Key, Entity]) -> tuple[np.ndarray, tuple[Key, ...]]:
+    """The vertices, and the least key at each.
+
+    On the globe they are the same about every centre, because no three random places are within nanometres of a line.
+    """
     names: dict[tuple[float, float], Key] = {}
     for key, each in entities.items():
         place = each.x, each.y
         names[place] = min(key, names.get(place, key), key=_order)
-    vertices = dynhull.static.monotone_chain(np.array(sorted(names), dtype=float).reshape(-1, 2))
+    points = np.array(sorted(names), dtype=float).reshape(-1, 2)
+    if kind.geographic:
+        vertices = dynhull.GeoHull(points, center=MIDDLE).vertices()
+    else:
+        vertices = dynhull.static.monotone_chain(points)
     return vertices, tuple(names[place] for place in map(tuple, vertices.tolist()))
 
 
@@ -178,11 +191,21 @@ def draw(rng: np.random.Generator, sent: Contents, now: int) -> Change:
 def _place(rng: np.random.Generator, kind: Kind) -> tuple[Key, float, float]:
     """A key, of which there are few, and a place; places on a grid have several keys."""
     x, y = rng.normal(size=2).tolist()
+    if kind.keyed:
+        x, y = round(x, 1) + 0.0, round(y, 1) + 0.0
+    if kind.geographic:
+        x, y = _on_globe(x, y)
     if not kind.keyed:
         return (x, y), x, y
     number = int(rng.integers(KEYS))
     key = f"entité {number}" if kind.identity == STRINGS else number
-    return key, round(x, 1) + 0.0, round(y, 1) + 0.0
+    return key, x, y
+
+
+def _on_globe(x: float, y: float) -> tuple[float, float]:
+    """A longitude and a latitude around the antimeridian; a grid becomes one without rows along great circles."""
+    lon = MIDDLE[0] + 9 * x + 2.3 * y + 0.37 * x * y
+    return lon - 360 * (x > y), MIDDLE[1] + 8 * y + 0.21 * x * x
 
 
 def encode(kind: Kind, change: Change) -> batch_pb2.Batch:

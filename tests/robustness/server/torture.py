@@ -282,7 +282,7 @@ class Torture:
         """It must hold whole batches, the first n of each writer; returns n for each writer."""
         last = {}
         for writer in self.writers:
-            numbers = {last_sequence(stub, hull, writer.name) for hull in writer.hulls}
+            numbers = {last_sequence(stub, hull, writer.name) // writer.stride for hull in writer.hulls}
             require(len(numbers) == 1, f"{where}: a batch of {writer.name} is only in some of {writer.hulls}")
             last[writer.name] = numbers.pop()
         points, revision = self._points(last)

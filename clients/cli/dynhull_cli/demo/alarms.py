@@ -1,14 +1,12 @@
 """Follows the fences of a scene, and compares each event with a recomputation from scratch."""
 
-import threading
-from time import monotonic
+from collections import deque
 
 from dynhull_client import Batch, Circle, FenceEvent, HullClient
 
 from .fences import Circled, Happening, Rivals, members
+from .follower import Follower
 from .scene import Frame, Scene
-
-PATIENCE = 30.0  # seconds to wait for an event; later, it counts as missing
 
 
 class Alarms:
@@ -30,15 +28,15 @@ class Alarms:
         for name, (x, y, radius) in scene.circles.items():
             circle = Circle(x, y, radius)
             client.create_fence(name, circle, self._hull, initial="none")
-            self._oracles[name] = Circled(circle)
+            self._oracles[name] = Circled(circle, scene.center)
         if scene.rivals:
             first, second = (self.hull_of(group) for group in scene.rivals)
             for hull in (first, second):
-                client.create_hull(hull, keyed="str")
+                client.create_hull(hull, keyed="str", geographic=scene.center is not None, center=scene.center)
             name = " and ".join(scene.rivals).replace(" ", "-")
             client.create_fence(name, first, other_hull=second, initial="none")
-            self._oracles[name] = Rivals(scene.rivals)
-        self._followers = {name: Follower(client, name) for name in self._oracles}
+            self._oracles[name] = Rivals(scene.rivals, scene.center)
+        self._alarms = {name: Alarm(client, name) for name in self._oracles}
 
     def hull_of(self, group: str) -> str:
         """The name of the hull of a group."""
@@ -61,7 +59,7 @@ class Alarms:
             expected = oracle.expected(frame)
             self.expected += len(expected)
             for event in expected:
-                found = self._followers[name].next()
+                found = self._alarms[name].next()
                 if found is None:
                     return seen, f"{name}: the event {event} is missing"
                 seen.append(found)
@@ -73,19 +71,19 @@ class Alarms:
     def surplus(self) -> str | None:
         """An event that nobody expected; None if there is none."""
         for name in self._oracles:
-            last, taken = self._client.get_fence(name).last_sequence, self._followers[name].taken
+            last, taken = self._client.get_fence(name).last_sequence, self._alarms[name].taken
             if last != taken:
                 return f"{name}: the fence has {last} events, {taken} were expected"
         return None
 
     def stop(self) -> None:
         """End the subscriptions."""
-        for follower in self._followers.values():
-            follower.stop()
+        for alarm in self._alarms.values():
+            alarm.stop()
 
 
-class Follower:
-    """The events of one fence, read by a thread.
+class Alarm:
+    """The events of one fence.
 
     Attributes:
         taken: the number of events taken by `next`.
@@ -93,40 +91,18 @@ class Follower:
 
     def __init__(self, client: HullClient, name: str) -> None:
         self.taken = 0
-        self._arrived = threading.Condition()
-        self._events: list[FenceEvent] = []
-        self._failure: Exception | None = None
-        self._watch = client.watch_fence(name, after=0)
-        self._thread = threading.Thread(target=self._follow, name=f"fence {name}", daemon=True)
-        self._thread.start()
-
-    def _follow(self) -> None:
-        try:
-            for event in self._watch:
-                with self._arrived:
-                    self._events.append(event)
-                    self._arrived.notify_all()
-        except Exception as failure:  # raised in the thread that waits for the events
-            with self._arrived:
-                self._failure = failure
-                self._arrived.notify_all()
+        self._events: deque[FenceEvent] = deque()
+        self._follower = Follower(f"fence {name}", client.watch_fence(name, after=0), self._events.append)
 
     def next(self) -> FenceEvent | None:
         """The next event; None if it does not come in time."""
-        deadline = monotonic() + PATIENCE
-        with self._arrived:
-            while len(self._events) == self.taken:
-                if self._failure:
-                    raise self._failure
-                if not self._arrived.wait(deadline - monotonic()) and monotonic() >= deadline:
-                    return None
-            self.taken += 1
-            return self._events[self.taken - 1]
+        event = self._follower.wait(lambda: self._events.popleft() if self._events else None)
+        self.taken += event is not None
+        return event
 
     def stop(self) -> None:
         """End the subscription."""
-        self._watch.close()
-        self._thread.join()
+        self._follower.stop()
 
 
 def _happening(event: FenceEvent) -> Happening:

@@ -7,13 +7,17 @@ from typing import Literal
 
 import numpy as np
 
-from dynhull import DynamicHull, convex_hull, orient2d
+from dynhull import DynamicHull, GeoHull, convex_hull, orient2d
+from dynhull.globe import Gnomonic
 from dynhull_client import Circle
 
 from .scene import Frame, Points
 
 # Within this share of the radius, floating point might err about the side of a circle; it decides the rest.
 UNSURE = 1e-6
+# On the globe a circle is a polygon, whose edges are within this share of the radius.
+SAGITTA = 1e-5
+CORNERS = 720
 
 Position = tuple[float, float]
 
@@ -30,9 +34,10 @@ class Happening:
 
 
 class Circled:
-    """The expected events of a fence around a circle."""
+    """The expected events of a fence around a circle; on the globe if there is a centre of projection."""
 
-    def __init__(self, circle: Circle) -> None:
+    def __init__(self, circle: Circle, center: Position | None) -> None:
+        self._holds = self._in_plane if center is None else _OnGlobe(circle, center).holds
         self._circle = circle
         self._before: dict[str, Position] = {}
         self._inside: set[str] = set()
@@ -52,7 +57,7 @@ class Circled:
         self._before, self._inside = now, inside
         return events
 
-    def _holds(self, position: Position) -> bool:
+    def _in_plane(self, position: Position) -> bool:
         circle = self._circle
         dx, dy = position[0] - circle.x, position[1] - circle.y
         away = float(np.hypot(dx, dy)) - circle.r
@@ -62,16 +67,40 @@ class Circled:
         return (exact[0] - exact[2]) ** 2 + (exact[1] - exact[3]) ** 2 <= exact[4] ** 2
 
 
+class _OnGlobe:
+    """A circle of metres: the polygon of great circles between places at its radius, every half degree of azimuth."""
+
+    def __init__(self, circle: Circle, center: Position) -> None:
+        from pyproj import Geod
+
+        self._geod = Geod(ellps="WGS84")
+        self._circle = circle
+        ones = np.ones(CORNERS)
+        azimuths = -np.linspace(0, 360, CORNERS, endpoint=False)
+        lon, lat, _ = self._geod.fwd(circle.x * ones, circle.y * ones, azimuths, circle.r * ones)
+        self._polygon = GeoHull(np.column_stack([lon, lat]), center)
+
+    def holds(self, position: Position) -> bool:
+        """Whether a position is inside; the distance decides, unless the position is near the edges of the polygon."""
+        _, _, metres = self._geod.inv(self._circle.x, self._circle.y, *position)
+        away = metres / self._circle.r - 1
+        if abs(away) > SAGITTA:
+            return bool(away < 0)
+        return bool(self._polygon.contains([position])[0])
+
+
 class Rivals:
     """The expected events of a fence between the hulls of two groups of points."""
 
-    def __init__(self, groups: tuple[str, str]) -> None:
+    def __init__(self, groups: tuple[str, str], center: Position | None) -> None:
         self._groups = groups
+        self._frame = None if center is None else Gnomonic(center)
         self._meet = False
 
     def expected(self, frame: Frame) -> list[Happening]:
         """The event of a frame, if there is one."""
-        first, second = (convex_hull(frame.positions[_rows(frame, group)]) for group in self._groups)
+        positions = frame.positions if self._frame is None else self._frame.project_all(frame.positions)
+        first, second = (convex_hull(positions[_rows(frame, group)]) for group in self._groups)
         before, self._meet = self._meet, _intersect(first, second)
         if before == self._meet:
             return []

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from pyproj import Geod, Transformer
+from pyproj import Geod
 
 from .scene import Frame, Points
 
@@ -26,16 +26,17 @@ MISSING_AIRPORTS = {
 
 # Busy destinations, whose surroundings are fenced.
 FENCED = "ATL", "LAX", "ORD"
-FENCE_RADIUS = 100.0  # km
+FENCE_RADIUS = 100_000.0  # metres
 # Airlines whose hulls meet and part several times on a day.
 RIVALS = "AA", "WN"
 
-# Lambert's equal-area projection about the middle of the flights: areas in it are areas on the ground.
-PROJECTION = "+proj=laea +lat_0=40 +lon_0=-95 +ellps=WGS84 +units=km"
+# The middle of the flights.
+CENTER = -95.0, 40.0
+SQUARE_KILOMETRE = 1e6  # square metres
 
 
 class Flights:
-    """Every flight in the air on one day, on the great circle between its airports, minute by minute.
+    """Every flight in the air on one day, on the geodesic between its airports, minute by minute.
 
     A flight starts at its departure (New York time) and takes its recorded air time: the data set has no time of
     taxiing. Flights that left the evening before are in the air at midnight.
@@ -51,6 +52,8 @@ class Flights:
     step = "minutes"
     length_unit = "km"
     area_unit = "km²"
+    area_scale = 1 / SQUARE_KILOMETRE
+    center: tuple[float, float] | None = CENTER
     rivals: tuple[str, str] | None = RIVALS
 
     def __init__(self, day: date, hours: int = HOURS) -> None:
@@ -78,14 +81,13 @@ class Flights:
         self._latitude, self._longitude = origin.T
         self._geod = Geod(ellps="WGS84")
         self._azimuth, _, self._distance = self._geod.inv(*origin.T[::-1], *destination.T[::-1])
-        self._project = Transformer.from_crs("EPSG:4326", PROJECTION, always_xy=True).transform
         fenced = airports.loc[list(FENCED)]
-        x, y = self._project(fenced["lon"], fenced["lat"])
         self.circles = {
-            f"near/{code}": (float(cx), float(cy), FENCE_RADIUS) for code, cx, cy in zip(FENCED, x, y, strict=True)
+            f"near/{code}": (float(lon), float(lat), FENCE_RADIUS)
+            for code, lon, lat in zip(FENCED, fenced["lon"], fenced["lat"], strict=True)
         }
         served = airports.loc[sorted(set(flights["origin"]) | set(flights["dest"]))]
-        self.background = np.stack(self._project(served["lon"], served["lat"]), axis=1)
+        self.background = served[["lon", "lat"]].to_numpy(float)
 
     def frames(self) -> Iterator[Frame]:
         """One frame per minute: every airborne flight is put where it is, and those that have landed are removed."""
@@ -115,7 +117,7 @@ class Flights:
         longitude, latitude, _ = self._geod.fwd(
             self._longitude[airborne], self._latitude[airborne], self._azimuth[airborne], flown
         )
-        return np.stack(self._project(longitude, latitude), axis=1)
+        return np.stack([longitude, latitude], axis=1)
 
 
 def _distinct(names: Iterable[str]) -> list[str]:

@@ -8,13 +8,14 @@ mpl.use("Agg")
 
 import numpy as np
 from matplotlib import pyplot as plt
-from matplotlib.patches import Circle
 
+from .map import drawing_of
 from .replay import Step
 from .scene import Scene
 
 HULL_COLOUR, POINT_COLOUR, GROUND_COLOUR = "#0072B2", "#D55E00", "#B8B8B8"
 FENCE_COLOUR = "#009E73"
+COAST_COLOUR = "#9A9A9A"
 TICK_COLOUR = "#707070"
 LABEL_OFFSET = 9  # typographic points, away from the hull
 FENCE_LABEL = 3  # typographic points, below the fence
@@ -26,29 +27,29 @@ MOST_LABELS = 24
 
 def draw(path: Path, scene: Scene, step: Step) -> None:
     """Write a PNG of one frame: background, points, hull, the corners' names."""
-    frame, vertices = step.frame, step.vertices
-    everything = np.concatenate([vertices, scene.background])
-    wide, high = np.ptp(everything, axis=0)
-    height = WIDTH * min(max(high / wide if wide else 1.0, FLATTEST), 1.0) + TITLE_HEIGHT
+    frame, drawing = step.frame, drawing_of(scene)
+    vertices, background = drawing.place(step.vertices), drawing.place(scene.background)
+    positions = drawing.place(frame.positions)
+    outline = drawing.line(step.vertices)
+    everything = np.concatenate([outline, background])
+    wide, tall = np.ptp(everything, axis=0)
+    height = WIDTH * min(max(tall / wide if wide else 1.0, FLATTEST), 1.0) + TITLE_HEIGHT
     figure, axes = plt.subplots(figsize=(WIDTH, height), dpi=130, layout="constrained")
+    for coast in drawing.coasts:
+        axes.plot(*coast.T, color=COAST_COLOUR, linewidth=0.8, zorder=0.5)
     axes.scatter(
-        scene.background[:, 0],
-        scene.background[:, 1],
-        s=8,
-        color=GROUND_COLOUR,
-        label="airports" if len(scene.background) else None,
+        background[:, 0], background[:, 1], s=8, color=GROUND_COLOUR, label="airports" if len(background) else None
     )
-    outline = np.concatenate([vertices, vertices[:1]])
     for name, (x, y, radius) in scene.circles.items():
-        axes.add_patch(Circle((x, y), radius, facecolor="none", edgecolor=FENCE_COLOUR, linewidth=1.2))
-        axes.annotate(
-            name, (x, y - radius), (0, -FENCE_LABEL), textcoords="offset points", ha="center", va="top", fontsize=8
-        )
+        circle = drawing.circle(x, y, radius)
+        axes.plot(*circle.T, color=FENCE_COLOUR, linewidth=1.2)
+        lowest = circle[circle[:, 1].argmin()]
+        axes.annotate(name, lowest, (0, -FENCE_LABEL), textcoords="offset points", ha="center", va="top", fontsize=8)
     axes.fill(*outline.T, facecolor=HULL_COLOUR, alpha=0.10)
     axes.plot(*outline.T, color=HULL_COLOUR, linewidth=1.6, label=f"convex hull, {len(vertices)} vertices")
     axes.scatter(
-        frame.positions[:, 0],
-        frame.positions[:, 1],
+        positions[:, 0],
+        positions[:, 1],
         s=12,
         color=POINT_COLOUR,
         label=f"{len(frame.positions):,} {scene.counted}",
@@ -66,8 +67,13 @@ def draw(path: Path, scene: Scene, step: Step) -> None:
     axes.set_title(
         f"{scene.title}, {frame.clock}: the hull at its largest, {step.area:,.0f} {scene.area_unit}", loc="left"
     )
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal", adjustable="box" if drawing.coasts else "datalim")
     axes.margins(MARGIN)
+    if drawing.coasts:  # which go on beyond the picture
+        low, high = everything.min(axis=0), everything.max(axis=0)
+        room = MARGIN * float((high - low).max())
+        axes.set_xlim(low[0] - room, high[0] + room)
+        axes.set_ylim(low[1] - room, high[1] + room)
     axes.set_xlabel(scene.length_unit, loc="right", color=TICK_COLOUR)
     axes.legend(loc="lower left", frameon=False)
     axes.tick_params(colors=TICK_COLOUR, labelsize=8)

@@ -1,20 +1,17 @@
 """Replays a scene through a server and compares three hulls after every frame."""
 
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
-from time import monotonic
 from typing import Literal
 
 import numpy as np
 
-from dynhull import convex_hull
+from dynhull import GeoHull, convex_hull
 from dynhull_client import Batch, FenceEvent, Hull, HullClient, HullCopy
 
 from .alarms import Alarms
+from .follower import Follower
 from .scene import Frame, Points, Scene
-
-PATIENCE = 30.0  # seconds to wait for the watcher; later, its copy counts as different
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +21,7 @@ class Step:
     Attributes:
         frame: the frame.
         vertices: (h, 2) vertices of the live hull.
-        area: the live hull's area.
+        area: the live hull's area, in the unit of the scene.
         keys: the key of each vertex, as the server names it; None in a scene without keys.
         events: the events of the fences.
         alarms: the counts of events so far: equal to the recomputed ones, and recomputed.
@@ -44,44 +41,33 @@ class Step:
         return self.frame.names_at(self.vertices) if self.keys is None else [str(key) for key in self.keys]
 
 
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """What a watcher's copy was: its revision, vertices and their keys."""
+
+    revision: int
+    vertices: Points
+    keys: tuple[object, ...] | None
+
+
 class Watcher:
     """A copy of a hull that a thread keeps up to date from a watch."""
 
     def __init__(self, client: HullClient, name: str, *, keys: bool) -> None:
-        self._moved = threading.Condition()
         self._copy = HullCopy()
-        self._failure: Exception | None = None
-        self._events = client.watch(name, keys=keys)
-        self._thread = threading.Thread(target=self._follow, name="watcher", daemon=True)
-        self._thread.start()
+        self._follower = Follower("watcher", client.watch(name, keys=keys), self._copy.update)
 
-    def _follow(self) -> None:
-        try:
-            for event in self._events:
-                with self._moved:
-                    self._copy.update(event)
-                    self._moved.notify_all()
-        except Exception as failure:  # raised in the thread that waits for the copy
-            with self._moved:
-                self._failure = failure
-                self._moved.notify_all()
+    def at(self, revision: int) -> Reached | None:
+        """The copy at a revision, or at a later one that it skipped to; None if it does not get there in time."""
+        return self._follower.wait(lambda: self._reached(revision))
 
-    def vertices_at(self, revision: int) -> tuple[Points, tuple[object, ...] | None] | None:
-        """The copy's vertices and their keys at a revision; None if it does not get there in time, or skips it."""
-        deadline = monotonic() + PATIENCE
-        with self._moved:
-            while self._copy.revision < revision:
-                if self._failure:
-                    raise self._failure
-                if not self._moved.wait(deadline - monotonic()):
-                    return None
-            reached = self._copy.revision == revision
-            return (self._copy.vertices, self._copy.vertex_keys) if reached else None
+    def _reached(self, revision: int) -> Reached | None:
+        copy = self._copy
+        return Reached(copy.revision, copy.vertices, copy.vertex_keys) if copy.revision >= revision else None
 
     def stop(self) -> None:
         """End the subscription."""
-        self._events.close()
-        self._thread.join()
+        self._follower.stop()
 
 
 def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
@@ -94,7 +80,14 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
     """
     name = scene.hull_name
     clock: Literal["server", "data"] = "server" if scene.max_age is None else "data"
-    client.create_hull(name, keyed="str" if scene.keyed else None, max_age=scene.max_age, clock=clock)
+    client.create_hull(
+        name,
+        keyed="str" if scene.keyed else None,
+        max_age=scene.max_age,
+        clock=clock,
+        geographic=scene.center is not None,
+        center=scene.center,
+    )
     alarms = Alarms(client, scene) if scene.circles or scene.rivals else None
     watcher = Watcher(client, name, keys=scene.keyed)
     try:
@@ -102,9 +95,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
             revision = _send(client, scene, frame, alarms)
             live = client.get_hull(name, min_revision=revision)
             difference = (
-                _verified(client, scene, frame, live)
-                or _named(frame, live)
-                or _watched(watcher.vertices_at(revision), live)
+                _verified(client, scene, frame, live) or _named(frame, live) or _watched(watcher.at(revision), live)
             )
             events: list[FenceEvent] = []
             counts = 0, 0
@@ -112,7 +103,8 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
                 events, wrong = alarms.check(frame, revision)
                 difference = difference or wrong or (alarms.surplus() if number == scene.length else None)
                 counts = alarms.agreed, alarms.expected
-            yield Step(frame, live.vertices, live.measures.area, live.vertex_keys, events, counts, difference)
+            area = live.measures.area * scene.area_scale
+            yield Step(frame, live.vertices, area, live.vertex_keys, events, counts, difference)
     finally:
         watcher.stop()
         if alarms:
@@ -141,7 +133,7 @@ def _verified(client: HullClient, scene: Scene, frame: Frame, live: Hull) -> str
     if found.points != len(frame.positions):
         return f"the server holds {found.points} points, {len(frame.positions)} were sent"
     if not scene.keyed:
-        same = np.array_equal(live.vertices, convex_hull(frame.positions))
+        same = np.array_equal(live.vertices, _vertices(scene, frame))
         return None if same else "the server holds other points than those that were sent"
     if not found.keys_equal:
         return "the points of the hull are not the positions of its keys"
@@ -150,6 +142,13 @@ def _verified(client: HullClient, scene: Scene, frame: Frame, live: Hull) -> str
     if dict(zip(there.keys, there.points.tolist(), strict=True)) != sent:
         return f"the server holds the keys {sorted(there.keys)}, {sorted(sent)} were sent, or their positions differ"
     return None
+
+
+def _vertices(scene: Scene, frame: Frame) -> Points:
+    """The vertices of the hull of all points of a frame, computed without the server."""
+    if scene.center is None:
+        return convex_hull(frame.positions)
+    return GeoHull(frame.positions, scene.center).vertices()
 
 
 def _named(frame: Frame, live: Hull) -> str | None:
@@ -163,13 +162,12 @@ def _named(frame: Frame, live: Hull) -> str | None:
     return None
 
 
-def _watched(copy: tuple[Points, tuple[object, ...] | None] | None, live: Hull) -> str | None:
+def _watched(copy: Reached | None, live: Hull) -> str | None:
     """How the watcher's copy differs from the live hull; None if it does not."""
-    if copy is None:
+    if copy is None or copy.revision != live.revision:
         return f"the watcher did not reach revision {live.revision}"
-    vertices, keys = copy
-    if not np.array_equal(vertices, live.vertices):
-        return f"the watcher's copy differs: {vertices.tolist()} instead of {live.vertices.tolist()}"
-    if keys != live.vertex_keys:
-        return f"the watcher's copy has the keys {keys} instead of {live.vertex_keys}"
+    if not np.array_equal(copy.vertices, live.vertices):
+        return f"the watcher's copy differs: {copy.vertices.tolist()} instead of {live.vertices.tolist()}"
+    if copy.keys != live.vertex_keys:
+        return f"the watcher's copy has the keys {copy.keys} instead of {live.vertex_keys}"
     return None

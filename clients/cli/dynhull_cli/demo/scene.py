@@ -53,10 +53,13 @@ class Scene(Protocol):
         step: what a frame is, in the plural.
         length_unit: the unit of coordinates, as an adjective of an axis.
         area_unit: the unit of an area.
+        area_scale: the number of these in a unit of the server.
+        center: the longitude and latitude of the centre of a geographic hull; None for a plane.
         length: the number of frames.
         notes: lines about the input, such as what was left out; printed first.
         background: (m, 2) points that never move, drawn faintly.
-        circles: the center and radius of fences that the keys enter and leave, by name; none without keys.
+        circles: the centre and radius of fences that the keys enter and leave, by name; none without keys. On the
+            globe radii are metres.
         rivals: two groups of keys, whose hulls are watched for meeting; a key begins with the name of its group and a
             space. None for no groups.
     """
@@ -69,6 +72,8 @@ class Scene(Protocol):
     step: str
     length_unit: str
     area_unit: str
+    area_scale: float
+    center: tuple[float, float] | None
     length: int
     notes: list[str]
     background: Points

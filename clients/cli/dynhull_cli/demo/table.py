@@ -30,6 +30,8 @@ class Table:
     step = "batches"
     length_unit = "units"
     area_unit = "square units"
+    area_scale = 1.0
+    center: "tuple[float, float] | None" = None
     circles: dict[str, tuple[float, float, float]] = {}  # noqa: RUF012  (nobody changes it)
     rivals: tuple[str, str] | None = None
 

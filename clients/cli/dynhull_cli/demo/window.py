@@ -29,6 +29,8 @@ class RecentPositions:
         self.step = scene.step
         self.length_unit = scene.length_unit
         self.area_unit = scene.area_unit
+        self.area_scale = scene.area_scale
+        self.center = scene.center
         self.length = scene.length
         self.notes = scene.notes
         self.background = scene.background

@@ -59,9 +59,10 @@ class Rows:
             return [self]
         stay = [row for row, time in enumerate(self.expires) if time is None]
         leave = [row for row, time in enumerate(self.expires) if time is not None]
-        return [replace(self._at(stay), expires=None), self._at(leave)]
+        return [replace(self.at(stay), expires=None), self.at(leave)]
 
-    def _at(self, rows: list[int]) -> "Rows":
+    def at(self, rows: list[int]) -> "Rows":
+        """Some rows, given by their numbers."""
         columns: list[Any] = [self.keys, self.times, self.expires]
         return Rows(self.points[rows], *(None if each is None else [each[row] for row in rows] for each in columns))
 

@@ -1,6 +1,8 @@
 """The command: `dynhull load`."""
 
+import dataclasses
 import sys
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -75,6 +77,15 @@ def load(
         str | None,
         _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
     ] = None,
+    geographic: Annotated[
+        bool | None,
+        typer.Option(
+            "--geographic/--plane",
+            help="Whether a new hull is on the globe, in degrees, or in the plane. Default: on the globe if the "
+            "columns are named lon and lat, or the like.",
+            show_default=False,
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Read everything and report it. Needs no server and changes nothing.")
     ] = False,
@@ -110,6 +121,9 @@ def load(
 
     With --key, each row puts its key: a row for a known key moves it, and rows are applied in the order of the file. A
     missing hull is created with keys that are strings; create it before the load if it shall have other settings.
+
+    A missing hull is created on the globe if the columns are named lon and lat, or longitude and latitude: its edges
+    are great circles, and its points within 85 degrees of a centre, which the first points choose.
     """
     from .bad_rows import BadRows, open_bad_rows
     from .loading import load_points, producer_name, report_reading, require_readable
@@ -126,10 +140,12 @@ def load(
     integers = not dry_run and key is not None and _has_integer_keys(client, name)
     with (
         integers_of_any_size(),
-        open_source(STANDARD_INPUT if file is None else file, format, options, integer_keys=integers) as source,
-        open_bad_rows(bad_rows, source) as bad_file,
+        open_source(STANDARD_INPUT if file is None else file, format, options, integer_keys=integers) as opened,
+        open_bad_rows(bad_rows, opened) as bad_file,
     ):
         bad = BadRows(bad_file, max_bad)
+        frame = partial(_frame, None if dry_run or replace else client, name, geographic)
+        source = dataclasses.replace(opened, geographic=cache(frame))
         if dry_run:
             report_reading(name, source, bad, as_json)
             return
@@ -138,7 +154,9 @@ def load(
         producer = producer or (None if again else producer_name(source))
         if resume and producer is None:
             raise ValueError(f"{source.name} has no name to resume by: give --producer NAME, the same each time")
-        loaded, points = load_points(client, name, source, bad, producer, patience, resume=resume, replace=replace)
+        loaded, points = load_points(
+            client, name, source, bad, producer, patience, geographic=geographic, resume=resume, replace=replace
+        )
     if as_json:
         typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points))
     else:
@@ -155,6 +173,12 @@ def _has_integer_keys(client: "HullClient", name: str) -> bool:
     if known and keyed is None:
         raise ValueError(f"the points of {name!r} have no keys: leave out --key, or load into another hull")
     return keyed == "int"
+
+
+def _frame(client: "HullClient | None", name: str, geographic: bool | None) -> bool | None:
+    """Whether an existing hull is geographic; what was asked for if there is none, or without a client."""
+    known = None if client is None else next(client.list_hulls(name), None)
+    return known.geographic if known is not None and known.name == name else geographic
 
 
 def _check(decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:

@@ -11,12 +11,21 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from dynhull_client import Applied, DynhullError, HullClient, HullExistsError, HullNotFoundError, Writer
+from dynhull_client import (
+    Applied,
+    DynhullError,
+    HullClient,
+    HullExistsError,
+    HullNotFoundError,
+    InvalidRequestError,
+    Writer,
+)
 
 from ..json_lines import json_line
 from ..plural import plural
 from .bad_rows import BadRows
 from .chunks import Points, Rows, blocks
+from .options import Format
 from .source import Source
 
 if TYPE_CHECKING:
@@ -66,10 +75,13 @@ def load_points(
     producer: str | None,
     patience: float,
     *,
+    geographic: bool | None,
     resume: bool,
     replace: bool,
 ) -> tuple[int, int | None]:
     """Create the hull where it is missing, and add the points that earlier runs of the same load did not add.
+
+    A new hull is geographic if `geographic` says so or, without it, if the names of the columns do.
 
     Returns:
         The number of points added, and the number in the hull afterwards; None where nothing was left to add.
@@ -85,12 +97,13 @@ def load_points(
         if first is None:
             raise ValueError(_no_points(source, bad))
         _print_notes(source.notes)
-        _make(client, name, source, silent=resume, replace=replace)
+        on_globe = _make(client, name, source, geographic, silent=resume, replace=replace)
         writer = client.writer(
             name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
         )
         with (
             _resumable("--resume in place of --replace" if replace else "--resume", producer),
+            _advised(on_globe),
             _progress(source) as read,
         ):
             loaded, acknowledged = _send(writer, chain([first], batches), resume, read)
@@ -122,7 +135,10 @@ def _print_notes(notes: Iterable[str]) -> None:
         typer.echo(note, err=True)
 
 
-def _make(client: HullClient, name: str, source: Source, *, silent: bool, replace: bool) -> None:
+def _make(
+    client: HullClient, name: str, source: Source, geographic: bool | None, *, silent: bool, replace: bool
+) -> bool:
+    """Create the hull unless it exists. Returns whether it is geographic."""
     keyed: KeyType | None = None
     if source.options.key is not None:
         keyed = "int" if source.integer_keys else "str"
@@ -131,11 +147,51 @@ def _make(client: HullClient, name: str, source: Source, *, silent: bool, replac
             client.delete_hull(name)
         except HullNotFoundError:
             typer.echo(f"there is no hull {name!r} to replace: creating it", err=True)
+    on_globe = source.degrees if geographic is None else geographic
     try:
-        client.create_hull(name, keyed=keyed)
+        client.create_hull(name, keyed=keyed, geographic=on_globe)
     except HullExistsError as known:
         if not silent:
             typer.echo(f"{known}: adding to it", err=True)
+        return _known_frame(client, name, source, geographic)
+    if on_globe:
+        what = " and ".join(source.axes) or "x and y"
+        typer.echo(f"{name}: a new hull on the globe: {what} are degrees; --plane makes it a plane", err=True)
+    elif source.degrees or source.format is Format.GEOJSON:
+        typer.echo(
+            f"{name}: a new hull in the plane, in square degrees; --geographic makes it one on the globe", err=True
+        )
+    return on_globe
+
+
+def _known_frame(client: HullClient, name: str, source: Source, geographic: bool | None) -> bool:
+    """Whether an existing hull is geographic; ValueError if it is not what was asked for."""
+    known = client.get_hull(name).info.geographic
+    if geographic is not None and geographic != known:
+        kind, option = ("geographic", "--plane") if known else ("a plane", "--geographic")
+        raise ValueError(f"the hull {name!r} is {kind}: leave out {option}, or load into another hull")
+    if source.degrees and not known:
+        typer.echo(
+            f"{name} is a plane: it takes {source.axes[0]} and {source.axes[1]} for x and y, and has square degrees. "
+            f"`dynhull create NAME --geographic` makes a hull on the globe",
+            err=True,
+        )
+    return known
+
+
+@contextmanager
+def _advised(on_globe: bool) -> Iterator[None]:
+    """When a point is too far from the others for a hull on the globe, print what can be done."""
+    try:
+        yield
+    except InvalidRequestError as error:
+        if on_globe and "degrees from the centre" in str(error):
+            typer.echo(
+                "A hull on the globe has points within 85 degrees of its centre. `dynhull create NAME --geographic "
+                "--center LON,LAT` makes one about another; --replace --plane loads degrees as points of a plane.",
+                err=True,
+            )
+        raise
 
 
 def _send(

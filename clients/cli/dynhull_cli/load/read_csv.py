@@ -20,6 +20,7 @@ def read_csv(source: Source) -> Chunks:
     try:
         with csv_table(source.name, source.file, given) as table:
             source.notes.extend(table.notes)
+            source.axes.extend((table.names[table.x], table.names[table.y]))
             labels = _labels(source, table)
             yield from _chunks(table, options.decimal, labels)
     except UnclearTableError as error:

@@ -135,6 +135,7 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
     """
     x, y = source.options.x, source.options.y
     members = None if x is None or y is None else (x, y)
+    source.axes.extend(members or ())
 
     def read(value: Any) -> list[Position]:
         nonlocal members
@@ -150,6 +151,7 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
             names = list(value)
             i, j = coordinate_columns(source.name, names, x, y)
             members = names[i], names[j]
+            source.axes.extend(members)
         return [(number(value.get(members[0]), members[0]), number(value.get(members[1]), members[1]))]
 
     return read

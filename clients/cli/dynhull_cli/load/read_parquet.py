@@ -41,6 +41,7 @@ def read_parquet(source: Source) -> Chunks:
 def _of_columns(source: Source, parquet: Any) -> Chunks:
     schema = parquet.schema_arrow
     names = [schema.names[i] for i in coordinate_columns(source.name, schema.names, source.options.x, source.options.y)]
+    source.axes.extend(names)
     for name in names:
         kind = schema.field(name).type
         if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):

@@ -7,20 +7,24 @@ import os
 import sys
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any, cast
+
+from dynhull.arrays import COLUMN_NAMES
 
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from .chunks import Chunks
 from .options import STANDARD_INPUT, Format, Options
+from .places import places_only
 
 DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
 SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
 TABLES = {Format.CSV, Format.TSV}
+DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
 APPLIES_TO = {
     "x": set(Format) - {Format.GEOJSON},
     "y": set(Format) - {Format.GEOJSON},
@@ -49,6 +53,9 @@ class Source:
         options: how to read it.
         integer_keys: whether keys are integers.
         notes: lines about what was detected while reading and may surprise.
+        axes: the names of the columns of x and y, once they are known; empty for geometries.
+        geographic: returns whether the points are places on the globe, None if the names of the columns say so. Called
+            once there are points.
     """
 
     name: str
@@ -59,15 +66,29 @@ class Source:
     options: Options
     integer_keys: bool = False
     notes: list[str] = field(default_factory=list)
+    axes: list[str] = field(default_factory=list)
+    geographic: Callable[[], bool | None] = lambda: None
+
+    @property
+    def degrees(self) -> bool:
+        """Whether the names of its columns say that these are longitudes and latitudes."""
+        return tuple(name.strip().lower() for name in self.axes) in DEGREES
 
     def chunks(self) -> Chunks:
-        """The points; ValueError where the input cannot be read as this format."""
-        return _reader(self.format)(self)
+        """The points; those that are no places are bad rows. ValueError where the input is not of this format."""
+        read = 0
+        with closing(_reader(self.format)(self)) as chunks:
+            for chunk in chunks:
+                known = self.geographic()
+                on_globe = self.degrees if known is None else known
+                yield places_only(chunk, read) if on_globe else chunk
+                read += len(chunk.rows)
 
     def rewind(self) -> None:
         """Return to the beginning; not possible with a pipe."""
         self.file.seek(0)
         self.notes.clear()
+        self.axes.clear()
 
     def is_file(self, path: Path) -> bool:
         """Whether that is the file that is read, perhaps by another name."""

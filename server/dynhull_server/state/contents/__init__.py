@@ -1,5 +1,6 @@
 """The points of hulls: multisets, keyed hulls, and windows."""
 
+from ..frames import Globe
 from ..records import DEFAULT, HullSettings, Kept
 from .keyed import Keyed
 from .live import LiveContents
@@ -12,11 +13,12 @@ UNLIMITED = 2**63
 def replayed(kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UNLIMITED) -> LiveContents:
     """The contents of a hull with these settings: those of a snapshot, and the changes after it. O(n log² n)."""
     contents: LiveContents
+    globe = Globe(kept.center or settings.center) if settings.geographic else None
     if settings.identity == "multiset" and settings.window is None:
-        contents = Multiset(kept.contents, most_points)
+        contents = Multiset(kept.contents, most_points, globe)
     elif settings.identity == "multiset":
-        contents = Windowed(settings, kept.contents, kept.clock, most_points)
+        contents = Windowed(settings, kept.contents, kept.clock, most_points, globe)
     else:
-        contents = Keyed(settings, kept.contents, kept.clock, most_points)
+        contents = Keyed(settings, kept.contents, kept.clock, most_points, globe)
     contents.replay(kept.records)
     return contents

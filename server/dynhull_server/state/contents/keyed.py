@@ -8,16 +8,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DuplicateKeyError, KeyedHull, Put
+from dynhull import DuplicateKeyError, GeoKeyedHull, KeyedHull, Put
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys, key_list
 
 from ..admission import GREATEST_TIME, Admission, admit, server_clock, shown, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
-from ..records import NO_TIME, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
+from ..frames import Globe
+from ..records import NO_TIME, Center, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
 from .deadlines import Deadlines, Key
-from .live import REPLAYED_TOGETHER
+from .live import REPLAYED_TOGETHER, AnyKeyedHull
+from .mirror import Mirror
+from .places import move_center, require_puts
 
 REMOVED = -1
 # Keys whose deadline has come are removed in parts of this size: reading a list of keys keeps other threads waiting.
@@ -70,20 +73,32 @@ class Keyed:
         stored: its points.
         clock: its clock.
         most_points: the limit on the number of points.
+        globe: the frame of a geographic hull; None for a plane.
 
     Attributes:
         timed: whether its points have times.
+        mirror: the keys of a geographic hull in the plane, while fences compare them.
+        ended: the keys whose deadline had come when points last left.
     """
 
-    def __init__(self, settings: HullSettings, stored: Contents, clock: int | None, most_points: int) -> None:
+    def __init__(
+        self, settings: HullSettings, stored: Contents, clock: int | None, most_points: int, globe: Globe | None
+    ) -> None:
         assert settings.identity != "multiset"
         self._settings = settings
         self._kind = settings.identity
         self._most_points = most_points
         self.clock = clock
-        self.hull = KeyedHull(self._kind, ordered=settings.by_event_time)
+        self.globe = globe
+        self.hull: AnyKeyedHull
+        if globe is None:
+            self.hull = KeyedHull(self._kind, ordered=settings.by_event_time)
+        else:
+            self.hull = GeoKeyedHull(self._kind, ordered=settings.by_event_time, center=globe.center)
         self.follows_server = settings.window is None or settings.window.clock == "server"
+        self.mirror: Mirror | None = None
         self._deadlines = Deadlines()
+        self.ended: list[Key] = []
         self._earliest: int | None = None  # no point has an earlier time
         self.timed = settings.window is not None or settings.by_event_time
         if stored.keys is not None:
@@ -116,6 +131,8 @@ class Keyed:
         rows.times = admission.times
         if self.clock is not None or batch.ttl is not None or batch.deadlines is not None:
             self._admit_deadlines(batch, rows, admission, arrived)
+        if self.globe is not None:
+            require_puts(self.globe, batch.points, admission.young)
         late = 0
         if admission.young is not None:
             _refuse_repeated(rows)
@@ -177,6 +194,11 @@ class Keyed:
         """The keys of an applied batch, without those that are too old."""
         return admitted.rows
 
+    def recenter(self, center: Center | None) -> KeyRows:
+        """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""
+        move_center(self.hull, center)
+        return KeyRows(self._no_keys(), NO_POINTS, self._no_keys())
+
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays."""
         clock = clock if self.clock is None else max(clock, self.clock)
@@ -194,9 +216,12 @@ class Keyed:
         for record in records:
             rows = record.rows
             assert isinstance(rows, KeyRows | Expiry)
-            if group and (size >= REPLAYED_TOGETHER or not self._may_follow(group[-1], rows)):
+            alone = record.center is not None or size >= REPLAYED_TOGETHER
+            if group and (alone or not self._may_follow(group[-1], rows)):
                 self._carry_out(_merged(group))
                 group, size = [], 0
+            if record.center is not None:
+                move_center(self.hull, record.center)
             if isinstance(rows, Expiry):
                 assert record.clock is not None  # nothing expires without a clock
                 self._expire(rows.until, record.clock)
@@ -223,6 +248,14 @@ class Keyed:
         deadlines = self._deadlines.of(key_list(keys)) if len(self._deadlines) else None
         return Contents(points, keys, stored_times(times) if self.timed else None, deadlines)
 
+    def in_plane(self) -> KeyedHull:
+        """The keys as points of a plane: those of a geographic hull at their projections. O(n log n) the first time."""
+        if isinstance(self.hull, KeyedHull):
+            return self.hull
+        if self.mirror is None:
+            self.mirror = Mirror(self.hull)
+        return self.mirror.plane
+
     def find(self, keys: Keys) -> Found:
         """The positions of keys of the hull's kind."""
         points = self.hull.positions(keys)
@@ -233,9 +266,14 @@ class Keyed:
 
     def _load(self, keys: Keys, stored: Contents) -> None:
         times = None if stored.times is None else library_times(stored.times)
-        self.hull = KeyedHull.from_entities(
-            keys, stored.points, times, self._kind, ordered=self._settings.by_event_time
-        )
+        ordered = self._settings.by_event_time
+        if self.globe is None:
+            self.hull = KeyedHull.from_entities(keys, stored.points, times, self._kind, ordered=ordered)
+        else:
+            center = self.globe.center
+            self.hull = GeoKeyedHull.from_entities(
+                keys, stored.points, times, self._kind, ordered=ordered, center=center
+            )
         if stored.times is not None:
             self._note_times(stored.times)
         if stored.deadlines is not None:
@@ -243,22 +281,30 @@ class Keyed:
 
     def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
         """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""
-        hull, times = self.hull, rows.times
+        hull, times, mirror = self.hull, rows.times, self.mirror
+        if mirror is not None:
+            mirror.note(rows.keys)
+            mirror.note(rows.removes)
+            mirror.plane.remove_many(rows.removes, missing="ignore")
         removed = hull.remove_many(rows.removes, missing="ignore") if len(rows.removes) else 0
         written = None
         if rows.deadlines is not None or len(self._deadlines):
             written = self._written(rows)
         put = NOTHING_PUT
         if len(rows.keys):  # otherwise a hull by event time would ask for times
-            put = hull.update(
-                rows.keys, rows.points, None if times is None else library_times(times), only=rows.condition
-            )
+            moments = None if times is None else library_times(times)
+            put = hull.update(rows.keys, rows.points, moments, only=rows.condition)
+            if mirror is not None:
+                mirror.plane.update(rows.keys, mirror.project(rows.points), moments, only=rows.condition)
         if times is not None:
             self._note_times(times)
         if written is not None:
             self._set_deadlines(rows, written)
         window = self._settings.window
         surplus = 0 if window is None or not window.max_points else len(hull) - window.max_points
+        if surplus > 0 and mirror is not None:
+            mirror.note_inside()
+            mirror.plane.evict(surplus)
         return put, removed, hull.evict(surplus) if surplus > 0 else 0
 
     def _note_times(self, times: Times) -> None:
@@ -291,15 +337,21 @@ class Keyed:
 
     def _expire(self, until: int | None, clock: int) -> int:
         """Remove the points that leave. Returns their number."""
-        hull = self.hull
+        hull, mirror = self.hull, self.mirror
         leaving = 0
+        if mirror is not None:
+            mirror.note_inside()
         if until is not None and until >= -GREATEST_TIME:
+            if mirror is not None:
+                mirror.plane.expire(until)
             leaving = hull.expire(until)
             oldest = hull.oldest()
             self._earliest = None if oldest is None else int(oldest)
-        ended = self._deadlines.pop_until(clock)
+        ended = self.ended = self._deadlines.pop_until(clock)
         for first in range(0, len(ended), REMOVED_TOGETHER):
             leaving += hull.remove_many(ended[first : first + REMOVED_TOGETHER], missing="ignore")
+            if mirror is not None:
+                mirror.plane.remove_many(ended[first : first + REMOVED_TOGETHER], missing="ignore")
         return leaving
 
     # Rules

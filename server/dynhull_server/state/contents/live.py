@@ -3,12 +3,14 @@
 from collections.abc import Iterable
 from typing import Any, Protocol
 
-from dynhull import DynamicHull, KeyedHull, WindowHull
+from dynhull import DynamicHull, GeoHull, GeoKeyedHull, GeoWindowHull, KeyedHull, WindowHull
 
 from ..batch import Applied
-from ..records import Contents, Expiry, Record, Rows
+from ..frames import Globe
+from ..records import Center, Contents, Expiry, Record, Rows
 
-AnyHull = DynamicHull | KeyedHull | WindowHull
+AnyHull = DynamicHull | KeyedHull | WindowHull | GeoHull | GeoKeyedHull | GeoWindowHull
+AnyKeyedHull = KeyedHull | GeoKeyedHull
 
 # Changes are replayed as one of up to this many rows, which is many times faster.
 REPLAYED_TOGETHER = 65_536
@@ -20,10 +22,12 @@ class LiveContents(Protocol):
     Attributes:
         clock: the clock of the hull in microseconds since 1970, None for a hull without a clock so far.
         follows_server: whether the clock, if any, follows the server's, rather than event times.
+        globe: the frame of a geographic hull; None for a plane.
     """
 
     clock: int | None
     follows_server: bool
+    globe: Globe | None
 
     @property
     def hull(self) -> AnyHull:
@@ -60,6 +64,13 @@ class LiveContents(Protocol):
 
     def rows(self, admitted: Any, applied: Applied) -> Rows:
         """The rows of an applied batch that `replay` needs."""
+
+    def recenter(self, center: Center | None) -> Rows:
+        """Move the centre of a geographic hull; None for the mean direction of its points. Returns no rows.
+
+        Raises:
+            MisfitError: the hull is a plane, or cannot have this centre; nothing has changed.
+        """
 
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays, and None is returned."""

@@ -5,12 +5,14 @@ from typing import Literal, cast
 
 import numpy as np
 
-from dynhull import DynamicHull, MissingPointError
+from dynhull import DynamicHull, GeoHull, MissingPointError
 
-from ..batch import Applied, Batch, KeyedBatch
+from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import LimitExceededError, MisfitError, PointMissingError
-from ..records import Contents, Expiry, PointRows, Record
+from ..frames import Globe
+from ..records import Center, Contents, Expiry, PointRows, Record
 from .live import REPLAYED_TOGETHER
+from .places import move_center, require_batch
 
 NO_KEYS = "has points without keys, which a batch inserts and deletes"
 
@@ -21,14 +23,16 @@ class Multiset:
     Args:
         stored: the points.
         most_points: the limit on their number.
+        globe: the frame of a geographic hull; None for a plane.
     """
 
     clock: int | None = None
     due: int | None = None
     follows_server = True
 
-    def __init__(self, stored: Contents, most_points: int) -> None:
-        self.hull = DynamicHull(stored.points)
+    def __init__(self, stored: Contents, most_points: int, globe: Globe | None) -> None:
+        self.hull = DynamicHull(stored.points) if globe is None else GeoHull(stored.points, globe.center)
+        self.globe = globe
         self._most_points = most_points
         self._points, self._changes = len(self.hull), self.hull.changes
 
@@ -40,6 +44,8 @@ class Multiset:
             raise MisfitError("insert_times", "has no window, so its points have no times")
         if self._points + batch.growth > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
+        if self.globe is not None:
+            require_batch(self.globe, batch)
         return batch
 
     def check(self, batch: Batch) -> None:
@@ -67,15 +73,26 @@ class Multiset:
         """The points of an applied batch."""
         return PointRows(batch.inserts, batch.deletes, applied.missing > 0)
 
+    def recenter(self, center: Center | None) -> PointRows:
+        """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""
+        move_center(self.hull, center)
+        self._changes = self.hull.changes
+        return PointRows(NO_POINTS, NO_POINTS)
+
     def expire(self, _: int) -> Expiry | None:
         """None: no points leave."""
         return None
 
     def replay(self, records: Iterable[Record]) -> None:
         """Apply recorded batches, many at a time."""
-        for group in _together(records):
+        for center, group in _together(records):
+            if center is not None:
+                move_center(self.hull, center)
             inserts = np.concatenate([rows.inserts for rows in group])
             deletes = np.concatenate([rows.deletes for rows in group])
+            if not len(deletes):
+                self.hull.insert_many(inserts)
+                continue
             ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
             missing: Literal["raise", "ignore"] = "ignore" if group[0].lenient else "raise"
             self.hull.apply(ops, np.concatenate([inserts, deletes]), missing)
@@ -86,7 +103,7 @@ class Multiset:
         return Contents(self.hull.points())
 
 
-def apply_points(hull: DynamicHull, batch: Batch) -> int:
+def apply_points(hull: DynamicHull | GeoHull, batch: Batch) -> int:
     """Apply a batch to `hull`. Returns the number of points deleted.
 
     Raises:
@@ -116,17 +133,23 @@ def missing_point(batch: Batch, row: int, point: tuple[float, float]) -> PointMi
     return PointMissingError("origins", row - first_origin, point)
 
 
-def _together(records: Iterable[Record]) -> Iterable[list[PointRows]]:
-    """Groups of batches to apply as one set. A lenient one stays alone: its deletes depend on the points before it."""
+def _together(records: Iterable[Record]) -> Iterable[tuple[Center | None, list[PointRows]]]:
+    """Groups of batches to apply as one set, each with the centre to set before it, or None.
+
+    A lenient one stays alone: its deletes depend on the points before it.
+    """
+    center: Center | None = None
     group: list[PointRows] = []
     size = 0
     for record in records:
         rows = record.rows
         assert isinstance(rows, PointRows)
-        if group and (rows.lenient or group[-1].lenient or size >= REPLAYED_TOGETHER):
-            yield group
-            group, size = [], 0
+        alone = rows.lenient or record.center is not None
+        if group and (alone or group[-1].lenient or size >= REPLAYED_TOGETHER):
+            yield center, group
+            center, group, size = None, [], 0
+        center = center or record.center
         group.append(rows)
         size += len(rows)
     if group:
-        yield group
+        yield center, group

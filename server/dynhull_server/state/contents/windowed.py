@@ -8,15 +8,18 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DynamicHull, MissingPointError, WindowHull
+from dynhull import DynamicHull, GeoWindowHull, MissingPointError, WindowHull
 from dynhull.arrays import Points
+from dynhull.globe import Gnomonic
 
 from ..admission import GREATEST_TIME, admit, too_old
-from ..batch import Applied, Batch, KeyedBatch
+from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, LimitExceededError, MisfitError
-from ..records import Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
+from ..frames import Globe
+from ..records import Center, Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
 from .live import REPLAYED_TOGETHER
 from .multiset import NO_KEYS, apply_points, missing_point
+from .places import move_center, require_batch
 
 UNLIMITED = 2**63 - 1
 
@@ -50,9 +53,12 @@ class Windowed:
         stored: its points, in the order in which they leave.
         clock: its clock.
         most_points: the limit on the number of points.
+        globe: the frame of a geographic hull; None for a plane.
     """
 
-    def __init__(self, settings: HullSettings, stored: Contents, clock: int | None, most_points: int) -> None:
+    def __init__(
+        self, settings: HullSettings, stored: Contents, clock: int | None, most_points: int, globe: Globe | None
+    ) -> None:
         window = settings.window
         assert window is not None
         self._settings = settings
@@ -60,7 +66,9 @@ class Windowed:
         self._most_points = most_points
         self.clock = clock
         self.follows_server = window.clock == "server"
-        self.hull = WindowHull(max_points=window.max_points or UNLIMITED)
+        self.globe = globe
+        most = window.max_points or UNLIMITED
+        self.hull = WindowHull(max_points=most) if globe is None else GeoWindowHull(None, most, globe.center)
         if stored.times is not None:
             self.hull.add(stored.points, stored.times.astype(np.float64))
 
@@ -83,6 +91,8 @@ class Windowed:
             times = np.concatenate((times, np.full(moves, arrived, np.int64)))
         admission = admit(self._settings, times, rows, "insert_times", arrived, self.clock)
         assert admission.times is not None  # a hull with a window has times
+        if self.globe is not None:
+            require_batch(self.globe, batch, admission.young)
         admitted = Admitted(batch, admission.times, admission.clock, 0, admission.clamped)
         if admission.young is not None:
             admitted.late = rows - int(np.count_nonzero(admission.young))
@@ -132,6 +142,11 @@ class Windowed:
         batch = admitted.batch
         return PointRows(batch.inserts, batch.deletes, applied.missing > 0, admitted.times)
 
+    def recenter(self, center: Center | None) -> PointRows:
+        """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""
+        move_center(self.hull, center)
+        return PointRows(NO_POINTS, NO_POINTS, times=np.empty(0, np.int64))
+
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays."""
         clock = clock if self.clock is None else max(clock, self.clock)
@@ -148,6 +163,10 @@ class Windowed:
         size = 0
         for record in records:
             rows = record.rows
+            if record.center is not None:
+                self._insert(inserts)
+                inserts, size = [], 0
+                move_center(self.hull, record.center)
             if isinstance(rows, PointRows) and not len(rows.deletes) and size < REPLAYED_TOGETHER:
                 inserts.append(rows)
                 size += len(rows)
@@ -192,6 +211,8 @@ class Windowed:
                 raise missing_point(batch, int(rows[row]), error.point) from None
             missing = len(deletes) - removed
         if len(inserts):
+            if isinstance(self.hull, GeoWindowHull) and self.hull.center is None:
+                self.hull.recenter(Gnomonic.about(batch.inserts).center)  # as `admit` has checked
             self.hull.add(inserts, times.astype(np.float64))
         return missing
 

@@ -5,6 +5,7 @@ from typing import Literal
 
 Initial = Literal["snapshot", "events", "none"]
 SubjectKind = Literal["hull", "prefix", "other"]
+CORNER_BYTES = 16
 Ring = bytes  # the corners as pairs of little-endian doubles
 
 
@@ -71,9 +72,22 @@ class FenceConfig:
     max_event_age: int = 0
 
     @property
+    def delays(self) -> bool:
+        """Whether a change of side becomes an event only later."""
+        return bool(self.confirmations or self.min_dwell)
+
+    @property
     def area_hull(self) -> str | None:
         """The name of the hull that is the area, None for other areas."""
         return self.area.name if isinstance(self.area, HullArea) else None
+
+    @property
+    def corners(self) -> int:
+        """The number of corners of its polygons, with repeated ones."""
+        rings = (
+            (ring for polygon in self.area.polygons for ring in polygon) if isinstance(self.area, PolygonArea) else ()
+        )
+        return sum(map(len, rings)) // CORNER_BYTES
 
     def compares(self, name: str) -> bool:
         """Whether the keys of a hull of that name are subjects."""

@@ -9,9 +9,7 @@ import numpy as np
 from dynhull.keys import key_list
 
 from ..records import NO_TIME, Keys, Times
-from .records import EventType, FenceEvent, KeptFence, Key, Members, Waits
-
-Subject = tuple[str, Key]  # the name of its hull, and its key
+from .records import EventType, FenceEvent, KeptFence, Members, Subject, Waits
 
 
 class Dwelling:

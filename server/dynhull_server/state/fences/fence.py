@@ -4,7 +4,10 @@ from collections import deque
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from ..records import NO_TIME
+from dynhull.keys import key_list
+
+from ..records import NO_TIME, Keys
+from .delays import Delays
 from .dwelling import Dwelling, dwelling_after
 from .records import Consumer, FenceEvent, FenceRow, KeptFence
 
@@ -35,6 +38,8 @@ class Fence:
         inside: the number of subjects inside, as of the last commit.
         consumers: its consumers, as of the last commit.
         dwelling: who waits for a dwell event, as of the last commit; None where the fence makes none.
+        delays: changes of side that are no events yet, as of the last request, like the subjects' indexes; None where
+            the fence has no rules that delay.
         due: when it is planned to look at those who wait, None if it is not.
         unsaved: the number of events since who is inside was last stored.
         ended: whether it has been deleted.
@@ -42,6 +47,7 @@ class Fence:
 
     def __init__(self, row: FenceRow, recent_bytes: int) -> None:
         self.row = row
+        self.delays = Delays(row.config) if row.config.delays else None
         self.area: Hull | None = None
         self.subjects: dict[str, Subjects] = {}
         self.pair: Pair | None = None
@@ -75,16 +81,33 @@ class Fence:
 
     @property
     def next_due(self) -> int | None:
-        """When the next subject has been inside for as long as the fence asks; None if nobody waits."""
-        first = None if self.dwelling is None else self.dwelling.first
-        return None if first is None else first + self.row.config.dwell
+        """When a time that subjects wait for has passed next; None if none waits."""
+        times = []
+        if self.dwelling is not None and self.dwelling.first is not None:
+            times.append(self.dwelling.first + self.row.config.dwell)
+        if self.delays is not None and self.delays.first is not None:
+            times.append(self.delays.first + self.row.config.min_dwell)
+        return min(times, default=None)
+
+    @property
+    def waiting(self) -> int:
+        """The number of subjects that wait for a time."""
+        return (0 if self.dwelling is None else len(self.dwelling)) + (0 if self.delays is None else len(self.delays))
+
+    def keys_inside(self, subjects: "Subjects") -> Keys:
+        """The keys of a hull that are inside, ascending, as its events say."""
+        keys = subjects.index.inside(self.number)
+        delays = {} if self.delays is None else self.delays.of(subjects.hull.name)
+        return subjects.keys(set(key_list(keys)) ^ delays.keys()) if delays else keys
 
     def count_inside(self) -> None:
         """Count the subjects that are inside."""
         if self.pair is not None:
             self.inside = int(self.pair.near)
-        else:
-            self.inside = sum(each.index.count(self.number) for each in self.subjects.values())
+            return
+        self.inside = sum(each.index.count(self.number) for each in self.subjects.values())
+        if self.delays is not None:
+            self.inside += self.delays.balance
 
     def restored(self, kept: KeptFence) -> None:
         """Take over what the storage has; who is inside belongs to the subjects."""
@@ -92,10 +115,13 @@ class Fence:
         self.last, self.first = kept.last, kept.first
         self.consumers = dict(kept.consumers)
         self.dwelling = dwelling_after(kept)
+        self.delays = Delays(kept.row.config, kept.delays) if kept.row.config.delays else None
         self.unsaved = len(kept.events)
-        self.time = max(self.time, kept.row.waits.time)
+        self.time = max(self.time, kept.row.waits.time, kept.inside.time)
         if kept.events:
             self.time = max(self.time, kept.events[-1].time)
+        if self.delays is not None:
+            self.time = max(self.time, self.delays.newest)
         self._recent.clear()
         self._bytes = 0
 

@@ -1,12 +1,15 @@
 """The part of a trip at one fence."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import numpy.typing as npt
 
 from dynhull import Crossings
-from dynhull.keys import PackedKeys, key_list
+from dynhull.keys import PackedKeys, key_list, take_keys
 
 from ..changes import FenceChange
-from ..records import NO_TIME
+from ..records import NO_TIME, Keys
 from .dwelling import Dwelling
 from .fence import Fence
 from .pair import Pair
@@ -16,6 +19,7 @@ from .records import (
     Cause,
     ChangeFence,
     Consumer,
+    Delay,
     DropConsumer,
     DropEvents,
     DropFence,
@@ -27,11 +31,15 @@ from .records import (
     Key,
     Members,
     PutConsumer,
+    PutDelays,
+    Subject,
 )
 from .subjects import Subjects, keyed
 
 # A cause as the index knows it, and what it is here.
 Swap = tuple[Cause, Cause]
+# Some rows of crossings.
+Rows = slice | npt.NDArray[np.intp]
 TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS}
 
 
@@ -50,6 +58,7 @@ class FenceLeg:
         consumers: its consumers after the trip.
         first: the oldest event that is kept after the trip.
         inside: who is inside of a new fence that says nothing about it.
+        delays: the delays that it changes.
     """
 
     def __init__(self, fence: Fence, *, created: bool = False) -> None:
@@ -63,6 +72,8 @@ class FenceLeg:
         self.consumers = fence.consumers
         self.first = fence.first
         self.inside = Inside()
+        self.delays: dict[Subject, Delay | None] = {}
+        self._time = fence.time
 
     @property
     def last(self) -> int:
@@ -76,14 +87,14 @@ class FenceLeg:
 
     def time(self, now: int) -> int:
         """The time of an event that is made now: never before the one before it."""
-        return max(now, self.events[-1].time if self.events else self.fence.time)
+        return max(now, self._time, self.events[-1].time if self.events else NO_TIME)
 
-    def crossed(self, subjects: Subjects, crossings: Crossings, rows: slice, swap: Swap | None, now: int) -> None:
+    def crossed(self, subjects: Subjects, crossings: Crossings, rows: Rows, swap: Swap | None, now: int) -> None:
         """Make an event of each of some crossings; `swap` is a cause, and the one that it stands for."""
         sequence, time = self.last, self.time(now)
         hull, area_revision = subjects.hull, self.area_revision
         revision = hull.state.counts.revision
-        keys = crossings.keys[rows]
+        keys = crossings.keys[rows] if isinstance(rows, slice) else take_keys(crossings.keys, rows)
         times = subjects.times(keys)
         columns = zip(
             crossings.changes[rows].tolist(),
@@ -103,7 +114,7 @@ class FenceLeg:
                 FenceEvent(
                     sequence,
                     TYPES[change],
-                    _caused(causes, swap),
+                    caused(causes, swap),
                     hull.name,
                     key,
                     revision,
@@ -143,24 +154,26 @@ class FenceLeg:
                 )
             )
 
-    def dwelt(self, subjects: Subjects, waited: Sequence[tuple[Key, int]], now: int) -> None:
-        """Make an event of each of some keys that have been inside long enough, given since when."""
-        keys = subjects.keys([key for key, _ in waited])
-        since = dict(waited)
+    def report(self, subjects: Subjects, found: Mapping[Key, tuple[EventType, int, int]], now: int) -> None:
+        """Make an event of each of some keys that are there, given its type, why, and its first time."""
+        keys = subjects.keys(found)
         sequence, time = self.last, self.time(now)
         times = subjects.times(keys)
         event_times = [NO_TIME] * len(keys) if times is None else times.tolist()
         points = keyed(subjects.hull.state).positions(keys)
-        distances = subjects.distances(self.row.config, self.area, keys, points)
+        delays = {} if self.fence.delays is None else self.fence.delays.of(subjects.hull.name)
+        outside = np.array([found[key][0] is EventType.EXIT or key in delays for key in key_list(keys)], np.bool_)
+        distances = subjects.distances(self.row.config, self.area, keys, points, outside)
         hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
         columns = zip(key_list(keys), points.tolist(), distances, event_times, strict=True)
         for key, (x, y), distance, event_time in columns:
             sequence += 1
+            kind, causes, first_time = found[key]
             self.events.append(
                 FenceEvent(
                     sequence,
-                    EventType.DWELL,
-                    Cause.TIME,
+                    kind,
+                    causes,
                     hull,
                     key,
                     revision,
@@ -170,7 +183,7 @@ class FenceLeg:
                     distance,
                     event_time,
                     time,
-                    since[key],
+                    first_time,
                 )
             )
 
@@ -193,10 +206,9 @@ class FenceLeg:
             )
         )
 
-    def left(self, subjects: Subjects, now: int) -> None:
-        """Make an exit of each subject of a hull that is deleted."""
+    def left(self, subjects: Subjects, keys: Keys, cause: Mapping[Key, int] | int, now: int) -> None:
+        """Make an exit of each of some keys of a hull that are gone, given why; with the positions they still have."""
         sequence, time = self.last, self.time(now)
-        keys = subjects.index.inside(self.fence.number)
         points = keyed(subjects.hull.state).positions(keys).tolist()
         hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
         for key, (x, y) in zip(key_list(keys), points, strict=True):
@@ -205,18 +217,27 @@ class FenceLeg:
                 FenceEvent(
                     sequence,
                     EventType.EXIT,
-                    Cause.REMOVED,
+                    cause if isinstance(cause, int) else cause[key],
                     hull,
                     key,
                     revision,
                     self.area_revision,
                     None,
-                    (x, y),
+                    None if x != x else (x, y),
                     None,
                     NO_TIME,
                     time,
                 )
             )
+
+    def put_delay(self, subject: Subject, delay: Delay | None) -> None:
+        """Put the delay of a subject in the place of the one before."""
+        assert self.fence.delays is not None  # only such fences have subjects with delays
+        self.fence.delays.set(subject, delay)
+        if delay is not None:
+            self._time = max(self._time, delay.since)
+        self.delays[subject] = delay
+        self.fence.subjects[subject[0]].note_delays(self.fence)
 
     def summed_up(self, kind: EventType, cause: int, now: int) -> None:
         """Make one event of all subjects that are inside."""
@@ -249,6 +270,8 @@ class FenceLeg:
             yield ChangeFence(self.row)
         if self.events:
             yield AppendEvents(number, self.events)
+        if self.delays:
+            yield PutDelays(number, self.delays)
         if self.first != fence.first:
             yield DropEvents(number, self.first)
         if self.consumers is not fence.consumers:
@@ -266,7 +289,8 @@ class FenceLeg:
         """Whether the changes were committed, given the fence in the storage."""
         if self.deleted or found is None:
             return self.deleted and found is None
-        return (found.row, found.last, found.consumers) == (self.row, self.last, self.consumers)
+        same = all(found.delays.get(subject) == delay for subject, delay in self.delays.items())
+        return same and (found.row, found.last, found.consumers) == (self.row, self.last, self.consumers)
 
     def publish(self) -> None:
         """Make the changes, which are committed, those of the fence."""
@@ -277,6 +301,9 @@ class FenceLeg:
         fence.ended = self.deleted
         if self.events:
             fence.published(self.events)
+        if not self.row.config.delays:
+            fence.delays = None
+        fence.time = max(fence.time, self._time)
         if not self.deleted:
             fence.count_inside()
             if begins:
@@ -289,11 +316,12 @@ def members(fence: Fence, dwelling: Dwelling | None = None) -> Iterator[Members]
     if fence.pair is not None and fence.pair.near:
         yield Members(fence.pair.other.name, PackedKeys(b"", b""), fence.pair.other.state.counts.revision)
     for subjects in fence.subjects.values():
-        keys = subjects.index.inside(fence.number)
+        keys = fence.keys_inside(subjects)
         if len(keys):
             since = None if dwelling is None else dwelling.times(subjects.hull.name, keys)
             yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision, since)
 
 
-def _caused(causes: int, swap: Swap | None) -> int:
+def caused(causes: int, swap: Swap | None) -> int:
+    """A set of causes with one cause in the place of another one."""
     return causes & ~swap[0] | swap[1] if swap is not None and causes & swap[0] else causes

@@ -7,9 +7,10 @@ from dynhull import Crossings
 
 from ..hull import Hull
 from .fence import Fence
+from .on_globe import require_frames
 from .pair import Pair
 from .records import Cause
-from .subjects import Subjects, lay
+from .subjects import Subjects
 
 
 @dataclass(slots=True)
@@ -42,22 +43,42 @@ class Line:
         pairs: the fences that compare a hull as a whole with another one, by the names of both.
     """
 
-    def __init__(self, fences: Iterable[Fence], names: list[str]) -> None:
+    def __init__(self, fences: Iterable[Fence], names: Iterable[str]) -> None:
         self.names = dict.fromkeys(names)
-        self.fences = {fence.name: fence for fence in fences}
+        self.fences: dict[str, Fence] = {}
         self.subjects: dict[str, Subjects] = {}
         self.areas: dict[str, AreaHull] = {}
         self.pairs: dict[str, list[Fence]] = {}
-        for fence in self.fences.values():
-            self.subjects |= fence.subjects
-            if fence.pair is not None:
-                for hull in (fence.pair.area, fence.pair.other):
-                    self.pairs.setdefault(hull.name, []).append(fence)
-            elif fence.area is not None:
-                area = self.areas.setdefault(fence.area.name, AreaHull(fence.area))
-                area.fences[fence.number] = fence
-        for area in self.areas.values():
-            area.as_of = area.hull.state.hull.changes
+        for fence in fences:
+            self.add(fence)
+
+    def add(self, fence: Fence) -> None:
+        """Add a fence that has compared the hulls as they are now."""
+        self.fences[fence.name] = fence
+        self.subjects.update(fence.subjects)
+        if fence.pair is not None:
+            for hull in (fence.pair.area, fence.pair.other):
+                self.pairs.setdefault(hull.name, []).append(fence)
+        elif fence.area is not None:
+            area = self.areas.get(fence.area.name)
+            if area is None:
+                area = self.areas[fence.area.name] = AreaHull(fence.area, as_of=fence.area.state.hull.changes)
+            area.fences[fence.number] = fence
+
+    def remove(self, fence: Fence) -> None:
+        """Remove a fence, after its subjects have dropped it."""
+        del self.fences[fence.name]
+        for name, subjects in fence.subjects.items():
+            if not subjects.fences:
+                self.subjects.pop(name, None)  # or another of the fences that are removed has done it
+        if fence.pair is not None:
+            for hull in (fence.pair.area, fence.pair.other):
+                self.pairs[hull.name].remove(fence)
+        elif fence.area is not None:
+            area = self.areas[fence.area.name]
+            del area.fences[fence.number]
+            if not area.fences:
+                del self.areas[fence.area.name]
 
     def paired(self, hulls: Iterable[Hull]) -> Iterator[tuple[Fence, Pair, int]]:
         """The fences around pairs of hulls that begin or cease to be near, now that these have changed, and why."""
@@ -77,10 +98,11 @@ class Line:
         fences = [fence for fence in fences if fence.row.config.compares(hull.name)]
         if not fences or hull.row.settings.identity == "multiset":
             return
+        require_frames(fences[0].row.config, hull, None)
         subjects = self.subjects[hull.name] = Subjects(hull)
         for fence in fences:
             vertices = None if fence.area is None else fence.area.state.vertices()
-            lay(subjects.index, fence.number, fence.row.config, vertices)
+            subjects.lay(fence.number, fence.row.config, vertices)
             subjects.fences[fence.number] = fence
             fence.subjects = fence.subjects | {hull.name: subjects}
 
@@ -109,10 +131,10 @@ class Line:
                 vertices = hull.state.vertices()
                 for fence in area.fences.values():
                     for each in fence.subjects.values():
-                        lay(each.index, fence.number, fence.row.config, vertices)
+                        each.lay(fence.number, fence.row.config, vertices)
                     touched |= fence.subjects
                 area.as_of = hull.state.hull.changes
         for _, subjects in sorted(touched.items()):
-            crossings = subjects.index.take()
+            crossings = subjects.take()
             if len(crossings):
                 yield subjects, crossings

@@ -1,8 +1,9 @@
 """A trip on hulls with fences: its batches, and the events that follow from them, are committed together."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from dynhull import Crossings, FenceIndex, KeyedHull
 
 from ..batch import Applied
 from ..changes import Change
+from ..contents.keyed import Keyed
 from ..errors import (
     ConsumerNotFoundError,
     FenceExistsError,
@@ -22,17 +24,21 @@ from ..errors import (
     LimitExceededError,
     SequenceAheadError,
 )
-from ..events import CreateHull, DeleteHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
+from ..events import CreateHull, DeleteHull, Expire, ReadHull, Recenter, Request, WriteBatch, WriteTogether
 from ..hull import Hull
-from ..hull_state import HullState
+from ..hull_state import Counts, HullState
 from ..limits import FenceLimits
+from ..records import KeyRows, Record
 from ..trip import Leg, Place, Trip, write
 from .config import FenceConfig, PolygonArea
+from .delaying import NO_ROWS, KeysChanged, delay, end_all, end_some
+from .delays import Delays
 from .fence import Fence
 from .fence_leg import FenceLeg, Swap, members
 from .line import Line
+from .on_globe import require_frames
 from .pair import Pair
-from .records import NO_WAITS, Cause, Consumer, EventType, FenceRow, Inside, KeptFence, Key, Waits
+from .records import NO_WAITS, Cause, Consumer, EventType, FenceRow, Inside, KeptFence, Key, Subject, Waits
 from .requests import (
     STRUCTURAL,
     CreateFence,
@@ -51,8 +57,11 @@ POINT_BYTES = 16
 # The hull removes keys whose time has come; the area of a fence that is replaced does not move.
 EXPIRY: Swap = Cause.REMOVED, Cause.EXPIRED
 REPLACEMENT: Swap = Cause.AREA, Cause.CHANGED
+# The number of subjects inside of the fences that a trip has created after which it creates no more.
+MOST_INSIDE = 2**18
 # The most subjects that make an event together because time has passed.
 MOST_DUE = 4096
+NOTHING: Mapping[str, KeysChanged] = MappingProxyType({})
 # How the library names a ring.
 RING = re.compile(r"polygon (\d+)(?: ring (\d+))? (.*)", re.DOTALL)
 
@@ -65,16 +74,14 @@ class Ground:
         lines: the lines of its queues.
         places: for hulls that the trip may create, by name.
         fences: the fences that its requests name; None for those that do not exist.
-        number: the number of a new fence.
-        refusal: the reason if no more fences are allowed.
+        numbers: the numbers of new fences, by name; those without one are too many.
         limits: the limits on fences.
     """
 
     lines: Sequence[Line]
     places: dict[str, Place]
     fences: dict[str, Fence | None]
-    number: int
-    refusal: Exception | None
+    numbers: dict[str, int]
     limits: FenceLimits
 
 
@@ -93,20 +100,43 @@ class LineTrip(Trip):
         examined: the numbers of the fences that are examined after a failure.
         structural: whether it changes which hulls share a queue.
         creates: the number of fences that it creates, at most.
+        left: the requests that it has left for a later trip, because the fences before them have many subjects inside.
         weight: the number of subjects that it may concern beside the rows of its requests.
     """
 
-    __slots__ = ("_by_name", "_ground", "creates", "examined", "fence_legs", "structural", "weight")
+    __slots__ = (
+        "_by_name",
+        "_expired",
+        "_ground",
+        "_inside",
+        "_journals",
+        "creates",
+        "examined",
+        "fence_legs",
+        "left",
+        "structural",
+        "weight",
+    )
 
     def __init__(self, legs: list[Leg], requests: list[Request], now: float, pause: float, ground: Ground) -> None:
         super().__init__(legs, requests, now, pause, None)
         self.fence_legs: dict[int, FenceLeg] = {}
         self._ground = ground
         self._by_name = {leg.name: leg for leg in legs}
+        self._journals: dict[str, list[Record]] = {}
+        self._expired: dict[str, set[Key]] = {}
         self.examined: list[int] = []
         self.structural = isinstance(requests[0], STRUCTURAL)
-        self.creates = int(isinstance(requests[0], CreateFence))
+        self.creates = len(requests) if isinstance(requests[0], CreateFence) else 0
+        self.left: list[Request] = []
+        self._inside = 0
         self.weight = sum(line.weight(leg.name) for line in ground.lines for leg in legs)
+
+    def run(self) -> None:
+        """Run the requests."""
+        super().run()
+        if self.left:
+            del self.requests[-len(self.left) :]
 
     @property
     def places(self) -> dict[str, Place]:
@@ -170,13 +200,17 @@ class LineTrip(Trip):
             if each.before is None:
                 for line in self.lines:
                     line.dismiss(each.name)
-        for leg in self.fence_legs.values():
-            if leg.created:
-                for subjects in leg.fence.subjects.values():
-                    if leg.fence.number in subjects.index:
-                        subjects.index.drop(leg.fence.number)
-                    if not subjects.fences:
-                        subjects.index.detach()
+        for number in [number for number, leg in self.fence_legs.items() if leg.created]:
+            self._drop(self.fence_legs.pop(number).fence)
+
+    def _drop(self, fence: Fence) -> None:
+        """Let its subjects forget a fence that is not created after all; without any, nothing is compared any more."""
+        others = [leg.fence for leg in self.fence_legs.values() if leg.created]
+        for name, subjects in fence.subjects.items():
+            if fence.number in subjects.index:
+                subjects.index.drop(fence.number)
+            if not subjects.fences and all(other.subjects.get(name) is not subjects for other in others):
+                subjects.detach()
 
     # Hulls
 
@@ -185,14 +219,15 @@ class LineTrip(Trip):
 
     def _apply(self, request: WriteBatch, hull: Hull, leg: Leg) -> Applied | None:
         def expired() -> None:
-            self._watch([hull], request.arrived, EXPIRY)
+            self._watch([hull], request.arrived, EXPIRY, {hull.name: KeysChanged()})
 
-        applied = write(request, hull, self._now, leg.records, expired)
+        journal = self._journal(leg)
+        applied = write(request, hull, self._now, journal, expired)
         if applied is None and hull is not leg.after:  # it was not created after all
             for line in self.lines:
                 line.dismiss(hull.name)
         if applied is not None and not applied.duplicate:
-            self._watch([hull], request.arrived)
+            self._watch([hull], request.arrived, None, {hull.name: _keys_changed(applied, journal)})
         return applied
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
@@ -206,36 +241,74 @@ class LineTrip(Trip):
         return hull
 
     def _write_together(self, request: WriteTogether) -> None:
+        self._expired = {}
         super()._write_together(request)
         hulls = [self._by_name[part.name].after for part in request.parts]
-        self._watch([hull for hull in hulls if hull is not None], request.parts[0].arrived)
+        changed = {
+            part.name: _keys_changed(applied, self._journals[part.name], self._expired.get(part.name, ()))
+            for part, applied in zip(request.parts, request.result, strict=True)
+            if not applied.duplicate
+        }
+        self._watch([hull for hull in hulls if hull is not None], request.parts[0].arrived, None, changed)
+
+    def _journal(self, leg: Leg) -> list[Record]:
+        journal = self._journals[leg.name] = [] if leg.records is None else leg.records
+        return journal
+
+    def _left(self, hull: Hull) -> None:
+        contents = hull.state.contents
+        if isinstance(contents, Keyed):
+            self._expired[hull.name] = set(contents.ended)
 
     def _expire(self, request: Expire, leg: Leg) -> int:
         expired = super()._expire(request, leg)
         if expired:
-            self._watch([request.hull], request.time, EXPIRY)
+            self._watch([request.hull], request.time, EXPIRY, {request.name: KeysChanged()})
         return expired
 
-    def _watch(self, hulls: Sequence[Hull], now: int, swap: Swap | None = None) -> None:
+    def _watch(
+        self, hulls: Sequence[Hull], now: int, swap: Swap | None, changed: Mapping[str, KeysChanged] = NOTHING
+    ) -> None:
         """Make the events of a change of these hulls."""
         try:
             for line in self.lines:
-                self._cross(line.changed(hulls), swap, now)
+                crossed: dict[str, tuple[Subjects, Crossings | None]] = {
+                    name: (line.subjects[name], None) for name in changed if name in line.subjects
+                }
+                crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls)}
+                for name, (subjects, crossings) in sorted(crossed.items()):
+                    self._cross(subjects, crossings, swap, now, changed.get(name))
                 for fence, pair, causes in line.paired(hulls):
                     self._fence_leg(fence).paired(pair, causes, now)
         except BaseException:  # an index may have lost crossings
             self._tear(hulls)
             raise
 
-    def _cross(self, crossed: Iterable[tuple[Subjects, Crossings]], swap: Swap | None, now: int) -> None:
-        for subjects, crossings in crossed:
-            if not len(crossings):
-                continue
+    def _cross(
+        self,
+        subjects: Subjects,
+        crossings: Crossings | None,
+        swap: Swap | None,
+        now: int,
+        changed: KeysChanged | None = None,
+    ) -> None:
+        """Make the events of a change of the keys of a hull, or of the areas of its fences."""
+        crossed = set()
+        if crossings is not None and len(crossings):
+            if changed is not None and changed.expired:
+                crossings = _with_expiries(crossings, changed.expired)
             numbers = crossings.fences
             starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1])).tolist()
             for first, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
                 fence = subjects.fences[int(numbers[first])]
-                self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), swap, now)
+                crossed.add(fence)
+                if fence.delays is None:
+                    self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), swap, now)
+                else:
+                    delay(self._fence_leg(fence), subjects, crossings, slice(first, end), swap, now, changed)
+        for fence in () if changed is None else list(subjects.delaying):
+            if fence not in crossed:  # subjects may have reported that they stay
+                delay(self._fence_leg(fence), subjects, None, NO_ROWS, None, now, changed)
 
     def _tear(self, hulls: Iterable[Hull]) -> None:
         self.torn = True
@@ -259,6 +332,10 @@ class LineTrip(Trip):
             return None
         return super()._do(request)
 
+    def _recenter(self, request: Recenter, leg: Leg) -> tuple[Counts, bool]:
+        self._refuse_deletion(request.name)  # the projection of fences and subjects stays the same
+        return super()._recenter(request, leg)
+
     def _refuse_deletion(self, name: str) -> None:
         """Raise HullFencedError if a fence depends on the hull, other than by a prefix."""
         for line in self.lines:
@@ -272,13 +349,20 @@ class LineTrip(Trip):
         subjects = line.subjects.get(request.name)
         if subjects is not None:
             for fence in subjects.fences.values():
-                if subjects.index.count(fence.number):
-                    self._fence_leg(fence).left(subjects, request.time)
+                leg = self._fence_leg(fence)
+                keys = fence.keys_inside(subjects)
+                for key in () if fence.delays is None else list(fence.delays.of(request.name)):
+                    leg.put_delay((request.name, key), None)
+                    self.applied = True
+                leg.left(subjects, keys, int(Cause.REMOVED), request.time)
 
     # Fences
 
     def _do_fence(self, request: FenceRequest) -> object:
         if isinstance(request, CreateFence):
+            if self._inside > MOST_INSIDE:
+                self.left.append(request)
+                return None
             return self._create(request)
         fence = self._ground.fences[request.name]
         if fence is None:
@@ -318,10 +402,11 @@ class LineTrip(Trip):
         ground, config = self._ground, request.config
         if ground.fences[request.name] is not None:
             raise FenceExistsError(request.name)
-        if ground.refusal is not None:
-            raise ground.refusal
+        number = ground.numbers.get(request.name)
+        if number is None:
+            raise LimitExceededError("max_fences", ground.limits.max_fences)
         row = FenceRow(
-            ground.number,
+            number,
             request.name,
             request.birth.uid,
             request.birth.created,
@@ -330,21 +415,21 @@ class LineTrip(Trip):
         )
         fence = Fence(row, ground.limits.fence_history_bytes)
         fence.area = self._area(config)
+        require_frames(config, fence.area, None if config.kind == "prefix" else self._hull(config.subjects))
         if config.kind == "other":
             assert fence.area is not None  # checked by the caller
             fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
             fence.pair.look()
         leg = FenceLeg(fence, created=True)
+        fence.subjects = {each.hull.name: each for each in self._subjects(config)}
         try:
-            fence.subjects = {each.hull.name: each for each in self._subjects(config)}
             for subjects in fence.subjects.values():
-                _lay(subjects, row.number, config, fence.area)
+                _lay(subjects, number, config, fence.area)
+                self._inside += subjects.index.count(number)
         except BaseException:
-            self.fence_legs[row.number] = leg
-            self.undo_created()
-            del self.fence_legs[row.number]
+            self._drop(fence)
             raise
-        self.fence_legs[row.number] = leg
+        self.fence_legs[number] = leg
         if config.initial == "snapshot":
             leg.summed_up(EventType.SNAPSHOT, Cause.CREATED, request.time)
         elif config.initial == "events":
@@ -363,6 +448,7 @@ class LineTrip(Trip):
         if (config.kind, config.subjects) != (leg.row.config.kind, leg.row.config.subjects):
             raise InvalidFenceError("subjects", config.subjects, "the subjects of a fence stay the same")
         area = self._area(config)
+        require_frames(config, area, None if config.kind == "prefix" else self._hull(config.subjects))
         if not fence.subjects and config.kind == "prefix":  # nobody is there to refuse an invalid area
             _check(config, area)
         for subjects in fence.subjects.values():
@@ -371,13 +457,17 @@ class LineTrip(Trip):
         if fence.pair is not None and area is not None:
             self._replace_pair(fence.pair, Pair(area, fence.pair.other, config.near), leg, request.time)
         waits = leg.row.waits
+        if config.delays or fence.delays is not None:
+            fence.delays = Delays(config, None if fence.delays is None else dict(fence.delays.all()))
+            self.applied = True
         if config.dwell != leg.row.config.dwell:
             waits = _waits(config, leg.last, leg.time(request.time))
         leg.row = replace(leg.row, config=config, waits=waits)
         leg.area = area
         try:
             for subjects in fence.subjects.values():
-                self._cross([(subjects, subjects.index.take())], REPLACEMENT, request.time)
+                self._cross(subjects, subjects.take(config, area), REPLACEMENT, request.time)
+            end_all(leg, request.time)
         except BaseException:
             self._tear(())
             raise
@@ -404,6 +494,8 @@ class LineTrip(Trip):
     def _subjects(self, config: FenceConfig) -> list[Subjects]:
         """The hulls whose keys a new fence compares, by name."""
         known = {name: subjects for line in self.lines for name, subjects in line.subjects.items()}
+        for leg in self.fence_legs.values():
+            known |= leg.fence.subjects
         if config.kind == "hull":
             hull = self._hull(config.subjects)
             if hull.row.settings.identity == "multiset":
@@ -411,23 +503,35 @@ class LineTrip(Trip):
             return [known.get(hull.name) or Subjects(hull)]
         hulls = [leg.after for _, leg in sorted(self._by_name.items()) if config.compares(leg.name)]
         keyed = [hull for hull in hulls if hull is not None and hull.row.settings.identity != "multiset"]
+        for hull in keyed:
+            require_frames(config, hull, None)
         if not keyed and config.kind == "prefix":
             _check(config, self._area(config))
         return [known.get(hull.name) or Subjects(hull) for hull in keyed]
 
     def _pass_time(self, request: PassTime, fence: Fence) -> None:
-        """Make the events of those who have been inside long enough, in the order of hulls and keys."""
-        if fence is not request.fence or fence.dwelling is None:
+        """Make the events for which time has passed, in the order of hulls and keys."""
+        if fence is not request.fence:
             return
+        self._end_delays(request, fence)
         made = self.fence_legs.get(fence.number)
         # The events of this trip come after those that `dwelling` knows.
         changed = set() if made is None else {(event.hull, event.key) for event in made.events}
-        waited: dict[str, list[tuple[Key, int]]] = {}
-        for (hull, key), since in fence.dwelling.due(request.time - fence.row.config.dwell, MOST_DUE):
+        waited: dict[str, dict[Key, tuple[EventType, int, int]]] = {}
+        due = () if fence.dwelling is None else fence.dwelling.due(request.time - fence.row.config.dwell, MOST_DUE)
+        for (hull, key), since in due:
             if (hull, key) not in changed:
-                waited.setdefault(hull, []).append((key, since))
+                waited.setdefault(hull, {})[key] = EventType.DWELL, int(Cause.TIME), since
         for hull, keys in sorted(waited.items()):
-            self._fence_leg(fence).dwelt(fence.subjects[hull], keys, request.time)
+            self._fence_leg(fence).report(fence.subjects[hull], keys, request.time)
+
+    def _end_delays(self, request: PassTime, fence: Fence) -> None:
+        ripe: dict[str, list[Subject]] = {}
+        for subject in () if fence.delays is None else fence.delays.due(request.time, MOST_DUE):
+            ripe.setdefault(subject[0], []).append(subject)
+        for hull, found in sorted(ripe.items()):
+            self.applied = True
+            end_some(self._fence_leg(fence), fence.subjects[hull], found, Cause.TIME, request.time)
 
     def _put_consumer(self, request: PutConsumer, leg: FenceLeg) -> Consumer:
         fence = leg.fence
@@ -461,6 +565,22 @@ def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:
     return Waits(sequence, time) if config.dwell else NO_WAITS
 
 
+def _keys_changed(applied: Applied, journal: Sequence[Record], expired: Collection[Key] = ()) -> KeysChanged:
+    """What an applied batch, the last one of the journal, has done to keys."""
+    rows = journal[-1].rows
+    fewer = applied.deleted or applied.evicted or applied.expired
+    return KeysChanged(rows if isinstance(rows, KeyRows) else None, expired, bool(fewer))
+
+
+def _with_expiries(crossings: Crossings, expired: Collection[Key]) -> Crossings:
+    """The crossings; keys whose time had come were not removed by the batch that followed at once."""
+    gone = np.flatnonzero(crossings.causes & Cause.REMOVED)
+    ended = gone[[crossings.keys[row] in expired for row in gone.tolist()]] if len(gone) else gone
+    causes = crossings.causes.copy()
+    causes[ended] ^= np.uint8(Cause.REMOVED | Cause.EXPIRED)
+    return replace(crossings, causes=causes)
+
+
 def _check(config: FenceConfig, area: Hull | None) -> None:
     """Raise InvalidFenceError if the area of a fence without subjects is invalid."""
     try:
@@ -472,7 +592,7 @@ def _check(config: FenceConfig, area: Hull | None) -> None:
 def _lay(subjects: Subjects, number: int, config: FenceConfig, area: Hull | None) -> None:
     vertices = None if area is None else area.state.vertices()
     try:
-        lay(subjects.index, number, config, vertices)
+        subjects.lay(number, config, vertices)
     except ValueError as error:
         raise _invalid(config, str(error)) from None
 

@@ -11,6 +11,7 @@ from dynhull.convex import Cloud
 from dynhull.gjk import contact, intersect
 
 from ..hull import Hull
+from .on_globe import compared
 
 # Distances whose rounded value differs from the limit by less, of the size of the hulls, are compared exactly: a
 # hundred million times what rounding errors amount to.
@@ -51,7 +52,9 @@ class Pair:
         a, b = self.area.state.vertices(), self.other.state.vertices()
         self._as_of = self._changes()
         self.distance, self.near = math.inf, False
-        if len(a) and len(b):
+        if len(a) and len(b) and self.area.state.center is not None:
+            self.near, self.distance = compared(self.area, self.other, self._limit)
+        elif len(a) and len(b):
             self.distance = contact(Cloud(a), Cloud(b)).distance
             self.near = intersect(Cloud(a), Cloud(b)) or (self._limit > 0 and self._within(a, b))
             if self.near and not self._limit:

@@ -66,6 +66,9 @@ def merged(queues: Sequence[list[Request]]) -> list[Request]:
     A request that waits in several of the queues comes once. Requests that may wait in other queues too keep the order
     in which they have arrived, because it is their order there.
     """
+    queues = [queue for queue in queues if queue]
+    if len(queues) == 1:
+        return list(queues[0])
     places = Counter(id(request) for queue in queues for request in queue)
     at = [0] * len(queues)
     ordered: list[Request] = []

@@ -8,6 +8,7 @@ from ..records import NO_TIME, Keys, Times
 from .config import FenceConfig
 
 Key = str | int
+Subject = tuple[str, Key]  # the name of its hull, and its key
 Position = tuple[float, float]
 
 
@@ -50,6 +51,22 @@ class Members(NamedTuple):
     since: Times | None = None
 
 
+class Delay(NamedTuple):
+    """A change of side that is no event yet.
+
+    Attributes:
+        enters: whether the subject is on the side of the area, though it is reported outside; or the opposite.
+        since: when it changed its side, in microseconds since 1970 by the server's clock.
+        reports: the number of its reports since then, that one included if it was its own; 0 where they do not count.
+        causes: why it changed its side.
+    """
+
+    enters: bool
+    since: int
+    reports: int
+    causes: int
+
+
 class FenceEvent(NamedTuple):
     """One event.
 
@@ -64,7 +81,8 @@ class FenceEvent(NamedTuple):
         distance: the distance from the position to the area; None if the subject is gone.
         event_time: the time of the position, NO_TIME if it has none.
         time: when the event was made, in microseconds since 1970 by the server's clock.
-        first_time: since when the subject has been inside, in a dwell event; otherwise NO_TIME.
+        first_time: since when the subject has been inside, in a dwell event; when it changed its side, in one that was
+            delayed; otherwise NO_TIME.
         inside: the subjects that were inside, in a snapshot and at the end.
     """
 
@@ -142,10 +160,12 @@ class Inside:
     Attributes:
         sequence: the sequence of that event.
         members: the subjects, by hull.
+        time: the time of that event, which is perhaps no longer kept; NO_TIME if it is not known.
     """
 
     sequence: int = 0
     members: tuple[Members, ...] = ()
+    time: int = NO_TIME
 
 
 @dataclass(slots=True)
@@ -158,6 +178,7 @@ class KeptFence:
         events: the events after that one, all of them.
         first: the sequence of the oldest event that is kept; that of the next event if there is none.
         consumers: its consumers.
+        delays: the changes of side that are no events yet.
     """
 
     row: FenceRow
@@ -165,6 +186,7 @@ class KeptFence:
     events: list[FenceEvent] = field(default_factory=list)
     first: int = 1
     consumers: dict[str, Consumer] = field(default_factory=dict)
+    delays: dict[Subject, Delay] = field(default_factory=dict)
 
     @property
     def last(self) -> int:
@@ -203,6 +225,14 @@ class AppendEvents:
 
     number: int
     events: list[FenceEvent]
+
+
+@dataclass(frozen=True, slots=True)
+class PutDelays:
+    """Delays of subjects, new or changed; None for those that have ended."""
+
+    number: int
+    delays: dict[Subject, Delay | None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ With a margin the side of a subject depends on its way, so it is never recompute
 and the events since.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from dynhull.keys import key_list
 
 from ..hull_state import HullState
 from .records import EventType, KeptFence, Key
-from .subjects import Subjects, keyed, lay
+from .subjects import Subjects, frame_of, indexed, lay
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +41,25 @@ def restore(subjects: Iterable[Subjects], states: Mapping[str, HullState], kept:
         RuntimeError: who is inside, as stored, contradicts the positions.
     """
     inside = {number: members_after(each) for number, each in kept.items()}
+    delayed: defaultdict[tuple[int, str], set[Key]] = defaultdict(set)
+    for number, fence_kept in kept.items():
+        for hull, key in fence_kept.delays:
+            delayed[number, hull].add(key)
     indexes = {}
     for each in subjects:
         state = states.get(each.hull.name)
         if state is None:  # the hull itself stays
             each.index.detach()
             state = each.hull.state
-        index = indexes[each.hull.name] = FenceIndex(keyed(state))
+        index = indexes[each.hull.name] = FenceIndex(indexed(state))
         for number, fence in each.fences.items():
             config = kept[number].row.config
             vertices = None
             if fence.area is not None:
                 vertices = states.get(fence.area.name, fence.area.state).vertices()
-            lay(index, number, config, vertices, each.keys(inside[number].get(each.hull.name, ())))
+            reported = inside[number].get(each.hull.name, set())
+            members = each.keys(reported ^ delayed[number, each.hull.name])
+            lay(index, number, config, vertices, members, frame_of(state))
         if len(index.take()):
             raise RuntimeError(f"the subjects inside, as stored, contradict the keys of the hull {each.hull.name!r}")
     return Restored(kept, indexes)

@@ -49,16 +49,20 @@ def chunk(contents: Contents, rows: slice) -> bytes:
 
 def state(kept: Kept) -> bytes:
     """The state of a snapshot: everything but its contents."""
-    return json.dumps({"producers": kept.producers, "clock": kept.clock}).encode()
+    found = {"producers": kept.producers, "clock": kept.clock, "center": kept.center, "skipping": sorted(kept.skipping)}
+    return json.dumps(found).encode()
 
 
-def state_from(data: bytes) -> tuple[dict[str, int], int | None, Callable[[bytes], Contents]]:
-    """The producers and the clock of a state, and the function that decodes its chunks."""
+def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
+    """The producers, the clock and the centre of a state, and the function that decodes its chunks."""
     found = json.loads(data or "{}")
     producers = found.get("producers")
-    if isinstance(producers, dict):
-        return producers, found["clock"], _decoded
-    return found, None, _points_only  # of format 1 or 2: the last number of each producer
+    if not isinstance(producers, dict):
+        return Kept(producers=found), _points_only  # of format 1 or 2: the last number of each producer
+    center = found.get("center")
+    kept = Kept(producers=producers, clock=found["clock"], center=None if center is None else tuple(center))
+    kept.skipping = frozenset(found.get("skipping", ()))
+    return kept, _decoded
 
 
 def joined(parts: Sequence[Contents]) -> Contents:

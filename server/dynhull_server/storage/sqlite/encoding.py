@@ -1,7 +1,8 @@
 """Records as bytes, and the checksums of rows.
 
-A payload is a sequence of records: a header, the name of the producer, the hull's clock, and the columns of the rows.
-What is optional has a flag in the header. Records of the formats 1 and 2 have no flags but LENIENT.
+A payload is a sequence of records: a header, the name of the producer, the hull's clock, its centre, and the columns of
+the rows. What is optional has a flag in the header. Records of the formats 1 and 2 have no flags but LENIENT. Before
+format 5 the further flags were the upper byte of the length of the name, which was always 0.
 """
 
 import struct
@@ -14,12 +15,14 @@ from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows
 from .columns import Cursor, key_bytes, point_bytes, time_bytes
 
 # The number of points inserted, keys put or points expired; that of points deleted or keys removed; the sequence
-# number; the length of the producer's name; the flags.
-HEADER = struct.Struct("<IIQHB")
+# number; the length of the producer's name; the further flags; the flags.
+HEADER = struct.Struct("<IIQBBB")
 TIME = struct.Struct("<q")
+CENTER = struct.Struct("<dd")
 MOST_NUMBERS = 7  # in the key of a row
 NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
+HAS_CENTER, MAY_SKIP = 1, 2  # further flags
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
 KINDS = 48  # the flags with the kind of the rows
 POINTS, STRINGS, INTEGERS, EXPIRY = 0, 16, 32, 48
@@ -34,10 +37,14 @@ def encode(records: Iterable[Record]) -> bytes:
     for record in records:
         producer = record.producer.encode()
         added, removed, flags, columns = _encoded(record.rows)
+        further = MAY_SKIP if record.may_skip else 0
+        if record.center is not None:
+            further |= HAS_CENTER
+            columns.insert(0, CENTER.pack(*record.center))
         if record.clock is not None:
             flags |= HAS_CLOCK
             columns.insert(0, TIME.pack(record.clock))
-        parts += [HEADER.pack(added, removed, record.sequence, len(producer), flags), producer, *columns]
+        parts += [HEADER.pack(added, removed, record.sequence, len(producer), further, flags), producer, *columns]
     return b"".join(parts)
 
 
@@ -45,10 +52,14 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
     """The records of a payload; `revision` is that of the first. ValueError if the bytes are no records."""
     cursor = Cursor(payload)
     while not cursor.at_end:
-        added, removed, sequence, name, flags = HEADER.unpack(cursor.take(HEADER.size))
+        added, removed, sequence, name, further, flags = HEADER.unpack(cursor.take(HEADER.size))
+        if further > HAS_CENTER | MAY_SKIP:
+            raise ValueError(f"a record has the unknown further flags {further:#x}")
         producer = str(cursor.take(name), "utf-8")
         clock = _time(cursor) if flags & HAS_CLOCK else None
-        yield Record(revision, _decoded(cursor, added, removed, flags), producer, sequence, clock)
+        center = CENTER.unpack(cursor.take(CENTER.size)) if further & HAS_CENTER else None
+        rows = _decoded(cursor, added, removed, flags)
+        yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP))
         revision += 1
 
 

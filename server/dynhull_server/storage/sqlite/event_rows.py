@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 
 from dynhull.keys import PackedKeys
 
-from ...state.fences.records import EventType, FenceEvent, Inside, Key, Members, Position
+from ...state.fences.records import Delay, EventType, FenceEvent, Inside, Key, Members, Position, Subject
 from ...state.records import NO_TIME, Keys
 from .columns import Cursor, key_bytes, time_bytes
 
@@ -20,6 +20,7 @@ INTEGER = struct.Struct("<Q")
 
 # The first byte of an event: its type, and what it has. A distance without bytes of its own is 0.
 TYPE_BITS = 15
+OF_PAIRS = (EventType.BEGIN, EventType.CEASE)  # they have a distance without a position
 HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
 # The third byte, after the causes.
 NO_KEY, STRING_KEY, INTEGER_KEY = 0, 1, 2
@@ -27,6 +28,7 @@ KEY_BITS = 3
 HAS_FIRST_TIME, HAS_HULL, HAS_INSIDE = 4, 8, 16
 # Of some keys inside: beside their kind, whether their times follow.
 HAS_SINCE = 4
+ENTERS = 4  # of a delay: beside the kind of its key
 SEVEN_BITS, MORE = 127, 128
 
 
@@ -93,10 +95,11 @@ def decode_events(payload: bytes, sequence: int, own: str) -> Iterator[FenceEven
             key = _read_text(cursor)
         elif third & KEY_BITS == INTEGER_KEY:
             (key,) = INTEGER.unpack(cursor.take(INTEGER.size))
-        position = previous = distance = None
+        kind = EventType(first & TYPE_BITS)
+        position = previous = None
+        distance = 0.0 if first & HAS_POSITION or kind in OF_PAIRS else None
         if first & HAS_POSITION:
             position = POSITION.unpack(cursor.take(POSITION.size))
-            distance = 0.0
         if first & HAS_PREVIOUS:
             previous = _read_differing(cursor, position)
         if first & HAS_DISTANCE:
@@ -106,7 +109,7 @@ def decode_events(payload: bytes, sequence: int, own: str) -> Iterator[FenceEven
         inside = _read_members(cursor) if third & HAS_INSIDE else ()
         yield FenceEvent(
             sequence,
-            EventType(first & TYPE_BITS),
+            kind,
             causes,
             hull,
             key,
@@ -123,16 +126,51 @@ def decode_events(payload: bytes, sequence: int, own: str) -> Iterator[FenceEven
         sequence += 1
 
 
-def encode_inside(members: Iterable[Members]) -> bytes:
-    """Who is inside, as bytes."""
+def encode_inside(members: Iterable[Members], time: int) -> bytes:
+    """Who is inside, as bytes, and the time of the last event."""
     out = bytearray()
     _members(out, tuple(members))
+    if time != NO_TIME:
+        _signed(out, time)
     return bytes(out)
 
 
 def decode_inside(data: bytes, sequence: int) -> Inside:
     """The inverse of `encode_inside`."""
-    return Inside(sequence, _read_members(Cursor(data)))
+    cursor = Cursor(data)
+    members = _read_members(cursor)
+    return Inside(sequence, members, NO_TIME if cursor.at_end else _read_signed(cursor))
+
+
+def encode_delay(subject: Subject, delay: Delay) -> bytes:
+    """The delay of a subject, as bytes."""
+    hull, key = subject
+    kind = STRING_KEY if isinstance(key, str) else INTEGER_KEY
+    out = bytearray((kind | ENTERS * delay.enters, delay.causes))
+    _text(out, hull)
+    if isinstance(key, str):
+        _text(out, key)
+    else:
+        out += INTEGER.pack(key)
+    _signed(out, delay.since)
+    _unsigned(out, delay.reports)
+    return bytes(out)
+
+
+def decode_delay(data: bytes) -> tuple[Subject, Delay]:
+    """The inverse of `encode_delay`. ValueError if the bytes are no delay."""
+    cursor = Cursor(data)
+    kind, causes = cursor.take(2)
+    hull = _read_text(cursor)
+    key: Key
+    if kind & KEY_BITS == STRING_KEY:
+        key = _read_text(cursor)
+    else:
+        (key,) = INTEGER.unpack(cursor.take(INTEGER.size))
+    since, reports = _read_signed(cursor), _read_unsigned(cursor)
+    if not cursor.at_end:
+        raise ValueError("bytes follow the delay")
+    return (hull, key), Delay(kind & ENTERS != 0, since, reports, causes)
 
 
 def _members(out: bytearray, members: tuple[Members, ...]) -> None:

@@ -17,14 +17,13 @@ from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
 from .hull_rows import found_hulls, values
 from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
-from .schema import APPLICATION_ID, FORMAT, PAGE_BYTES, SCHEMAS, found
+from .schema import APPLICATION_ID, DELAYS_SINCE, FENCES_SINCE, FORMAT, PAGE_BYTES, SCHEMAS, found
 from .totals import Totals, read_totals
 
 MOST_MESSAGES = 5  # of SQLite's checks
 PROGRESS_ROWS = 1000
 
 MISSING = 0  # the number of no row
-FENCES_SINCE = 4  # the first format with fences
 
 
 @dataclass(slots=True)
@@ -175,7 +174,9 @@ class _Examination:
         self._chunks()
         self._batches()
         if self._version >= FENCES_SINCE:
-            self._fences = FenceExamination(self._connection, self._ledger, contents=self._contents).run()
+            delays = self._version >= DELAYS_SINCE
+            examination = FenceExamination(self._connection, self._ledger, contents=self._contents, delays=delays)
+            self._fences = examination.run()
             self._findings.fatal += self._fences.fatal
             self._findings.repairs += self._fences.repairs
         self._compare(totals)

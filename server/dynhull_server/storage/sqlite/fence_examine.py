@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...state.fences.records import Consumer
 from .encoding import checksum, weight
+from .event_rows import decode_delay
 from .fence_ledger import DropInside, FenceRows, FenceStep
 from .fence_rows import consumer_values, found_fences
 
@@ -41,13 +42,15 @@ class FenceExamination:
         connection: a connection with an open transaction.
         ledger: receives the rows.
         contents: whether to read payloads.
+        delays: whether the format has delays.
     """
 
-    def __init__(self, connection: sqlite3.Connection, ledger: "Ledger", *, contents: bool) -> None:
+    def __init__(self, connection: sqlite3.Connection, ledger: "Ledger", *, contents: bool, delays: bool) -> None:
         self._connection = connection
         self._ledger = ledger
         self._fences = ledger.fences
         self._contents = contents
+        self._has_delays = delays
         self._found = FoundFences()
 
     def run(self) -> FoundFences:
@@ -57,6 +60,8 @@ class FenceExamination:
         self._events()
         self._insides()
         self._consumers()
+        if self._has_delays:
+            self._delays()
         for fence in self._fences.values():
             self._judge(fence)
         found.rows = sum(fence.count for fence in self._fences.values())
@@ -123,6 +128,29 @@ class FenceExamination:
                 continue
             fence.put_consumer(consumer, place, weight(stored, number))
         self._ledger.consumer_ids = count(newest + 1)
+
+    def _delays(self) -> None:
+        newest = 0
+        query = "SELECT rowid, fence, checksum, payload FROM delays ORDER BY rowid"
+        for place, number, stored, payload in self._connection.execute(query):
+            newest = place
+            fence = self._fences.get(number)
+            if fence is None:
+                self._ledger.dead["delays"].append(place)
+                continue
+            try:
+                whole = checksum(payload, number) == stored
+                subject, _ = decode_delay(payload)
+                each = weight(stored, number)
+            except (ValueError, TypeError, struct.error):
+                whole = False
+            if not whole:
+                self._blame(fence, "a delay is damaged")
+                continue
+            if subject in fence.delays:
+                self._blame(fence, f"the key {subject[1]!r} of the hull {subject[0]!r} has two delays")
+            fence.put_delay(subject, place, each)
+        self._ledger.delay_ids = count(newest + 1)
 
     def _weight(self, fence: FenceRows, what: str, stored: Any, payload: Any, *keys: Any) -> int | None:
         """The weight of a row; None if it is damaged."""

@@ -4,6 +4,7 @@ from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
 from ...state.changes import FenceChange
@@ -19,12 +20,14 @@ from ...state.fences.records import (
     Inside,
     Members,
     PutConsumer,
+    PutDelays,
+    Subject,
 )
 from ..port import NotCommittedError
 from .encoding import checksum, weight
-from .event_rows import encode_events, encode_inside
+from .event_rows import encode_delay, encode_events, encode_inside
 from .fence_rows import consumer_values, values
-from .schema import INSERT_CONSUMER, INSERT_EVENTS, INSERT_FENCE, INSERT_INSIDE
+from .schema import INSERT_CONSUMER, INSERT_DELAY, INSERT_EVENTS, INSERT_FENCE, INSERT_INSIDE
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -70,6 +73,7 @@ class FenceRows:
         last: the newest sequence.
         insides: who was inside, by sequence.
         consumers: each consumer with its row number and weight.
+        delays: the row number and weight of each delay.
     """
 
     row: FenceRow
@@ -82,6 +86,7 @@ class FenceRows:
     last: int = 0
     insides: dict[int, InsideRows] = field(default_factory=dict)
     consumers: dict[str, tuple[Consumer, int, int]] = field(default_factory=dict)
+    delays: dict[Subject, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def first(self) -> int:
@@ -112,6 +117,7 @@ class FenceRows:
             weights=array("q"),
             insides=insides,
             consumers=dict(self.consumers),
+            delays=dict(self.delays),
         )
 
     def append(self, first: int, last: int, place: int, each: int) -> None:
@@ -150,6 +156,18 @@ class FenceRows:
         known = self.consumers.pop(name, None)
         if known is not None:
             self._plus(-1, -known[2])
+
+    def put_delay(self, subject: Subject, place: int, each: int) -> None:
+        """Add or change the delay of a subject."""
+        self.drop_delay(subject)
+        self.delays[subject] = place, each
+        self._plus(1, each)
+
+    def drop_delay(self, subject: Subject) -> None:
+        """Remove the delay of a subject, if it has one."""
+        known = self.delays.pop(subject, None)
+        if known is not None:
+            self._plus(-1, -known[1])
 
     def change(self, row: FenceRow, each: int) -> None:
         """Change the row of the fence itself."""
@@ -194,6 +212,7 @@ class _Now:
         last: the newest sequence.
         dropped: the number of its oldest rows of events that are deleted.
         consumers: the row number and weight of each changed consumer, None for a deleted one.
+        delays: the row number and weight of each changed delay, None for one that has ended.
         deleted: whether it is deleted.
     """
 
@@ -203,6 +222,7 @@ class _Now:
     last: int
     dropped: int = 0
     consumers: dict[str, tuple[int, int] | None] = field(default_factory=dict)
+    delays: dict[Subject, tuple[int, int] | None] = field(default_factory=dict)
     deleted: bool = False
 
     def consumer(self, name: str) -> tuple[int, int] | None:
@@ -277,6 +297,8 @@ class FenceChanges:
         match change:
             case AppendEvents():
                 self._append(change, now)
+            case PutDelays():
+                self._put_delays(change, now)
             case ChangeFence():
                 self._change(change.row, now)
             case DropFence():
@@ -328,6 +350,7 @@ class FenceChanges:
             dead["events"] += gone.places
             dead["insides"].extend(place for each in gone.insides.values() for place in each.places.values())
             dead["consumers"].extend(place for _, place, _ in gone.consumers.values())
+            dead["delays"].extend(place for place, _ in gone.delays.values())
 
         self._effects.append(bury)
 
@@ -358,6 +381,25 @@ class FenceChanges:
             place, each = known
             self._plus(now, -1, -each)
             self._delete_rows("consumers", [place])
+
+    def _put_delays(self, change: PutDelays, now: _Now) -> None:
+        number, rows = change.number, now.rows
+        for subject, delay in change.delays.items():
+            known = now.delays.get(subject, rows.delays.get(subject))
+            if known is not None:
+                self._plus(now, -1, -known[1])
+                self._delete_rows("delays", [known[0]])
+            if delay is None:
+                now.delays[subject] = None
+                self._effects.append(partial(rows.drop_delay, subject))
+                continue
+            payload = encode_delay(subject, delay)
+            stored = checksum(payload, number)
+            place, each = next(self._ledger.delay_ids), weight(stored, number)
+            now.delays[subject] = place, each
+            self._plus(now, 1, each)
+            self._statements.append((INSERT_DELAY, (place, number, stored, payload)))
+            self._effects.append(partial(rows.put_delay, subject, place, each))
 
     def _put_inside(self, step: PutInside, now: _Now) -> None:
         keys = step.number, step.sequence, step.part, step.parts
@@ -395,6 +437,6 @@ def inside_steps(number: int, inside: Inside, place: Callable[[], int]) -> list[
     ]
     rows = [[piece] for piece in pieces] or [[]]
     return [
-        PutInside(number, inside.sequence, len(rows), part, place(), encode_inside(row))
+        PutInside(number, inside.sequence, len(rows), part, place(), encode_inside(row, inside.time))
         for part, row in enumerate(rows)
     ]

@@ -4,10 +4,11 @@ import sqlite3
 from array import array
 from collections.abc import Iterator
 
-from ...state.fences.records import FenceEvent, Inside, KeptFence, Members
+from ...state.fences.records import Delay, FenceEvent, Inside, KeptFence, Members, Subject
+from ...state.records import NO_TIME
 from ..port import DamagedError
 from .encoding import checksum
-from .event_rows import decode_events, decode_inside
+from .event_rows import decode_delay, decode_events, decode_inside
 from .fence_ledger import FenceRows
 from .reading import rows_by_id
 
@@ -26,7 +27,8 @@ def read_fence(connection: sqlite3.Connection, fence: FenceRows, first: int) -> 
     base = fence.base
     events = list(_events(connection, fence, base))
     consumers = {name: consumer for name, (consumer, _, _) in fence.consumers.items()}
-    return KeptFence(fence.row, _inside(connection, fence, base), events, first, consumers)
+    delays = dict(_delays(connection, fence))
+    return KeptFence(fence.row, _inside(connection, fence, base), events, first, consumers, delays)
 
 
 def read_events(connection: sqlite3.Connection, fence: FenceRows, after: int, most: int) -> list[FenceEvent]:
@@ -63,15 +65,29 @@ def _inside(connection: sqlite3.Connection, fence: FenceRows, base: int) -> Insi
     places = array("q", (rows.places[part] for part in range(rows.parts)))
     members: list[Members] = []
     columns = "fence, sequence, part, parts, checksum, payload"
-    count = 0
+    count, time = 0, NO_TIME
     for *keys, stored, payload in rows_by_id(connection, columns, "insides", places):
         if checksum(payload, *keys) != stored or keys != [fence.row.number, base, count, rows.parts]:
             raise _damaged(fence, f"who was inside after event {base} is damaged")
-        members += decode_inside(payload, base).members
+        part = decode_inside(payload, base)
+        members += part.members
+        time = part.time
         count += 1
     if count < rows.parts:
         raise _damaged(fence, f"who was inside after event {base} is missing")
-    return Inside(base, tuple(members))
+    return Inside(base, tuple(members), time)
+
+
+def _delays(connection: sqlite3.Connection, fence: FenceRows) -> Iterator[tuple[Subject, Delay]]:
+    places = array("q", (place for place, _ in fence.delays.values()))
+    count = 0
+    for number, stored, payload in rows_by_id(connection, "fence, checksum, payload", "delays", places):
+        if checksum(payload, number) != stored or number != fence.row.number:
+            raise _damaged(fence, "a delay is damaged")
+        count += 1
+        yield decode_delay(payload)
+    if count < len(places):
+        raise _damaged(fence, "a delay is missing")
 
 
 def _damaged(fence: FenceRows, words: str) -> DamagedError:

@@ -47,7 +47,12 @@ def settings_from(text: str) -> HullSettings:
     """The inverse of `settings_text`; ValueError or TypeError for other texts."""
     given = json.loads(text)
     window = given.pop("window", None)
-    return HullSettings(**given, window=None if window is None else Window(**window))
+    center = given.pop("center", None)
+    return HullSettings(
+        **given,
+        window=None if window is None else Window(**window),
+        center=None if center is None else tuple(center),
+    )
 
 
 def found_hulls(connection: sqlite3.Connection, version: int) -> Iterator[FoundHull]:
@@ -81,6 +86,8 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     2: ("SELECT id, name, uid, created, max_points, checksum FROM hulls", _of_format_2),
     3: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
     4: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
+    5: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
+    6: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
 }
 
 

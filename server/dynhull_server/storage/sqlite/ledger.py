@@ -26,9 +26,10 @@ DROPPED = {
     "events": "payload",
     "insides": "payload",
     "consumers": "name",
+    "delays": "payload",
 }
 
-IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids")
+IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids", "delay_ids")
 
 Statement = tuple[str, tuple[Any, ...]]
 
@@ -110,7 +111,7 @@ class Ledger:
         dead: by table, the rows to drop because no hull, fence or snapshot needs them.
         batch_ids, chunk_ids, snapshot_ids: the next numbers. No number is used twice while the storage is open, so a
             row found dead cannot belong to anything else when it is dropped.
-        event_ids, inside_ids, consumer_ids: the same for fences.
+        event_ids, inside_ids, consumer_ids, delay_ids: the same for fences.
     """
 
     totals: Totals = field(default_factory=Totals)
@@ -123,6 +124,7 @@ class Ledger:
     event_ids: "count[int]" = field(default_factory=lambda: count(1))
     inside_ids: "count[int]" = field(default_factory=lambda: count(1))
     consumer_ids: "count[int]" = field(default_factory=lambda: count(1))
+    delay_ids: "count[int]" = field(default_factory=lambda: count(1))
 
     def go_on_from(self, before: "Ledger", under_way: Set[int]) -> None:
         """Replace an earlier ledger; chunks of snapshots that are `under_way` are not dead."""

@@ -4,7 +4,7 @@ import sqlite3
 
 from .hull_rows import values
 from .ledger import Ledger
-from .schema import FENCE_TABLES, INSERT_HULL, TABLES, stamp
+from .schema import FENCE_TABLES, INSERT_HULL, SCHEMAS, TABLES, stamp
 from .totals import Totals, renew_totals
 
 
@@ -29,7 +29,7 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger) -> Non
             connection.execute(f"DROP INDEX {index}")
     else:
         connection.execute("DROP TABLE totals")
-    for table in ("totals", *FENCE_TABLES):
+    for table in ("totals", *(table for table in FENCE_TABLES if table not in SCHEMAS[version])):
         connection.execute(TABLES[table])
     connection.execute("DROP TABLE hulls")
     connection.execute(TABLES["hulls"])

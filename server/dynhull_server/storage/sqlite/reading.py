@@ -1,6 +1,5 @@
 """Reading hulls during commits, even when the process has run out of file descriptors."""
 
-import json
 import sqlite3
 from array import array
 from collections.abc import Callable, Iterable, Iterator
@@ -114,7 +113,8 @@ def rows_by_id(
     # The numbers as JSON make one query for many rows. SQLite runs a cross join from left to right.
     sql = f"SELECT {columns} FROM json_each(?) AS id CROSS JOIN {table} ON {table}.rowid = id.value"  # noqa: S608  (ours)
     for start in range(0, len(ids), ROWS_A_QUERY):
-        yield from connection.execute(sql, (json.dumps(ids[start : start + ROWS_A_QUERY].tolist()),))
+        some = ",".join(map(str, ids[start : start + ROWS_A_QUERY]))
+        yield from connection.execute(sql, (f"[{some}]",))
 
 
 def _newest_snapshot(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kept:
@@ -133,7 +133,7 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
     row = connection.execute(query, keys).fetchone()
     if row is None or checksum(row[0], *keys) != row[1]:
         return None
-    producers, clock, decode_chunk = state_from(row[0])
+    kept, decode_chunk = state_from(row[0])
     parts = []
     found = rows_by_id(connection, "number, checksum, points", "chunks", array("q", snapshot.chunks))
     for expected, (number, stored, data) in enumerate(found):
@@ -142,7 +142,8 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
         parts.append(decode_chunk(data))
     if len(parts) != len(snapshot.chunks):
         return None
-    return Kept(snapshot.revision, joined(parts), producers, clock=clock)
+    kept.revision, kept.contents = snapshot.revision, joined(parts)
+    return kept
 
 
 def _batches(connection: sqlite3.Connection, hull: HullRows, ids: "array[int]") -> Iterable[Iterable[Record]]:

@@ -3,7 +3,8 @@
 import sqlite3
 
 APPLICATION_ID = 0x64796E68  # "dynh"
-FORMAT = 4
+FORMAT = 6
+FENCES_SINCE, DELAYS_SINCE = 4, 6  # the first formats with fences, and with delayed events
 PAGE_BYTES = 8192  # a large batch spans several pages, and wastes half of one
 
 TABLES = {
@@ -77,9 +78,16 @@ TABLES = {
     lost INTEGER NOT NULL,
     checksum INTEGER NOT NULL
 )""",
+    "delays": """CREATE TABLE delays (
+    fence INTEGER NOT NULL,
+    checksum INTEGER NOT NULL,
+    payload BLOB NOT NULL
+)""",
 }
-FENCE_TABLES = ("fences", "events", "insides", "consumers")
+FENCE_TABLES = ("fences", "events", "insides", "consumers", "delays")
 
+# Format 5 had no fences whose events are delayed.
+FORMAT_5 = {table: sql for table, sql in TABLES.items() if table != "delays"}
 # Format 3 had no fences.
 FORMAT_3 = {table: sql for table, sql in TABLES.items() if table not in FENCE_TABLES} | {
     "totals": """CREATE TABLE totals (
@@ -123,6 +131,8 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     1: FORMAT_1,
     2: FORMAT_2,
     3: FORMAT_3,
+    4: FORMAT_5,  # it had no centres in batches and snapshots, and no frames of hulls
+    5: FORMAT_5,
     FORMAT: TABLES,
 }
 
@@ -136,6 +146,7 @@ INSERT_INSIDE = (
     "INSERT INTO insides (rowid, fence, sequence, part, parts, checksum, payload) VALUES (?, ?, ?, ?, ?, ?, ?)"
 )
 INSERT_CONSUMER = "INSERT INTO consumers (rowid, fence, name, acknowledged, lost, checksum) VALUES (?, ?, ?, ?, ?, ?)"
+INSERT_DELAY = "INSERT INTO delays (rowid, fence, checksum, payload) VALUES (?, ?, ?, ?)"
 UPDATE_TOTALS = (
     "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_number=?, mode=?, fence_rows=?, checksum=?"
 )

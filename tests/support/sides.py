@@ -1,25 +1,15 @@
-"""The sides of subjects in whole numbers: what a fence must say, written down as plainly as possible.
+"""The sides of points in whole numbers: what a fence must say, written down as plainly as possible.
 
-All coordinates and lengths of the torture are multiples of a half, and are counted in halves here.
+Coordinates and lengths are whole numbers of a unit that the caller chooses.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from math import inf, isqrt
 
 Point = tuple[int, int]
 Ring = Sequence[Point]
-
-
-def halves(length: float) -> int:
-    """A length in halves."""
-    doubled = int(2 * length)
-    assert doubled == 2 * length
-    return doubled
-
-
-def exact(xy: Iterable[float]) -> Point:
-    x, y = xy
-    return halves(x), halves(y)
 
 
 def turn(a: Point, b: Point, c: Point) -> int:
@@ -96,6 +86,21 @@ def apart(one: Sequence[Point], other: Sequence[Point], limit: int) -> bool:
     )
 
 
+def segment_distance(p: Point, a: Point, b: Point) -> Fraction:
+    """The square of the distance of a point from a segment."""
+    along = (p[0] - a[0]) * (b[0] - a[0]) + (p[1] - a[1]) * (b[1] - a[1])
+    if 0 < along < squared(a, b):
+        return Fraction(turn(a, b, p) ** 2, squared(a, b))
+    return Fraction(min(squared(p, a), squared(p, b)))
+
+
+def root_less(square: Fraction, less: int) -> float:
+    """The square root of a number, less another one, in wholes instead of halves, rounded once."""
+    scale = 2**200  # the integer part of the root has 200 more bits than it needs, and so decides the rounding
+    root = Fraction(isqrt(square.numerator * scale**2 // square.denominator), scale)
+    return float((root - less) / 2)
+
+
 @dataclass(frozen=True)
 class Rings:
     """Polygons joined by "or", each an exterior and holes; a point or a segment as a ring of one or two corners."""
@@ -123,6 +128,15 @@ class Rings:
             return True
         return not any(near(p, a, b, margin) for a, b in self.boundary())
 
+    def distance(self, p: Point, *, closed: bool) -> float:
+        """The distance of a point, rounded once."""
+        degenerate = all(len(exterior) < 3 for exterior, *_ in self.polygons)
+        if degenerate and not closed:
+            return inf
+        if self.holds(p, closed=True):
+            return 0.0
+        return root_less(min(segment_distance(p, a, b) for a, b in self.boundary()), 0) if self.polygons else inf
+
     def passed(self, p: Point, q: Point) -> bool:
         """Whether the way between two points outside meets the closed area."""
         return any(meet(p, q, a, b) for a, b in self.boundary())
@@ -142,7 +156,16 @@ class Disk:
     def farther(self, p: Point, margin: int, *, closed: bool) -> bool:
         if self.holds(p, closed=closed):
             return False
-        return margin == 0 or squared(p, self.center) > (self.radius + margin) ** 2
+        if margin == 0 or (self.radius == 0 and not closed):  # an open disk of this radius is empty
+            return True
+        return squared(p, self.center) > (self.radius + margin) ** 2
+
+    def distance(self, p: Point, *, closed: bool) -> float:
+        if not self.radius and not closed:
+            return inf
+        if self.holds(p, closed=True):
+            return 0.0
+        return root_less(Fraction(squared(p, self.center)), self.radius)
 
     def passed(self, p: Point, q: Point) -> bool:
         return near(self.center, p, q, self.radius)

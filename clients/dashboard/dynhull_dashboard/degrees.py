@@ -1,0 +1,41 @@
+"""Places on the globe in the picture: longitude to the right, latitude upwards, in degrees."""
+
+from math import cos, radians
+
+import numpy as np
+
+from dynhull_client import Circle
+
+from .drawing import Points
+
+Center = tuple[float, float]  # longitude and latitude
+
+FULL_TURN = 360.0
+METRES_A_DEGREE = 111_195.0  # of latitude, on a globe with the mean radius
+SQUARE_KILOMETRE = 1e6
+CORNERS_OF_CIRCLE = 180
+
+
+def shown(places: Points, center: Center | None) -> Points:
+    """The places with longitudes within half a turn of the centre, so that no hull is torn at 180 degrees.
+
+    Without a centre they are points of a plane, and stay.
+    """
+    if center is None or not len(places):
+        return places
+    lon = places[:, 0]
+    return np.column_stack([lon - FULL_TURN * np.round((lon - center[0]) / FULL_TURN), places[:, 1]])
+
+
+def shown_place(x: float, y: float, center: Center | None) -> tuple[float, float]:
+    """The same for one place."""
+    ((x, y),) = shown(np.array([[x, y]]), center).tolist()
+    return x, y
+
+
+def circle(area: Circle) -> Points:
+    """A circle with a radius in metres. For the eye: the server decides who is inside."""
+    angles = np.linspace(0, 2 * np.pi, CORNERS_OF_CIRCLE, endpoint=False)
+    high = area.r / METRES_A_DEGREE
+    wide = high / max(cos(radians(area.y)), np.finfo(float).eps)
+    return np.column_stack([area.x + wide * np.cos(angles), area.y + high * np.sin(angles)])

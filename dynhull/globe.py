@@ -1,0 +1,30 @@
+"""The door between degrees and the plane, and measures of a hull on the globe given by its (h, 2) vertices.
+
+`GeoHull` does all of this by itself. These functions are for vertices and places that are elsewhere, such as copies of
+a hull: counter-clockwise, in degrees, longitude first, as `GeoHull.vertices` returns them.
+
+>>> from dynhull.globe import Gnomonic, area, as_lonlat
+>>> fiji = as_lonlat([(-179.9, -16.8), (179.4, -16.4), (177.4, -17.8), (178.4, -18.1)])
+>>> frame = Gnomonic.about(fiji)
+>>> frame.project_all(fiji).shape
+(4, 2)
+>>> round(area(fiji) / 1e6)  # square kilometres
+21100
+"""
+
+from ._ellipsoid import area, diameter, distance, perimeter
+from ._flat_map import boundary, geojson
+from ._globe import REACH, Gnomonic, as_center, as_lonlat
+
+__all__ = [
+    "REACH",
+    "Gnomonic",
+    "area",
+    "as_center",
+    "as_lonlat",
+    "boundary",
+    "diameter",
+    "distance",
+    "geojson",
+    "perimeter",
+]

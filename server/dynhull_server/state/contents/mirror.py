@@ -1,0 +1,60 @@
+"""The keys of a geographic hull in the plane of its projection, for the fences that compare them."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynhull import GeoKeyedHull, KeyedHull
+from dynhull.arrays import Points
+from dynhull.globe import Gnomonic
+from dynhull.keys import Keys, key_list
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+Key = str | int
+Position = tuple[float, float]
+
+
+class Mirror:
+    """A hull in the plane that gets each change of a geographic hull.
+
+    Args:
+        hull: the geographic hull, which has a centre that stays.
+
+    Attributes:
+        plane: the keys at their projections.
+        inside: called before keys leave that nobody names; returns those whose places matter.
+    """
+
+    def __init__(self, hull: GeoKeyedHull) -> None:
+        assert hull.center is not None  # checked when the fence was created
+        self._hull = hull
+        self._frame = Gnomonic(hull.center)
+        keys, points, times = hull.entities()
+        places = self.project(points)
+        self.plane = KeyedHull.from_entities(keys, places, times, hull.key_type, ordered=hull.ordered)
+        self._previous: dict[Key, Position] = {}
+        self.inside: Callable[[], Iterable[Keys]] = tuple
+
+    def project(self, points: Points) -> Points:
+        """The projections of places that the hull has admitted."""
+        return self._frame.project_all(points)
+
+    def note(self, keys: Keys) -> None:
+        """Take note of where keys are before they change."""
+        points = self._hull.positions(keys)
+        there = ~np.isnan(points[:, 0])
+        for key, (lon, lat), held in zip(key_list(keys), points.tolist(), there.tolist(), strict=True):
+            if held:
+                self._previous.setdefault(key, (lon, lat))
+
+    def take_previous(self) -> dict[Key, Position]:
+        """Where keys were, in degrees, that have changed since this was last called."""
+        previous, self._previous = self._previous, {}
+        return previous
+
+    def note_inside(self) -> None:
+        """Take note of where those keys are that may leave."""
+        for keys in self.inside():
+            self.note(keys)

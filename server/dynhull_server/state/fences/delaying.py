@@ -1,0 +1,178 @@
+"""What a change of a hull means for a fence whose events are delayed: `confirmations` and `min_dwell`."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dynhull import Crossings
+from dynhull.keys import key_list, take_keys
+
+from ..contents.live import AnyKeyedHull
+from ..records import KeyRows
+from .fence_leg import FenceLeg, Swap, caused
+from .records import Cause, Delay, EventType, Key, Subject
+from .subjects import Subjects, keyed
+
+OWN = Cause.MOVED | Cause.APPEARED
+GONE = Cause.REMOVED | Cause.EXPIRED
+NO_ROWS = slice(0)
+
+
+@dataclass(slots=True)
+class KeysChanged:
+    """What has happened to the keys of a hull.
+
+    Attributes:
+        rows: the batch; None where keys have only expired.
+        expired: the keys whose deadline had come before the batch, if it is one of several hulls.
+        fewer: whether keys may have left.
+    """
+
+    rows: KeyRows | None = None
+    expired: Collection[Key] = ()
+    fewer: bool = True
+    _removed: set[Key] | None = field(default=None, init=False)
+
+    def why_gone(self, key: Key) -> Cause:
+        """Why a key left."""
+        if self._removed is None:
+            self._removed = set() if self.rows is None else set(key_list(self.rows.removes)) - set(self.expired)
+        return Cause.REMOVED if key in self._removed else Cause.EXPIRED
+
+    def reports(self, hull: AnyKeyedHull, asked: Collection[Key]) -> list[Key]:
+        """Those of some keys, all of which were there before or after the batch, whose position it has written."""
+        rows = self.rows
+        if rows is None or not asked:
+            return []
+        asked = set(asked)
+        found = [row for row, key in enumerate(key_list(rows.keys)) if key in asked]
+        keys = take_keys(rows.keys, np.array(found, np.intp))
+        written = np.ones(len(found), np.bool_)
+        if rows.condition == "absent":  # only a key that has expired
+            written &= np.array([key in self.expired for key in key_list(keys)], np.bool_)
+        if hull.ordered and rows.times is not None:
+            written &= ~(rows.times[found] < hull.times(keys))
+        return [key for key, each in zip(key_list(keys), written.tolist(), strict=True) if each]
+
+
+def delay(
+    leg: FenceLeg,
+    subjects: Subjects,
+    crossings: Crossings | None,
+    rows: slice,
+    swap: Swap | None,
+    now: int,
+    changed: KeysChanged | None,
+) -> None:
+    """Begin and end delays, and make the events for which nothing is missing any more.
+
+    Args:
+        leg: the fence, one with delays.
+        subjects: the keys of a hull.
+        crossings: who has changed sides, or None.
+        rows: those that concern the fence.
+        swap: a cause, and the one that it stands for.
+        now: the time.
+        changed: what has happened to the keys; None where only the area has changed.
+    """
+    delays, hull = leg.fence.delays, subjects.hull.name
+    assert delays is not None  # the caller checks it
+    first = len(leg.events)
+    begun: set[Key] = set()
+    if crossings is not None:
+        begun = _follow(leg, subjects, crossings, rows, swap, now)
+    waiting = delays.of(hull)
+    touched = set(begun)
+    if changed is not None and waiting:
+        if changed.fewer:
+            _leave(leg, subjects, changed, now)
+        if leg.row.config.confirmations:
+            asked = [key for key, each in waiting.items() if not delays.confirmed(each) and key not in begun]
+            for key in changed.reports(keyed(subjects.hull.state), asked):
+                each = waiting[key]
+                leg.put_delay((hull, key), each._replace(reports=each.reports + 1))
+                touched.add(key)
+    ripe = [(hull, key) for key in touched if key in waiting and delays.ripe(waiting[key], leg.time(now))]
+    end_some(leg, subjects, ripe, Cause(0), now)
+    ordered = sorted(leg.events[first:], key=lambda event: event.key)  # type: ignore[arg-type, return-value]
+    start = leg.events[first].sequence if ordered else 0
+    leg.events[first:] = [event._replace(sequence=start + place) for place, event in enumerate(ordered)]
+
+
+def end_some(leg: FenceLeg, subjects: Subjects, ripe: Collection[Subject], more: Cause, now: int) -> None:
+    """End delays of keys of a hull with an event of each; `more` are causes beside those of the delay."""
+    delays, hull = leg.fence.delays, subjects.hull.name
+    if not ripe or delays is None:
+        return
+    found = {}
+    for subject in ripe:
+        each = delays.of(hull)[subject[1]]
+        kind = EventType.ENTER if each.enters else EventType.EXIT
+        found[subject[1]] = kind, each.causes | more, each.since
+        leg.put_delay(subject, None)
+    leg.report(subjects, found, now)
+
+
+def end_all(leg: FenceLeg, now: int) -> None:
+    """End the delays for which nothing is missing by the present settings of the fence, which has been replaced."""
+    delays, time = leg.fence.delays, leg.time(now)
+    if delays is None:
+        return
+    ripe: dict[str, list[Subject]] = {}
+    for subject, each in delays.all():
+        if delays.ripe(each, time):
+            ripe.setdefault(subject[0], []).append(subject)
+    for hull, found in ripe.items():
+        end_some(leg, leg.fence.subjects[hull], found, Cause.CHANGED, now)
+
+
+def _follow(
+    leg: FenceLeg, subjects: Subjects, crossings: Crossings, rows: slice, swap: Swap | None, now: int
+) -> set[Key]:
+    """Begin and end delays where subjects change sides. Returns the keys of those that begin with a report."""
+    delays, hull = leg.fence.delays, subjects.hull.name
+    assert delays is not None  # the caller checks it
+    numbers = np.arange(len(crossings))[rows]
+    at_once = []
+    begun = set()
+    columns = zip(
+        numbers.tolist(),
+        key_list(crossings.keys[rows]),
+        crossings.changes[rows].tolist(),
+        crossings.causes[rows].tolist(),
+        strict=True,
+    )
+    for number, key, change, causes in columns:
+        waits = key in delays.of(hull)
+        if change == 0 or causes & GONE:
+            if not waits:
+                at_once.append(number)
+            elif change:  # it had not entered
+                leg.put_delay((hull, key), None)
+        elif waits:  # it is back
+            leg.put_delay((hull, key), None)
+        elif not leg.row.config.delays:  # the fence has been replaced by one without such rules
+            at_once.append(number)
+        else:
+            own = causes & OWN != 0
+            reports = int(own and leg.row.config.confirmations > 0)
+            leg.put_delay((hull, key), Delay(change > 0, leg.time(now), reports, caused(causes, swap)))
+            if own:
+                begun.add(key)
+    if at_once:
+        leg.crossed(subjects, crossings, np.array(at_once, np.intp), swap, now)
+    return begun
+
+
+def _leave(leg: FenceLeg, subjects: Subjects, changed: KeysChanged, now: int) -> None:
+    """Make an exit of each key that is gone while its exit was delayed: it was outside, so it has not crossed."""
+    delays, hull = leg.fence.delays, subjects.hull.name
+    assert delays is not None  # the caller checks it
+    keys = subjects.keys([key for key, each in delays.of(hull).items() if not each.enters])
+    gone = np.isnan(keyed(subjects.hull.state).positions(keys)[:, 0])
+    if gone.any():
+        left = subjects.keys([key for key, each in zip(key_list(keys), gone.tolist(), strict=True) if each])
+        for key in key_list(left):
+            leg.put_delay((hull, key), None)
+        leg.left(subjects, left, {key: int(changed.why_gone(key)) for key in key_list(left)}, now)

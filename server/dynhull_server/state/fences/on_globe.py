@@ -1,0 +1,116 @@
+"""Fences about geographic hulls: their areas in the plane of the projection, in which great circles are straight."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import chain
+
+import numpy as np
+
+from dynhull.arrays import Points
+from dynhull.convex import Cloud
+from dynhull.gjk import intersect
+from dynhull.globe import Gnomonic, distance
+
+from ..errors import HullUnsuitableError, InvalidFenceError
+from ..frames import off_globe, out_of_reach
+from ..hull import Hull
+from .config import Area, CircleArea, FenceConfig, PolygonArea, Ring
+
+# A circle is a polygon with this many corners, every half degree of azimuth, each at the radius on WGS 84: its edges
+# are at most 1e-5 of the radius inside of the circle.
+CIRCLE_CORNERS = 720
+
+Rings = Sequence[Sequence[Points]]
+
+
+def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull | None) -> None:
+    """Raise the error that refuses a fence because of the frames of its hulls.
+
+    Args:
+        config: its settings.
+        area: the hull that is its area, None for other areas.
+        subjects: the hull that it compares; None for those with a prefix.
+    """
+    hulls = [hull for hull in (area, subjects) if hull is not None]
+    geographic = [hull for hull in hulls if hull.row.settings.geographic]
+    if not geographic:
+        return
+    if subjects is None:
+        raise HullUnsuitableError(geographic[0].name, "is geographic, and fences over a prefix are in the plane")
+    for hull in hulls:
+        if hull.state.center is None:
+            reason = "has no centre so far" if hull in geographic else "is a plane, and the other hull is geographic"
+            raise HullUnsuitableError(hull.name, f"{reason}: hulls of a fence on the globe have the same centre")
+    centers = {hull.name: hull.state.center for hull in hulls}
+    if len(set(centers.values())) > 1:
+        raise HullUnsuitableError(
+            subjects.name, f"has another centre: hulls of a fence on the globe have the same one, not {centers}"
+        )
+    if config.margin:
+        raise InvalidFenceError("margin", config.margin, "a fence on the globe has no margin")  # nor without_self
+
+
+def rings_of(area: Area, vertices: Points | None) -> Rings:
+    """The rings of an area in degrees, for each of its polygons; `vertices` are those of the hull that is the area."""
+    if isinstance(area, PolygonArea):
+        return [[corners_of(ring) for ring in polygon] for polygon in area.polygons]
+    if isinstance(area, CircleArea):
+        return [[_circle(area)]]
+    assert vertices is not None  # those of the area
+    return [[vertices]]
+
+
+def projected(frame: Gnomonic, rings: Rings) -> list[list[Points]]:
+    """The rings in the plane; ValueError names a ring with a corner that is no place or out of reach."""
+    return [[_projected(frame, ring, f"polygon {i} ring {j}") for j, ring in enumerate(p)] for i, p in enumerate(rings)]
+
+
+def outline(frame: Gnomonic, vertices: Points) -> Points:
+    """The vertices of a geographic hull in the plane, from the lexicographically smallest there."""
+    places = frame.project_all(vertices)
+    return np.roll(places, -int(np.lexsort(places.T[::-1])[0]), axis=0) if len(places) else places
+
+
+def metres(rings: Rings, places: Points) -> list[float]:
+    """The distances of places outside of an area to it."""
+    found = [distance(ring, places) for ring in chain.from_iterable(rings)]
+    nearest: list[float] = np.min(found, axis=0).tolist()
+    return nearest
+
+
+def compared(area: Hull, other: Hull, limit: float) -> tuple[bool, float]:
+    """Whether two hulls about one centre intersect or are at most `limit` metres apart, and their distance."""
+    a, b = area.state.vertices(), other.state.vertices()
+    center = area.state.center
+    assert center is not None  # checked when the fence was created
+    frame = Gnomonic(center)
+    if intersect(Cloud(outline(frame, a)), Cloud(outline(frame, b))):
+        return True, 0.0
+    apart = min(float(distance(a, b).min()), float(distance(b, a).min()))
+    return apart <= limit, apart
+
+
+def corners_of(ring: Ring) -> Points:
+    """The corners of a ring."""
+    return np.frombuffer(ring, "<f8").astype(np.float64).reshape(-1, 2)
+
+
+def _projected(frame: Gnomonic, ring: Points, name: str) -> Points:
+    misplaced = off_globe(ring) or out_of_reach(frame, ring)
+    if misplaced is not None:
+        raise ValueError(f"{name} has the corner {misplaced.place}: {misplaced.problem}")
+    return frame.project(ring)[0]
+
+
+@lru_cache(maxsize=1024)  # 11 kB each; more are computed again
+def _circle(area: CircleArea) -> Points:
+    """The corners of a circle, counter-clockwise."""
+    from pyproj import Geod  # takes a while to load, and only circles on the globe need it
+
+    misplaced = off_globe(np.array([[area.x, area.y]]))
+    if misplaced is not None:
+        raise ValueError(f"the centre is {misplaced.place}: {misplaced.problem}")
+    azimuths = -np.linspace(0, 360, CIRCLE_CORNERS, endpoint=False)
+    same = np.ones(CIRCLE_CORNERS)
+    lon, lat, _ = Geod(ellps="WGS84").fwd(area.x * same, area.y * same, azimuths, area.radius * same)
+    return np.column_stack([lon, lat])

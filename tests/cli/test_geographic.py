@@ -1,0 +1,141 @@
+"""Geographic hulls from the command line."""
+
+import json
+
+import pytest
+from command_line import dynhull
+
+FIJI = "lon,lat,key\n177.4,-17.8,Nadi\n178.4,-18.1,Suva\n-179.9,-16.8,Taveuni\n179.4,-16.4,Labasa\n"
+
+
+@pytest.fixture
+def fiji(tmp_path):
+    file = tmp_path / "fiji.csv"
+    file.write_text(FIJI)
+    return file
+
+
+def run(*arguments, code=0):
+    done = dynhull(*arguments)
+    assert done.exit_code == code, done.stderr
+    return done
+
+
+def listed(name):
+    return json.loads(run("list", name, "--json").stdout)
+
+
+@pytest.mark.usefixtures("served")
+def test_a_new_hull_of_lon_and_lat_is_on_the_globe_and_load_says_so(name, fiji):
+    done = run("load", name, fiji)
+    assert done.stderr.splitlines()[0] == (
+        f"{name}: a new hull on the globe: lon and lat are degrees; --plane makes it a plane"
+    )
+    info = listed(name)
+    assert (info["geographic"], info["points"]) == (True, 4)
+    assert info["center"] == pytest.approx([178.8, -17.3], abs=0.1)
+    area = json.loads(run("measure", name, "--json").stdout)["area"]
+    assert area == pytest.approx(21.1e9, rel=0.01)
+    assert run("query", name, "locate", "--", "179,-17", "0,-17").stdout.split()[2::3] == ["inside", "outside"]
+    again = run("load", name, fiji, "--again")
+    assert "new hull" not in again.stderr
+    assert "plane" not in again.stderr
+
+
+@pytest.mark.parametrize("columns", ["lng,lat", "Longitude,LATITUDE", "long,lat"])
+@pytest.mark.usefixtures("served")
+def test_other_names_of_longitude_and_latitude(name, tmp_path, columns):
+    for suffix, text in (("csv", f"{columns}\n1,2\n"), ("ndjson", json.dumps(dict.fromkeys(columns.split(","), 1)))):
+        file = tmp_path / f"points.{suffix}"
+        file.write_text(text)
+        run("load", f"{name}-{suffix}", file)
+        assert listed(f"{name}-{suffix}")["geographic"]
+
+
+@pytest.mark.usefixtures("served")
+def test_a_plane_on_request_and_for_other_columns(name, fiji, tmp_path):
+    done = run("load", f"{name}-a", fiji, "--plane")
+    assert (
+        f"{name}-a: a new hull in the plane, in square degrees; --geographic makes it one on the globe" in done.stderr
+    )
+    assert listed(f"{name}-a")["geographic"] is False
+    file = tmp_path / "points.csv"
+    file.write_text("x,y\n1,2\n")
+    silent = run("load", f"{name}-b", file)
+    assert "globe" not in silent.stderr
+    assert listed(f"{name}-b")["geographic"] is False
+    run("load", f"{name}-c", file, "--geographic")
+    assert listed(f"{name}-c")["geographic"]
+
+
+@pytest.mark.usefixtures("served")
+def test_a_plane_that_gets_longitudes_and_latitudes_is_warned_about_once(name, fiji):
+    run("create", name)
+    done = run("load", name, fiji)
+    assert done.stderr.count("is a plane: it takes lon and lat for x and y") == 1
+    refused = run("load", name, fiji, "--again", "--geographic", code=2)
+    assert f"the hull '{name}' is a plane: leave out --geographic" in refused.stderr
+
+
+@pytest.mark.usefixtures("served")
+def test_a_load_of_places_all_over_the_globe_is_refused_with_advice(name, tmp_path):
+    file = tmp_path / "world.csv"
+    file.write_text("lon,lat\n" + "".join(f"{lon},0\n" for lon in range(-180, 180, 10)))
+    done = run("load", name, file, code=2)
+    assert "degrees from the centre" in done.stderr
+    assert "--replace --plane loads degrees as points of a plane" in done.stderr
+    run("load", name, file, "--replace", "--plane")
+
+
+@pytest.mark.usefixtures("served")
+def test_create_and_recenter(name):
+    run("create", name, "--geographic", "--center", "190,-17.5")
+    info = listed(name)
+    assert (info["geographic"], info["center"]) == (True, [-170, -17.5])
+    assert run("list", name).stdout.split("\t")[-1] == "globe -170,-17.5\n"
+    assert run("recenter", name, "--", "180,-20").stdout == f"{name}: about -180,-20, revision 1\n"
+    moved = json.loads(run("recenter", name, "--json", "--", "-175,5").stdout)
+    assert moved == {"name": name, "revision": 2, "center": [-175, 5]}
+    assert "only a geographic" not in run("create", name, "--geographic", "--exist-ok").stderr
+    for options, words in (
+        (["--center", "1,2"], "--center is given with --geographic"),
+        (["--geographic", "--center", "1"], "give LON,LAT"),
+        (["--geographic", "--center", "1,95"], "from -90 to 90"),
+    ):
+        assert words in run("create", f"{name}-x", *options, code=2).stderr
+    assert "no points to choose a centre from" in run("recenter", name, code=1).stderr
+
+
+@pytest.mark.usefixtures("served")
+def test_keys_on_the_globe(name, fiji):
+    run("load", name, fiji, "--key", "key")
+    assert {line.split("\t")[2] for line in run("query", name, "--keys").stdout.splitlines()} == {
+        *("Nadi", "Suva", "Taveuni", "Labasa")
+    }
+    run("put", name, "Suva", "178.4", "-18.2")
+    refused = run("put", name, "Paris", "2.3", "48.9", code=2)
+    assert "degrees from the centre" in refused.stderr
+    assert "verified" in run("verify", name).stdout
+
+
+@pytest.mark.usefixtures("served")
+@pytest.mark.parametrize("suffix", ["csv", "ndjson"])
+def test_rows_that_are_no_places_are_left_out(name, tmp_path, suffix):
+    file = tmp_path / f"points.{suffix}"
+    rows = [(1, 2), (52.5, 113.4), (3, 4), (361, 0), (5, 6)]
+    if suffix == "csv":
+        file.write_text("lon,lat\n" + "".join(f"{lon},{lat}\n" for lon, lat in rows))
+    else:
+        file.write_text("\n".join(json.dumps({"lon": lon, "lat": lat}) for lon, lat in rows))
+    done = run("load", name, file)
+    assert "2 bad rows" in done.stderr
+    assert "point 2: the latitude is 113.4, not from -90 to 90 degrees; the longitude comes first" in done.stderr
+    assert "point 4: the longitude is 361.0, not from -360 to 360 degrees" in done.stderr
+    assert listed(name)["points"] == 3
+    known = run("load", name, file, "--again", "--key", "lon", code=2) if suffix == "csv" else None
+    assert known is None or "have no keys" in known.stderr
+    plain = tmp_path / "plain.csv"
+    plain.write_text("x,y\n7,8\n9,95\n")
+    assert "point 2: the latitude is 95.0" in run("load", name, plain).stderr  # the hull is on the globe
+    run("load", f"{name}-plane", plain)
+    assert listed(f"{name}-plane")["points"] == 2

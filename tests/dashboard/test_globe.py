@@ -1,0 +1,81 @@
+"""Hulls and fences on the globe as the dashboard draws them, without a browser."""
+
+import asyncio
+import json
+from collections.abc import Callable
+
+import pytest
+from patience import PATIENCE
+
+from dynhull_client import AsyncHullClient, Circle, HullClient
+from dynhull_dashboard.cards import table
+from dynhull_dashboard.describe import describe
+from dynhull_dashboard.feed import HullFeed
+from dynhull_dashboard.fence_feed import FenceFeed
+from dynhull_dashboard.looks import Look
+from dynhull_dashboard.plane import Plane
+from dynhull_dashboard.search import State
+from dynhull_dashboard.units import NO_UNITS
+
+LOOK = Look("#000000", (), "circle")
+
+
+async def until(ready: Callable[[], bool]) -> None:
+    async with asyncio.timeout(PATIENCE):
+        while not ready():
+            await asyncio.sleep(0.01)
+
+
+@pytest.fixture
+def fiji(address: str, name: str) -> str:
+    """A hull across 180 degrees, and a fence in it."""
+    with HullClient(address) as client:
+        client.create_hull(name, keyed="str", geographic=True, center=(179, -17))
+        client.create_fence(f"{name}/zone", Circle(-179.75, -17, 20_000), name)
+        client.put(name, ["a", "b", "c", "d"], [(177.5, -18), (-179.75, -17), (179.5, -16.25), (179.25, -17)])
+    return name
+
+
+def test_a_hull_across_180_degrees_is_drawn_in_one_piece(address: str, fiji: str) -> None:
+    async def shown() -> None:
+        async with AsyncHullClient(address) as client:
+            feed = HullFeed(client, fiji)
+            try:
+                await until(lambda: feed.vertices == 3 and len(feed.drawings()[1].points) == 1)
+                corners, inner = feed.drawings()
+                assert corners.points.tolist() == [[180.25, -17], [179.5, -16.25], [177.5, -18]]
+                assert corners.keys == ("b", "c", "a")
+                assert inner.points.tolist() == [[179.25, -17]]
+                assert feed.bounds == (177.5, -18, 180.25, -16.25)
+                assert " km²</td>" in table([(feed, LOOK)], True, "square units")
+                assert "longitude from 177.5 to 180.25, latitude from -18 to -16.25" in describe([feed])
+                await until(lambda: feed.search.find("b").state is State.VERTEX)
+                assert (feed.search.find("b").x, feed.search.find("b").y) == (180.25, -17)
+                plane = Plane(NO_UNITS, same_scale=True)
+                plane.show(feed, LOOK)
+                plane.update()
+                assert (plane.plot.xaxis.axis_label, plane.plot.yaxis.axis_label) == ("longitude (°)", "latitude (°)")
+                plane.hide(fiji)
+                plane.update()
+                assert (plane.plot.xaxis.axis_label, plane.plot.yaxis.axis_label) == ("x", "y")
+            finally:
+                await feed.close()
+
+    asyncio.run(shown())
+
+
+def test_a_circle_of_metres_has_its_size_in_degrees(address: str, fiji: str) -> None:
+    async def shown() -> None:
+        async with AsyncHullClient(address) as client:
+            feed = FenceFeed(client, f"{fiji}/zone")
+            try:
+                await until(lambda: feed.area.bounds is not None and json.loads(feed.marks.message)["x"] != [])
+                left, bottom, right, top = feed.area.bounds or (0.0, 0.0, 0.0, 0.0)
+                assert (left + right) / 2 == pytest.approx(180.25)
+                assert (top - bottom) / 2 == pytest.approx(20 / 111.2, rel=0.01)
+                assert (right - left) / (top - bottom) == pytest.approx(1.0457, rel=0.01)  # 1 / cos(17 degrees)
+                assert json.loads(feed.marks.message)["x"] == [180.25]
+            finally:
+                await feed.close()
+
+    asyncio.run(shown())

@@ -1,0 +1,762 @@
+"""What fences must say: their events follow from what the storage has kept of the hulls, in exact integers.
+
+The storage reports the revisions of a commit hull by hull. In which order they came between hulls is not in it, and is
+not promised: there must be one order from which all events of the commit follow.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from support.sides import Disk, Point, Rings, Shape, apart, shape_of_hull
+
+from dynhull.keys import as_keys, key_list
+from dynhull_server.engine.watch_fence import Sent
+from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.records import (
+    AddFence,
+    AppendEvents,
+    Cause,
+    ChangeFence,
+    Consumer,
+    DropConsumer,
+    DropEvents,
+    DropFence,
+    EventType,
+    FenceEvent,
+    FenceRow,
+    Members,
+    PutConsumer,
+)
+from dynhull_server.state.limits import FenceLimits
+from dynhull_server.state.records import NO_TIME
+
+from .entities import Entity, Key
+
+if TYPE_CHECKING:
+    from .model import Model, Truth
+
+FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | DropEvents | PutConsumer | DropConsumer
+# Fences have names beside those of hulls.
+PREFIX = "fence:"
+# Coordinates and lengths are multiples of 1 / 64.
+UNIT = 64
+# Of an event that two hulls begin or cease to be near, there is no key.
+WHOLE = None
+
+Subject = tuple[str, Key]
+Keyed = dict[Key, Entity]
+# A key, its place before and after, and why it is gone, or 0.
+Change = tuple[Key, Entity | None, Entity | None, int]
+
+
+@dataclass(slots=True, eq=False)
+class FenceTruth:
+    """One fence as the storage has kept it.
+
+    Attributes:
+        row: its identity and settings.
+        events: all its events, also those that were dropped.
+        first: the oldest event that is kept.
+        consumers: its consumers.
+        acknowledged: the last sequence that each consumer has ever acknowledged.
+        inside: who is inside, and since when it waits for its dwell event; None if it has made it.
+        near: whether two hulls are near.
+        ever: the names of the hulls that it has ever depended on, other than by a prefix.
+        droppable: the first event that may be kept as the oldest one.
+        deleted: the number of commits when it was deleted, None before.
+    """
+
+    row: FenceRow
+    events: list[FenceEvent] = field(default_factory=list)
+    first: int = 1
+    consumers: dict[str, Consumer] = field(default_factory=dict)
+    acknowledged: dict[str, int] = field(default_factory=dict)
+    inside: dict[Subject, int | None] = field(default_factory=dict)
+    near: bool = False
+    ever: set[str] = field(default_factory=set)
+    droppable: int = 1
+    deleted: int | None = None
+
+    @property
+    def config(self) -> FenceConfig:
+        return self.row.config
+
+    @property
+    def last(self) -> int:
+        return len(self.events)
+
+    def reads(self, row: FenceRow) -> None:
+        """Take over settings."""
+        self.row = row
+        self.ever |= self.needs
+
+    @property
+    def needs(self) -> set[str]:
+        """The names of the hulls that it depends on, other than by a prefix."""
+        config = self.config
+        return {config.area_hull or "", config.subjects if config.kind != "prefix" else ""} - {""}
+
+
+class State(NamedTuple):
+    """A fence in the middle of a commit: who is inside, and which of its new events have been explained."""
+
+    inside: dict[Subject, int | None]
+    near: bool
+    explained: int
+
+
+class Step(NamedTuple):
+    """Revisions that came at once, by the name of the hull: the last one before, and the last one of them."""
+
+    to: dict[str, tuple[int, int]]
+    together: bool
+
+
+class FenceModel:
+    """All fences over the lives of a plan.
+
+    Args:
+        model: the model of the hulls.
+
+    Attributes:
+        alive: the fences there are, by name.
+        ever: all fences.
+    """
+
+    def __init__(self, model: "Model") -> None:
+        self._model = model
+        self.alive: dict[str, FenceTruth] = {}
+        self.ever: dict[int, FenceTruth] = {}
+        self._told: dict[tuple[int, int], list[tuple[FenceTruth, int]]] = {}
+
+    # What is kept
+
+    def landed(self, changes: Sequence[Any], before: "dict[str, tuple[Truth, int]]") -> None:
+        """The storage has kept these changes of fences, and new revisions of hulls.
+
+        Args:
+            changes: the changes of fences.
+            before: the hulls that have changed, by name, with their revisions before.
+        """
+        by_fence: dict[int, list[Any]] = {}
+        for change in changes:
+            number = change.row.number if isinstance(change, AddFence | ChangeFence) else change.number
+            by_fence.setdefault(number, []).append(change)
+        made: dict[int, list[FenceEvent]] = {}
+        for number, of_fence in by_fence.items():
+            events = [event for change in of_fence if isinstance(change, AppendEvents) for event in change.events]
+            made[number] = self._numbered(number, of_fence, events)
+        self._revised(before, made)
+        for number, of_fence in by_fence.items():
+            fence = self.ever[number]
+            fence.events += made[number]
+            self._drop(fence, of_fence)
+            if isinstance(of_fence[-1], DropFence):
+                self._deleted(fence)
+        for fence in self.alive.values():
+            for name, (truth, revision) in before.items():
+                if fence.config.concerns(name):
+                    for each in range(revision + 1, truth.revision + 1):
+                        self._told.setdefault((truth.row.number, each), []).append((fence, fence.last))
+
+    def told(self, number: int, revision: int) -> list[tuple[FenceTruth, int]]:
+        """The fences that a revision concerned, and their events when it was committed."""
+        return self._told.get((number, revision), [])
+
+    def _numbered(self, number: int, changes: list[Any], events: list[FenceEvent]) -> list[FenceEvent]:
+        """The new events of a fence, if their numbers and times are in order; those of new settings are explained."""
+        first = changes[0]
+        if isinstance(first, AddFence):
+            self._added(first.row)
+        fence = self.ever.get(number)
+        if fence is None or fence.deleted is not None:
+            raise self._model.finds(f"{first} is kept of a fence that is not there")
+        sequences = [event.sequence for event in events]
+        if sequences != list(range(fence.last + 1, fence.last + 1 + len(events))):
+            raise self._model.finds(f"events {sequences} of {fence.row.name} are kept after {fence.last}")
+        times = [event.time for event in (*fence.events[-1:], *events)]
+        if times != sorted(times):
+            raise self._model.finds(f"the times of events of {fence.row.name} go back: {times}")
+        if isinstance(first, AddFence):
+            self._began(fence, first, events)
+        elif isinstance(first, ChangeFence):
+            self._replaced(fence, first.row, events)
+        return events
+
+    def _added(self, row: FenceRow) -> None:
+        if row.number in self.ever or row.number in self._model.numbers:
+            raise self._model.finds(f"the number {row.number} is given to another fence")
+        if row.name in self.alive:
+            raise self._model.finds(f"a second fence {row.name} is made beside the first")
+        self.alive[row.name] = self.ever[row.number] = fence = FenceTruth(row)
+        self._model.numbers.add(row.number)
+        fence.reads(row)
+
+    def _deleted(self, fence: FenceTruth) -> None:
+        """The fence has one more event, which only those see who watch it."""
+        closed = self._summary(fence, EventType.CLOSED, 0)
+        fence.events.append(closed._replace(time=fence.events[-1].time if fence.events else NO_TIME))
+        fence.deleted = self._model.commits
+        del self.alive[fence.row.name]
+
+    # Settings
+
+    def _began(self, fence: FenceTruth, added: AddFence, events: list[FenceEvent]) -> None:
+        """A new fence begins with these events."""
+        config, since = fence.config, fence.row.waits.time or None
+        now = self._now()
+        expected = []
+        if config.kind == "other":
+            fence.near = self._near(config, now)
+            if fence.near:
+                expected.append(self._paired(config, now, near=True, causes=Cause.CREATED))
+        for name, truth in self._subjects(config):
+            revision = now[name]
+            for key, entity in sorted(truth.held[revision].items()):
+                if self._shape(config, now, key).holds(_exact(entity), closed=config.closed):
+                    fence.inside[name, key] = since
+                    there = Expected(config, now, name, key, None, entity)
+                    expected.append(there.event(EventType.ENTER, Cause.CREATED))
+        match config.initial:
+            case "snapshot":
+                expected = [self._summary(fence, EventType.SNAPSHOT, Cause.CREATED)]
+            case "none":
+                kept = _members(added.inside.members)
+                if kept != _members(self._members(fence)):
+                    raise self._model.finds(f"inside of {fence.row.name} are {fence.inside}, kept are {kept}")
+                expected = []
+        if not self._as_expected(expected, events):
+            raise self._model.finds(f"{fence.row.name} begins with {events}, and should with {expected}")
+        for event in events:
+            fence.inside |= dict.fromkeys(_named(event) if config.dwell else (), event.time)
+
+    def _replaced(self, fence: FenceTruth, row: FenceRow, events: list[FenceEvent]) -> None:
+        """A fence gets other settings, and these events follow."""
+        if row.config.dwell != fence.config.dwell:
+            fence.inside = dict.fromkeys(fence.inside, row.waits.time if row.config.dwell else None)
+        fence.droppable = self._droppable(fence)  # that may just be going on
+        fence.reads(row)
+        config, now = row.config, self._now()
+        state = State(dict(fence.inside), fence.near, 0)
+        expected = []
+        if config.kind == "other" and self._near(config, now) != fence.near:
+            fence.near = not fence.near
+            expected = [self._paired(config, now, near=fence.near, causes=Cause.CHANGED)]
+        for name, truth in self._subjects(config):
+            places = truth.held[now[name]]
+            changes = [(key, place, place, 0) for key, place in sorted(places.items())]
+            looked = list(self._look(config, now, state, name, changes, Cause.CHANGED))
+            expected += [event for event in looked if event.type is not EventType.CROSS]
+        if not self._as_expected(expected, events):
+            raise self._model.finds(f"{fence.row.name} is replaced with {events}, and should be with {expected}")
+        for event in events:
+            self.follow(config, fence.inside, event)
+
+    # Revisions
+
+    def _revised(self, before: "dict[str, tuple[Truth, int]]", made: dict[int, list[FenceEvent]]) -> None:
+        """Explain the events of a commit by the new revisions of hulls."""
+        fences = [
+            fence
+            for fence in self.alive.values()
+            if (any(fence.config.concerns(name) for name in before) or made.get(fence.row.number))
+            and not _of_settings(made.get(fence.row.number))
+        ]
+        if not fences:
+            return
+        names = {name for name in before if any(fence.config.concerns(name) for fence in fences)}
+        lanes = {name: before[name] for name in names}
+        search = _Search(self, fences, lanes, made)
+        found = search.run()
+        if found is None:
+            raise self._model.finds(f"no order of {sorted(names)} explains the events: {search.problem}")
+        for fence in fences:
+            state = found[fence.row.number]
+            fence.inside, fence.near = state.inside, state.near
+
+    def expected(self, fence: FenceTruth, state: State, step: Step, at: dict[str, int]) -> "Iterator[FenceEvent]":
+        """The events of a fence that a step makes. `at` are the revisions before it."""
+        config = fence.config
+        now = at | {name: last for name, (_, last) in step.to.items()}
+        area = config.area_hull
+        moved = area in step.to and self._corners(area, at) != self._corners(area, now)
+        if config.kind == "other":
+            other = config.subjects
+            other_moved = other in step.to and self._corners(other, at) != self._corners(other, now)
+            if (moved or other_moved) and self._near(config, now) != state.near:
+                causes = (Cause.AREA if moved else 0) | (Cause.MOVED if other_moved else 0)
+                yield self._paired(config, now, near=not state.near, causes=causes)
+            return
+        for name, truth in self._subjects(config):
+            was = truth.held[at[name]] if name in at else {}
+            present = truth.held[now[name]]
+            if not moved and name not in step.to:
+                continue
+            gone: dict[Key, int] = {}
+            for revision in range(at.get(name, 0) + 1, now[name] + 1):
+                gone |= truth.gone[revision]
+            changes = [
+                (key, was.get(key), present.get(key), gone.get(key, 0))
+                for key in sorted({*was, *present})
+                if moved or config.area == HullArea(name, without_self=True) or was.get(key) is not present.get(key)
+            ]
+            yield from self._look(config, now, state, name, changes, Cause.AREA if moved else 0)
+
+    def _look(
+        self, config: FenceConfig, now: dict[str, int], state: State, name: str, changes: Iterable[Change], cause: int
+    ) -> "Iterator[FenceEvent]":
+        """The events of one hull's keys; `cause` is why the area is another one, or 0."""
+        for key, was, place, gone in changes:
+            inside = (name, key) in state.inside
+            shape = self._shape(config, now, key)
+            there = Expected(config, now, name, key, was, place)
+            if place is None:
+                if inside:
+                    yield there.event(EventType.EXIT, gone | cause)
+                continue
+            p = _exact(place)
+            causes = cause | (Cause.APPEARED if was is None else Cause.MOVED if _exact(was) != p else 0)
+            causes = causes or Cause.AREA  # only the others have moved, of whom the subject itself is not one
+            if inside:
+                if shape.farther(p, _units(config.margin), closed=config.closed):
+                    yield there.event(EventType.EXIT, causes)
+            elif shape.holds(p, closed=config.closed):
+                yield there.event(EventType.ENTER, causes)
+            elif config.crosses and was is not None and _exact(was) != p and shape.passed(_exact(was), p):
+                yield there.event(EventType.CROSS, causes)
+
+    def follow(self, config: FenceConfig, inside: dict[Subject, int | None], event: FenceEvent) -> None:
+        """Take in an event."""
+        if event.key is None:
+            return
+        match event.type:
+            case EventType.ENTER:
+                inside[event.hull, event.key] = event.time if config.dwell else None
+            case EventType.EXIT:
+                del inside[event.hull, event.key]
+            case EventType.DWELL:
+                inside[event.hull, event.key] = None
+
+    def dwells(self, fence: FenceTruth, state: State, event: FenceEvent, at: dict[str, int]) -> bool:
+        """Whether a subject has been inside for long enough to make this event at these revisions."""
+        config = fence.config
+        assert event.key is not None  # nobody dwells as a whole
+        since = state.inside.get((event.hull, event.key))
+        if since is None or event.time - since < config.dwell:
+            return False
+        place = self._model.alive[event.hull].held[at[event.hull]].get(event.key)
+        there = Expected(config, at, event.hull, event.key, None, place)
+        return same(event, there.event(EventType.DWELL, Cause.TIME)._replace(first_time=since))
+
+    # Consumers and retention
+
+    def permit(self, number: int, first: int) -> None:
+        """Events before `first` may be dropped from now on."""
+        fence = self.ever[number]
+        fence.droppable = max(fence.droppable, first)
+
+    def _drop(self, fence: FenceTruth, changes: list[Any]) -> None:
+        """Take over which events are kept, and what consumers have acknowledged and lost."""
+        dropped = max((change.first for change in changes if isinstance(change, DropEvents)), default=fence.first)
+        if dropped > fence.first and dropped > self._droppable(fence):
+            raise self._model.finds(f"the events of {fence.row.name} before {dropped} are dropped too early")
+        put = {change.consumer.name: change.consumer for change in changes if isinstance(change, PutConsumer)}
+        for name in {*fence.consumers, *put}:
+            known = fence.consumers.get(name, Consumer(name, fence.first - 1))
+            now = put.get(name, known)
+            if not known.acknowledged <= now.acknowledged <= max(fence.last, known.acknowledged):
+                raise self._model.finds(f"the consumer {known} of {fence.row.name} becomes {now}")
+            most, least = (
+                known.lost + max(dropped - 1 - max(each.acknowledged, fence.first - 1), 0) for each in (known, now)
+            )
+            if not least <= now.lost <= most:
+                raise self._model.finds(f"the consumer {known} loses the events before {dropped}, and becomes {now}")
+            if name in put:
+                fence.acknowledged[name] = max(fence.acknowledged.get(name, 0), now.acknowledged)
+        fence.consumers |= put
+        for change in changes:
+            if isinstance(change, DropConsumer):
+                del fence.consumers[change.name]
+        fence.first = dropped
+
+    def _droppable(self, fence: FenceTruth) -> int:
+        config = fence.config
+        if config.max_event_age:
+            return fence.last + 1
+        return max(fence.droppable, fence.last - config.max_events + 1 if config.max_events else 1)
+
+    # What is answered
+
+    def seen(self, number: int, uid: str, after: int, sent: Sent) -> None:
+        """Events after a sequence were sent."""
+        fence = self.ever.get(number)
+        if fence is None or fence.row.uid != uid:
+            raise self._model.finds(f"an answer names a fence that is not kept: {uid}")
+        if sent.lost is not None:
+            if sent.lost[0] != after + 1 or not after < sent.lost[1] < fence.first:
+                raise self._model.finds(f"{sent.lost} are called lost after {after}, kept are those from {fence.first}")
+            after = sent.lost[1]
+        for event in sent.events:
+            after += 1
+            if event.sequence != after:
+                raise self._model.finds(f"event {event.sequence} of {fence.row.name} was sent in place of {after}")
+            if event.sequence > fence.last:
+                raise self._model.finds(f"event {event} of {fence.row.name} was sent, and is not kept")
+            if not alike(event, fence.events[event.sequence - 1]):
+                raise self._model.finds(f"{event} was sent, kept is {fence.events[event.sequence - 1]}")
+        if sent.sequence != after:
+            raise self._model.finds(
+                f"the events of {fence.row.name} up to {after} are called those up to {sent.sequence}"
+            )
+
+    def acked(self, number: int, consumer: Consumer, sequence: int | None) -> None:
+        """An acknowledgement was answered."""
+        fence = self.ever[number]
+        kept = fence.acknowledged.get(consumer.name)
+        if kept is None or not (sequence or 0) <= consumer.acknowledged <= kept:
+            raise self._model.finds(f"{consumer} of {fence.row.name} was answered to {sequence}, kept is {kept}")
+
+    def held(self, number: int, sequence: int, members: Iterable[Members]) -> None:
+        """Who is inside was read, after the event of a sequence."""
+        fence = self.ever[number]
+        if sequence == fence.last and fence.deleted is None:
+            kept, found = _members(self._members(fence)), _members(members)
+            if {hull: keys for hull, (keys, _) in found.items()} != {hull: keys for hull, (keys, _) in kept.items()}:
+                raise self._model.finds(f"inside of {fence.row.name} are {kept}, answered was {found}")
+
+    def overdue(self, time: int) -> list[tuple[str, Subject]]:
+        """Who should have made its dwell event at a time by the server's clock."""
+        return [
+            (name, subject)
+            for name, fence in self.alive.items()
+            if fence.config.dwell
+            for subject, since in fence.inside.items()
+            if since is not None and since + fence.config.dwell <= time
+        ]
+
+    def full(self, name: str, limit: str, limits: FenceLimits) -> bool:
+        """Whether a limit leaves no room for one more fence, or for one more consumer of this one."""
+        if limit == "max_fences":
+            return len(self.alive) >= limits.max_fences
+        return name in self.alive and len(self.alive[name].consumers) >= limits.max_fence_consumers
+
+    def needed(self, name: str) -> bool:
+        """Whether a fence depends on a hull."""
+        return any(name in fence.needs for fence in self.alive.values())
+
+    def fenced(self, name: str, commits: int) -> bool:
+        """Whether a fence has depended on a hull since some commit."""
+        return any(
+            name in fence.ever and (fence.deleted is None or fence.deleted > commits) for fence in self.ever.values()
+        )
+
+    # Areas and subjects
+
+    def _now(self) -> dict[str, int]:
+        return {name: truth.revision for name, truth in self._model.alive.items()}
+
+    def _subjects(self, config: FenceConfig) -> "list[tuple[str, Truth]]":
+        alive = self._model.alive
+        return [
+            (name, alive[name])
+            for name in sorted(alive)
+            if config.compares(name) and alive[name].row.settings.identity != "multiset"
+        ]
+
+    def _corners(self, name: str | None, at: dict[str, int]) -> Rings:
+        assert name is not None
+        truth = self._model.alive[name]
+        revision = at[name]
+        corners = truth.corners.get(revision)
+        if corners is None:
+            corners = truth.corners[revision] = shape_of_hull(map(_exact, truth.entities_at(revision).values()))
+        return corners
+
+    def _shape(self, config: FenceConfig, at: dict[str, int], key: Key) -> Shape:
+        area = config.area
+        if not isinstance(area, HullArea):
+            return fixed_shape(area)
+        if not area.without_self:
+            return self._corners(area.name, at)
+        others = self._model.alive[area.name].held[at[area.name]]
+        return shape_of_hull(_exact(entity) for other, entity in others.items() if other != key)
+
+    def _near(self, config: FenceConfig, at: dict[str, int]) -> bool:
+        one, other = (self._corners(name, at).polygons for name in (config.area_hull, config.subjects))
+        return not apart(one[0][0] if one else (), other[0][0] if other else (), _units(config.near))
+
+    def _paired(self, config: FenceConfig, at: dict[str, int], *, near: bool, causes: int) -> FenceEvent:
+        there = Expected(config, at, config.subjects, WHOLE, None, None)
+        return there.event(EventType.BEGIN if near else EventType.CEASE, causes)
+
+    def _members(self, fence: FenceTruth) -> Iterator[Members]:
+        now = self._now()
+        if fence.near:
+            yield Members(fence.config.subjects, np.empty(0, np.uint64), now[fence.config.subjects])
+        for name in sorted({hull for hull, _ in fence.inside}):
+            keys = sorted(key for hull, key in fence.inside if hull == name)
+            yield Members(name, as_keys(keys, self._model.alive[name].row.settings.identity), now[name])
+
+    def _summary(self, fence: FenceTruth, kind: EventType, causes: int) -> FenceEvent:
+        now = self._now()
+        there = Expected(fence.config, now, "", WHOLE, None, None)
+        return there.event(kind, causes)._replace(inside=tuple(self._members(fence)))
+
+    def _as_expected(self, expected: list[FenceEvent], events: list[FenceEvent]) -> bool:
+        """Whether events are the expected ones. In one revision they are ordered by key; hulls come in any order."""
+        by_hull = sorted(events, key=lambda event: event.hull)
+        return len(events) == len(expected) and all(map(same, by_hull, expected))
+
+
+class Expected(NamedTuple):
+    """What an expected event is about: `was` and `place` are the entity before and after."""
+
+    config: FenceConfig
+    at: dict[str, int]
+    hull: str
+    key: Key | None
+    was: Entity | None
+    place: Entity | None
+
+    def event(self, kind: EventType, causes: int) -> FenceEvent:
+        """The event, without what is only known of the real one."""
+        area = self.config.area_hull
+        place = self.place
+        return FenceEvent(
+            0,
+            kind,
+            int(causes),
+            self.hull,
+            self.key,  # type: ignore[arg-type]
+            self.at[self.hull] if self.hull else 0,
+            self.at[area] if area is not None else 0,
+            None if place is None else (place.x, place.y),
+            None if self.was is None else (self.was.x, self.was.y),
+            None,
+            NO_TIME if place is None else place.time,
+            0,
+        )
+
+
+class _Search:
+    """Looks for an order of the revisions of a commit from which its events follow.
+
+    Attributes:
+        problem: what was wrong with the order that explained the most events.
+    """
+
+    def __init__(
+        self,
+        model: FenceModel,
+        fences: list[FenceTruth],
+        lanes: "dict[str, tuple[Truth, int]]",
+        made: dict[int, list[FenceEvent]],
+    ) -> None:
+        self._model = model
+        self._fences = fences
+        self._lanes = {name: lane for name, lane in lanes.items() if not lane[0].deleted}
+        self._deleted = {name: lane for name, lane in lanes.items() if lane[0].deleted}
+        self._made = made
+        self._explained = -1
+        self.problem = ""
+
+    def run(self) -> dict[int, State] | None:
+        at = self._model._now() | {name: revision for name, (_, revision) in self._lanes.items()}
+        states = {fence.row.number: State(dict(fence.inside), fence.near, 0) for fence in self._fences}
+        gone = self._hulls_gone(states, at)
+        return None if gone is None else self._from(self._wait(gone, at), at)
+
+    def _hulls_gone(self, states: dict[int, State], at: dict[str, int]) -> dict[int, State] | None:
+        """The keys of deleted hulls leave."""
+        for name, (truth, revision) in self._deleted.items():
+            for fence in self._fences:
+                state = states[fence.row.number]
+                keys = sorted(key for hull, key in state.inside if hull == name)
+                expected = [
+                    Expected(fence.config, at | {name: revision}, name, key, truth.held[revision][key], None).event(
+                        EventType.EXIT, Cause.REMOVED
+                    )
+                    for key in keys
+                ]
+                after = self._explain(fence, state, expected)
+                if after is None:
+                    return None
+                states = states | {fence.row.number: after}
+        return states
+
+    def _from(self, states: dict[int, State], at: dict[str, int]) -> dict[int, State] | None:
+        if all(at[name] == truth.revision for name, (truth, _) in self._lanes.items()):
+            for fence in self._fences:
+                left = self._events(fence)[states[fence.row.number].explained :]
+                if left:
+                    self._note(states, f"nothing explains {left[0]} of {fence.row.name}")
+                    return None
+            return states
+        for step in self._steps(at):
+            after = self._take(states, step, at)
+            if after is not None:
+                found = self._from(after, at | {name: last for name, (_, last) in step.to.items()})
+                if found is not None:
+                    return found
+        return None
+
+    def _steps(self, at: dict[str, int]) -> list[Step]:
+        """What may have come next, the most probable first."""
+        steps: list[tuple[int, Step]] = []
+        for name, (truth, _) in self._lanes.items():
+            revision = at[name] + 1
+            if revision > truth.revision:
+                continue
+            attempt = truth.attempts[revision]
+            bound = self._bound(truth, at[name])
+            if bound is not None:
+                step = self._all_of(bound[1], at)
+                if step is not None:
+                    steps.append((bound[0], Step(step, together=True)))
+            if attempt is None or not self._model._model.together(attempt):
+                steps.append((attempt or 0, Step({name: (at[name], revision)}, together=False)))
+        return [step for _, step in sorted(steps, key=lambda each: each[0])]
+
+    def _bound(self, truth: "Truth", at: int) -> tuple[int, list[int]] | None:
+        """The next batch of a hull, and the ones that come together with it; before it some keys may have expired."""
+        for revision in (at + 1, at + 2):
+            attempt = truth.attempts[revision] if revision <= truth.revision else None
+            if attempt is not None:
+                together = self._model._model.together(attempt)
+                return (attempt, together) if together else None
+        return None
+
+    def _all_of(self, together: list[int], at: dict[str, int]) -> dict[str, tuple[int, int]] | None:
+        """The revisions of batches that come at once; None if something else comes before one of them."""
+        step = {}
+        for name, (truth, _) in self._lanes.items():
+            for revision in range(at[name] + 1, truth.revision + 1):
+                if truth.attempts[revision] in together:
+                    if revision - at[name] > 2 or any(
+                        each is not None for each in truth.attempts[at[name] + 1 : revision]
+                    ):
+                        return None
+                    step[name] = at[name], revision
+        return step
+
+    def _take(self, states: dict[int, State], step: Step, at: dict[str, int]) -> dict[int, State] | None:
+        """The states after a step, if the next events follow from it."""
+        now = at | {name: last for name, (_, last) in step.to.items()}
+        after = dict(states)
+        for fence in self._fences:
+            if any(fence.config.concerns(name) for name in step.to):
+                number = fence.row.number
+                expected = list(self._model.expected(fence, states[number], step, at))
+                state = self._explain(fence, states[number], expected, together=step.together)
+                if state is None:
+                    return None
+                after[number] = state
+        return self._wait(after, now)
+
+    def _explain(
+        self, fence: FenceTruth, state: State, expected: list[FenceEvent], *, together: bool = False
+    ) -> State | None:
+        """The state after these events, if they are the next ones."""
+        if not expected:
+            return state
+        events = self._events(fence)[state.explained : state.explained + len(expected)]
+        for number, one in enumerate(expected):
+            if number >= len(events) or not same(events[number], one, together=together):
+                real = events[number] if number < len(events) else "nothing"
+                self._note({0: state}, f"{fence.row.name} has {real}, and should have {one}")
+                return None
+        inside = dict(state.inside)
+        near = state.near
+        for event in events:
+            self._model.follow(fence.config, inside, event)
+            if event.type in (EventType.BEGIN, EventType.CEASE):
+                near = event.type is EventType.BEGIN
+        return State(inside, near, state.explained + len(events))
+
+    def _wait(self, states: dict[int, State], at: dict[str, int]) -> dict[int, State]:
+        """The states after the dwell events that come at these revisions."""
+        for fence in self._fences:
+            if not fence.config.dwell:
+                continue
+            state, events = states[fence.row.number], self._events(fence)
+            while state.explained < len(events):
+                event = events[state.explained]
+                if event.type is not EventType.DWELL or not self._model.dwells(fence, state, event, at):
+                    break
+                inside = dict(state.inside)
+                self._model.follow(fence.config, inside, event)
+                state = State(inside, state.near, state.explained + 1)
+            states = states | {fence.row.number: state}
+        return states
+
+    def _events(self, fence: FenceTruth) -> list[FenceEvent]:
+        return self._made.get(fence.row.number, [])
+
+    def _note(self, states: dict[int, State], problem: str) -> None:
+        explained = sum(state.explained for state in states.values())
+        if explained > self._explained:
+            self._explained, self.problem = explained, problem
+
+
+def _of_settings(events: list[FenceEvent] | None) -> bool:
+    """Whether events follow from the settings of a fence, not from revisions."""
+    return bool(events) and events[0].causes & (Cause.CREATED | Cause.CHANGED) != 0
+
+
+def same(real: FenceEvent, expected: FenceEvent, *, together: bool = False) -> bool:
+    """Whether an event is as expected; its sequence and time are compared elsewhere."""
+    gone = real.position is None and real.key is not None
+    if (real.distance is None) != (gone or not real.hull):
+        return False
+    if real.type is EventType.ENTER and real.distance != 0.0:
+        return False
+    known = expected._replace(
+        sequence=real.sequence, time=real.time, distance=real.distance, inside=real.inside, causes=real.causes
+    )
+    causes = expected.causes
+    if together and causes & Cause.EXPIRED and real.causes & Cause.REMOVED:
+        causes = causes & ~Cause.EXPIRED | Cause.REMOVED
+    return real == known and real.causes == causes and _members(real.inside) == _members(expected.inside)
+
+
+def alike(one: FenceEvent, other: FenceEvent) -> bool:
+    """Whether two events are the same one."""
+    time = other.time if one.type is EventType.CLOSED else one.time  # that one is not stored
+    return one._replace(inside=(), time=time) == other._replace(inside=()) and _members(one.inside) == _members(
+        other.inside
+    )
+
+
+def _members(inside: Iterable[Members]) -> dict[str, tuple[list[Key], int]]:
+    return {each.hull: (list(key_list(each.keys)), each.revision) for each in inside}
+
+
+def _named(event: FenceEvent) -> list[Subject]:
+    """The subjects that an event at the beginning of a fence names."""
+    if event.type is EventType.SNAPSHOT:
+        return [(each.hull, key) for each in event.inside for key in key_list(each.keys)]
+    return [] if event.key is None else [(event.hull, event.key)]
+
+
+@cache
+def fixed_shape(area: CircleArea | PolygonArea) -> Shape:
+    """An area that no hull moves."""
+    if isinstance(area, CircleArea):
+        return Disk((_units(area.x), _units(area.y)), _units(area.radius))
+    polygons = ([np.frombuffer(ring).reshape(-1, 2).tolist() for ring in polygon] for polygon in area.polygons)
+    return Rings(
+        tuple(tuple(tuple((_units(x), _units(y)) for x, y in ring) for ring in polygon) for polygon in polygons)
+    )
+
+
+def _units(length: float) -> int:
+    units = int(length * UNIT)
+    assert units == length * UNIT
+    return units
+
+
+def _exact(entity: Entity) -> Point:
+    return _units(entity.x), _units(entity.y)
