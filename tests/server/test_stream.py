@@ -167,6 +167,10 @@ def test_messages_with_several_batches_that_are_refused(stub: HullServiceStub, h
     assert fields(first, both) == ("batches", "2 batches")
     assert fields(first, several(one, sequences=[1])) == ("sequence", "1")
     assert fields(pb.StreamRequest(name=hull, may_skip=True)) == ("may_skip", "True")
+    follows = pb.StreamRequest(name=hull, producer="p", batch=one, sequence=5, after_sequence=4)
+    assert fields(follows) == ("after_sequence", "4")
+    follows.may_skip, follows.after_sequence = True, 5
+    assert fields(follows) == ("after_sequence", "5")
     numbered = pb.StreamRequest(name=hull, producer="p")
     assert fields(numbered, pb.StreamRequest(batch=one, sequence=5, may_skip=True)) == ("may_skip", "True")
     assert stub.GetHull(pb.GetHullRequest(name=hull)).hull.revision == 0
@@ -246,6 +250,50 @@ def test_numbers_that_may_skip(address: str, hull: str) -> None:
             client.apply(hull, insert=[[0, 0]], producer="t/0", sequence=113)
         assert caught.value.expected == 112
         assert client.get_hull(hull).revision == 7
+
+
+def test_a_reader_of_a_log_that_was_replaced_neither_doubles_nor_loses(address: str, hull: str) -> None:
+    """Its last batch arrives after the new reader has asked where to continue: the new one has to ask again."""
+
+    def apply(after: int, sequence: int) -> bool:
+        points = insert([[number, 0] for number in range(after + 1, sequence + 1)])
+        request = pb.ApplyRequest(
+            name=hull, batch=points, producer="t/0", sequence=sequence, may_skip=True, after_sequence=after
+        )
+        return stub.Apply(request).result.duplicate
+
+    def replaced(client: HullClient) -> None:
+        with client.writer(hull, producer="t/0", may_skip=True, batch_points=1) as new:
+            assert new.sequence == 5
+            assert apply(5, 9) is False  # of the old reader
+            new.put([[6, 0], [7, 0], [8, 0], [9, 0], [10, 0]], sequence=10)
+
+    with HullClient(address) as client, grpc.insecure_channel(address) as channel:
+        stub = HullServiceStub(channel)
+        assert apply(0, 5) is False
+        with pytest.raises(SequenceGapError) as caught:
+            replaced(client)
+        assert caught.value.expected == 10
+        assert apply(5, 9) is True
+        with client.writer(hull, producer="t/0", may_skip=True, batch_points=1) as again:
+            again.put([[10, 0]], sequence=10)
+        assert client.get_hull(hull).info.points == 10
+
+
+def test_what_follows_a_refused_batch_follows_the_one_before_it(address: str, hull: str) -> None:
+    with HullClient(address) as client, client.writer(hull, producer="t/0", may_skip=True, batch_points=1) as writer:
+        outcomes = [
+            writer.put([[0, 0]], sequence=2),
+            writer.put(delete=[[5, 5]], sequence=4),
+            writer.put([[1, 0]], sequence=6),
+            writer.put(delete=[[5, 5]], sequence=7),
+        ]
+        with pytest.raises(PointMissingError):
+            writer.flush()
+        writer.put([[2, 0]], sequence=9)
+        writer.flush()
+        assert [each.exception(30) is None for each in outcomes] == [True, False, True, False]
+        assert writer.sequence == 9
 
 
 def test_numbers_that_may_skip_are_counted_in_each_of_several_hulls(address: str, hull: str) -> None:

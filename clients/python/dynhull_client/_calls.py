@@ -689,7 +689,8 @@ def writer(
         patience: seconds without a server after which the writer gives up.
         may_skip: whether the caller numbers what it puts, as with the offsets of a log: numbers that rise and may skip.
             The batch of several puts has the number of the last one, so the writer's `sequence` is where to continue
-            after a restart. Needs a `producer`.
+            after a restart. If another writer with the name has applied batches in the meantime, this one ends with
+            SequenceGapError. Needs a `producer`.
     """
     if may_skip and producer is None:
         raise ValueError("may_skip needs a producer, whose numbers go on after a restart")

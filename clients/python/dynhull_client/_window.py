@@ -92,6 +92,7 @@ class Window(Generic[Future]):
         self._writing = writing
         self._new_outcome: Callable[[], Future] = new_outcome
         self._last = sequence  # the last number given
+        self._before = sequence  # that of the batch before the next one
         self._next: Next[Future] | None = None
         self._waiting: deque[Batch[Future]] = deque()  # to be sent on this connection
         self._sent: deque[Batch[Future]] = deque()  # on this connection
@@ -169,7 +170,10 @@ class Window(Generic[Future]):
             return None
         if not self._most_batches or self._one_at_a_time:
             message = self._send()
-            return pb.StreamRequest(batch=message.batch, sequence=message.sequence)
+            alone = pb.StreamRequest(batch=message.batch, sequence=message.sequence)
+            if message.HasField("after_sequence"):
+                alone.after_sequence = message.after_sequence
+            return alone
         count, size = 1, waiting[0].size
         while count < len(waiting) and count < self._most_batches and size + waiting[count].size <= self._most_bytes:
             size += waiting[count].size
@@ -263,6 +267,9 @@ class Window(Generic[Future]):
         self._next = None
         self._last = following.number or self._last + 1
         message = pb.NumberedBatch(batch=following.gathering.joined(), sequence=self._last)
+        if self._writing.may_skip:
+            message.after_sequence = self._before
+            self._before = self._last
         self._waiting.append(Batch(following.outcome, message, message.ByteSize() + FRAME_BYTES))
 
     def _send(self) -> pb.NumberedBatch:
@@ -283,10 +290,14 @@ class Window(Generic[Future]):
         self._lost_since = None
         for batch in self._waiting:
             batch.sent = 0
-            if not self._writing.may_skip:
-                batch.message.sequence -= 1
         if not self._writing.may_skip:
+            for batch in self._waiting:
+                batch.message.sequence -= 1
             self._last -= 1
+        elif self._waiting:
+            self._waiting[0].message.after_sequence = refused.message.after_sequence
+        else:
+            self._before = refused.message.after_sequence
         return [(refused.outcome, error)], 0.0
 
     def _end(self, error: DynhullError) -> Settled:

@@ -83,18 +83,20 @@ class RecenterResponse(_message.Message):
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., hull_changed: bool = ...) -> None: ...
 
 class ApplyRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence", "may_skip")
+    __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
+    AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
     may_skip: bool
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ...) -> None: ...
+    after_sequence: int
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
 
 class ApplyResponse(_message.Message):
     __slots__ = ("result",)
@@ -129,18 +131,20 @@ class ApplyTogetherResponse(_message.Message):
     def __init__(self, results: _Optional[_Iterable[_Union[_batch_pb2.BatchResult, _Mapping]]] = ...) -> None: ...
 
 class IngestRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence", "may_skip")
+    __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
+    AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
     may_skip: bool
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ...) -> None: ...
+    after_sequence: int
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
 
 class IngestResponse(_message.Message):
     __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted")
@@ -173,7 +177,7 @@ class IngestResponse(_message.Message):
     def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ...) -> None: ...
 
 class StreamRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip")
+    __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip", "after_sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
@@ -181,6 +185,7 @@ class StreamRequest(_message.Message):
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     ACCEPT_RESULTS_FIELD_NUMBER: _ClassVar[int]
     MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
+    AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
@@ -188,15 +193,18 @@ class StreamRequest(_message.Message):
     batches: _containers.RepeatedCompositeFieldContainer[NumberedBatch]
     accept_results: bool
     may_skip: bool
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., batches: _Optional[_Iterable[_Union[NumberedBatch, _Mapping]]] = ..., accept_results: bool = ..., may_skip: bool = ...) -> None: ...
+    after_sequence: int
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., batches: _Optional[_Iterable[_Union[NumberedBatch, _Mapping]]] = ..., accept_results: bool = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
 
 class NumberedBatch(_message.Message):
-    __slots__ = ("batch", "sequence")
+    __slots__ = ("batch", "sequence", "after_sequence")
     BATCH_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     batch: _batch_pb2.Batch
     sequence: int
-    def __init__(self, batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., sequence: _Optional[int] = ...) -> None: ...
+    after_sequence: int
+    def __init__(self, batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., sequence: _Optional[int] = ..., after_sequence: _Optional[int] = ...) -> None: ...
 
 class StreamResponse(_message.Message):
     __slots__ = ("result", "sequence", "results", "max_batches", "max_message_bytes")

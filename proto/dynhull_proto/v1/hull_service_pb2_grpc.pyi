@@ -48,7 +48,9 @@ class HullServiceStub:
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
-    GetProducer returns where to continue.
+    GetProducer returns where to continue. With the number of the batch before it ("after_sequence") a batch is refused
+    where the producer's last batch is another one: a reader of the log that was replaced while its last batches were on
+    their way neither doubles nor passes over what they hold.
 
     The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
     answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
@@ -177,7 +179,9 @@ class HullServiceAsyncStub(HullServiceStub):
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
-    GetProducer returns where to continue.
+    GetProducer returns where to continue. With the number of the batch before it ("after_sequence") a batch is refused
+    where the producer's last batch is another one: a reader of the log that was replaced while its last batches were on
+    their way neither doubles nor passes over what they hold.
 
     The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
     answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
@@ -302,7 +306,9 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
-    GetProducer returns where to continue.
+    GetProducer returns where to continue. With the number of the batch before it ("after_sequence") a batch is refused
+    where the producer's last batch is another one: a reader of the log that was replaced while its last batches were on
+    their way neither doubles nor passes over what they hold.
 
     The points of a geographic hull are longitudes and latitudes, see Frame; so are those of requests about it. Where the
     answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +74,18 @@ def decode_may_skip(producer: str, may_skip: bool) -> bool:
     if may_skip and not producer:
         raise InvalidFieldError("may_skip", may_skip, "only numbers of a producer can be skipped")
     return may_skip
+
+
+def decode_after(may_skip: bool, request: Any) -> int | None:
+    """The number of the batch that must be the producer's last one; None for any."""
+    if not request.HasField("after_sequence"):
+        return None
+    after = int(request.after_sequence)
+    if not may_skip:
+        raise InvalidFieldError("after_sequence", after, "it is for numbers that may skip: give may_skip")
+    if after >= request.sequence:
+        raise InvalidFieldError("after_sequence", after, f"it must be less than sequence, {request.sequence}")
+    return after
 
 
 def decode_page(

@@ -33,6 +33,7 @@ def decode_write(request: Any, message_bytes: int, producer: str, owner: str, ma
         decode.decode_sequence(producer, request.sequence),
         owner,
         may_skip,
+        decode.decode_after(may_skip, request),
     )
 
 
@@ -156,6 +157,8 @@ class StreamedBatches:
         if not message.HasField("batch"):
             if message.sequence:
                 raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")
+            if message.HasField("after_sequence"):
+                raise decode.InvalidFieldError("after_sequence", message.after_sequence, "it needs a batch")
             return
         self._send([self._decoded(message, self._call.message_bytes)])
 
@@ -166,7 +169,7 @@ class StreamedBatches:
         if len(several) > MOST_IN_A_MESSAGE:
             problem = f"a message has at most {MOST_IN_A_MESSAGE}"
             raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
-        if message.HasField("batch") or message.sequence:
+        if message.HasField("batch") or message.sequence or message.HasField("after_sequence"):
             raise decode.InvalidFieldError("batches", f"{len(several)} batches", "use batch or batches, not both")
         size = self._call.message_bytes // len(several)
         requests: list[WriteBatch] = []

@@ -98,6 +98,7 @@ class WriteBatch(Request):
         sequence: its number.
         owner: the caller that the producer belongs to.
         may_skip: whether numbers may be skipped.
+        after: the number of the batch that must be the producer's last one; None for any.
         name: the name of the hull. The engine sets this, the attributes below and `to`.
         arrived: the time of its arrival by the server's clock, in microseconds since 1970.
         birth: the origin of the hull, if a missing hull shall be created; None if it shall be refused.
@@ -111,6 +112,7 @@ class WriteBatch(Request):
     sequence: int = 0
     owner: str = ""
     may_skip: bool = False
+    after: int | None = None
     name: str = field(default="", init=False)
     arrived: int = field(default=0, init=False)
     birth: Birth | None = field(default=None, init=False)

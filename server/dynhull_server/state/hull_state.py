@@ -123,7 +123,7 @@ class HullState:
             LimitExceededError: the hull has too many producers to add one.
         """
         return not write.producer or self._producers.is_new(
-            write.producer, write.sequence, write.owner, now, may_skip=write.may_skip
+            write.producer, write.sequence, write.owner, now, may_skip=write.may_skip, after=write.after
         )
 
     def duplicate(self) -> Applied:

@@ -55,16 +55,30 @@ class Producers:
         known = self._counting.get(producer) or self._skipping.get(producer)
         return 0 if known is None else known.last
 
-    def is_new(self, producer: str, sequence: int, owner: str, now: float, *, may_skip: bool = False) -> bool:
+    def is_new(
+        self, producer: str, sequence: int, owner: str, now: float, *, may_skip: bool = False, after: int | None = None
+    ) -> bool:
         """Whether the batch is the next one; False where it has already been applied.
 
+        Args:
+            producer: the name of the producer.
+            sequence: the batch's number.
+            owner: the caller that the producer belongs to.
+            now: seconds on a monotonic clock.
+            may_skip: whether numbers may be skipped.
+            after: the number of the batch that must be the producer's last one; None for any.
+
         Raises:
-            SequenceGapError: batches before it are missing, and its number must not skip any.
+            SequenceGapError: batches before it are missing and its number must not skip any, or the last one is not
+                `after`.
             LimitExceededError: the hull has too many producers to add one.
         """
         last = self.last(producer)
         if sequence > last + 1 and not may_skip:
             raise SequenceGapError(producer, sequence, last + 1)
+        if after not in (None, last) and sequence > last:
+            words = f"batch {sequence} of producer {producer!r} follows {after}, but the last one applied is {last}"
+            raise SequenceGapError(producer, sequence, last + 1, words)
         if last == 0:
             self._make_room(owner, now)
         return sequence > last
