@@ -141,8 +141,11 @@ def test_areas_of_every_kind_and_who_is_inside(
         wait_for_source(page, f"area of {herd}", "xs", [[[[0, 30, 30, 0]]]])
         wait_for_inside(page, herd, {"hole": [5, 3], "in": [3, 3], "out": [20, 2]})
         wait_for_inside(page, yard, {"hole": [5, 3], "in": [3, 3]})
+        # They are sorted, though an event brings the last one.
+        client.put(fleet, ["a new one"], [[3, 2]])
+        wait_for_inside(page, yard, {"a new one": [3, 2], "hole": [5, 3], "in": [3, 3]})
         expect(table_row(page, herd).locator("td")).to_have_text(
-            [f"hull {pack}", fleet, "3 of 3", "3", "none", "margin 2"]
+            [f"hull {pack}", fleet, "4 of 4", "4", "none", "margin 2"]
         )
         expect(table_row(page, pond).locator("td").first).to_have_text("circle around (20, 0), radius 3")
         dashes = [path.get_attribute("stroke-dasharray") for path in page.locator(".fences path[stroke]").all()]

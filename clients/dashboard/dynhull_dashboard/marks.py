@@ -41,9 +41,9 @@ class Marks:
 
     @property
     def message(self) -> str:
-        """All of them as JSON; the same string until one changes."""
+        """All of them as JSON, sorted, whether events or a reading brought them; the same string until one changes."""
         if self._message is None:
-            marks = self._marks.values()
+            marks = sorted(self._marks.values())
             columns = {name: [getattr(mark, name) for mark in marks] for name in Mark._fields}
             self._message = json.dumps({"kind": "inside", "fence": self._fence, **columns})
         return self._message
