@@ -35,12 +35,13 @@ def write_csv(file: Path, contents: Contents, progress: Progress, *, geographic:
 def write_geojson(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
     """Write a feature for each point: its key as the id, its times as the properties time and expires.
 
-    Longitudes of a geographic hull beyond 180 degrees are written as the same place within (RFC 7946).
+    Longitudes of a geographic hull beyond 180 degrees are written as the same place within (RFC 7946). Of a plane the
+    coordinate reference system is null, so that readers do not take its points for longitudes and latitudes.
 
     Integer keys above 2**53 are written as strings, because some readers of JSON would round the numbers.
     """
     with file.open("w", encoding="utf-8") as out:
-        out.write('{"type": "FeatureCollection", "features": [\n')
+        out.write('{"type": "FeatureCollection", ' + ("" if geographic else '"crs": null, ') + '"features": [\n')
         between = ""
         for part in _parts(contents, progress):
             for feature in _features(part, geographic=geographic):

@@ -63,6 +63,28 @@ def test_points_of_ones_own(tmp_path):
     assert is_picture(picture)
 
 
+def test_longitudes_and_latitudes_of_ones_own_are_on_the_globe(tmp_path):
+    file, picture = tmp_path / "fleet.csv", tmp_path / "fleet.png"
+    rows = ["1,a,179,-17", "1,b,-179.5,-18", "1,c,178,-18", "2,a,179.2,-16", "3,c,-18,177"]
+    file.write_text("\n".join(["minute,truck,Lon,Lat", *rows]))
+    options = ["--points", file, "--id", "truck", "--time", "minute", "--out", picture]
+    done = demo(*options)
+    assert done.exit_code == 0, done.stderr
+    assert "line 6: the latitude is 177.0, not from -90 to 90 degrees; the longitude comes first" in done.stdout
+    assert "on the globe: Lon and Lat are degrees; --plane takes them for a plane" in done.stdout
+    assert "14,709 km²" in done.stdout
+    assert done.stdout.splitlines()[-1] == "VERIFIED 2/2"
+    assert is_picture(picture)
+    plane = demo(*options, "--plane")
+    assert plane.exit_code == 0, plane.stderr
+    assert "in the plane: Lon and Lat are x and y, and areas square degrees" in plane.stdout
+    assert "square units" in plane.stdout
+    file.write_text("minute,truck,lon,lat\n1,a,0,0\n1,b,120,0\n1,c,-120,1\n")
+    far = demo(*options)
+    assert far.exit_code == 2
+    assert "a hull reaches 85 degrees. --plane takes degrees for points of a plane" in far.stderr
+
+
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
@@ -83,6 +105,7 @@ def test_unusable_input_says_what_to_do(tmp_path, text, options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--plane"], "--geographic and --plane are for --points: the flights are on the globe"),
         (["--day", "x"], "--day 'x' is not a day such as 2013-03-08"),
         (["--out", "d.txt"], "--out d.txt: the name must end in .png"),
         (["--out", "nowhere/d.png"], "--out nowhere/d.png: there is no folder nowhere"),

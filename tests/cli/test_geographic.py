@@ -52,6 +52,63 @@ def test_other_names_of_longitude_and_latitude(name, tmp_path, columns):
         assert listed(f"{name}-{suffix}")["geographic"]
 
 
+def collection(points, **more):
+    shapes = [{"type": "Point", "coordinates": each} for each in points]
+    features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+    return json.dumps({"type": "FeatureCollection", **more, "features": features})
+
+
+def crs(name):
+    return {"crs": {"type": "name", "properties": {"name": name}}}
+
+
+PORTS = [[179, -17], [-179, -17], [180, -16]]
+WHERE = [{"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": each}} for each in PORTS]
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("a.geojson", collection(PORTS)),
+        ("a.geojson", collection(PORTS, **crs("urn:ogc:def:crs:OGC:1.3:CRS84"))),
+        ("a.json", collection(PORTS)),
+        ("a.json", json.dumps(WHERE)),
+        ("a.json", json.dumps({"type": "MultiPoint", "coordinates": PORTS}, indent=1)),
+        ("a.ndjson", "\n".join(map(json.dumps, WHERE))),
+    ],
+)
+@pytest.mark.usefixtures("served")
+def test_geojson_is_on_the_globe(name, tmp_path, file, text):
+    path = tmp_path / file
+    path.write_text(text)
+    done = run("load", name, path, "--vertices")
+    assert f"{name}: a new hull on the globe: longitude and latitude are degrees; --plane" in done.stderr
+    info = listed(name)
+    assert (info["geographic"], info["points"]) == (True, 3)
+    assert info["center"] == pytest.approx([-180, -16.7], abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"), [({"crs": None}, "null"), (crs("urn:ogc:def:crs:EPSG::3857"), "urn:ogc:def:crs:EPSG::3857")]
+)
+@pytest.mark.usefixtures("served")
+def test_geojson_with_another_reference_system_is_a_plane(name, tmp_path, more, said):
+    path = tmp_path / "metres.geojson"
+    path.write_text(collection([[20_000_000, -1_900_000], [20_000_100, -1_900_000]], **more))
+    done = run("load", name, path)
+    assert f"its coordinates are not degrees: its crs is {said}" in done.stderr
+    assert (listed(name)["geographic"], listed(name)["points"]) == (False, 2)
+
+
+@pytest.mark.usefixtures("served")
+def test_a_plane_that_gets_geojson_is_warned_about_once(name, tmp_path):
+    path = tmp_path / "ports.geojson"
+    path.write_text(collection(PORTS))
+    run("create", name)
+    done = run("load", name, path)
+    assert done.stderr.count(f"{name} is a plane: it takes longitude and latitude for x and y") == 1
+
+
 @pytest.mark.usefixtures("served")
 def test_a_plane_on_request_and_for_other_columns(name, fiji, tmp_path):
     done = run("load", f"{name}-a", fiji, "--plane")

@@ -51,10 +51,11 @@ def holds(address, name, points):
 def test_every_format(tmp_path, served, name, suffix):
     file = tmp_path / f"points{suffix}"
     write(file, POINTS)
-    done = dynhull("load", name, file)
+    of_geojson = suffix == ".geojson"
+    done = dynhull("load", name, file, *(["--plane"] if of_geojson else []))
     assert (done.exit_code, done.stdout) == (0, f"{name}: 20,003 points loaded, 20,003 in the hull\n"), done.stderr
     words = f"{name}: a new hull in the plane, in square degrees; --geographic makes it one on the globe\n"
-    assert done.stderr == (words if suffix == ".geojson" else "")  # which are longitudes and latitudes by RFC 7946
+    assert done.stderr == (words if of_geojson else "")  # whose coordinates are degrees
     holds(served, name, POINTS)
 
 

@@ -153,8 +153,8 @@ def wkb(shape, **options):
     return shapely.to_wkb(shapely.geometry.shape(shape), **options)
 
 
-def write_geoparquet(path, geometries, encoding="WKB"):
-    geo = {"version": "1.1.0", "primary_column": "place", "columns": {"place": {"encoding": encoding}}}
+def write_geoparquet(path, geometries, encoding="WKB", **crs):
+    geo = {"version": "1.1.0", "primary_column": "place", "columns": {"place": {"encoding": encoding, **crs}}}
     table = pa.table({"x": [0.0] * len(geometries), "y": [0.0] * len(geometries), "place": geometries})
     pq.write_table(table.replace_schema_metadata({"geo": json.dumps(geo)}), path)
 
@@ -180,15 +180,17 @@ SHAPES = [FEATURES[0], {**FEATURES[1], "coordinates": [[-5, 6, 1], [-5, 6, 2]]},
     ],
     ids=count(),
 )
-def test_geoparquet(tmp_path, served, name, geometries, options):
+@pytest.mark.parametrize("crs", [{}, {"crs": {"type": "ProjectedCRS"}}], ids=["degrees", "metres"])
+def test_geoparquet(tmp_path, served, name, geometries, options, crs):
     path = tmp_path / "points.parquet"
-    write_geoparquet(path, geometries, "point" if isinstance(geometries, pa.Array) else "WKB")
+    write_geoparquet(path, geometries, "point" if isinstance(geometries, pa.Array) else "WKB", **crs)
     done = dynhull("load", name, path, *options)
     assert done.exit_code == 0, done.stderr
     assert "points from the geometry column place" in done.stderr
     assert "bad" not in done.stderr
     with HullClient(served) as client:
-        assert client.get_hull(name).vertices.tolist() == TRIANGLE
+        hull = client.get_hull(name)
+        assert (hull.vertices.tolist(), hull.info.geographic) == (TRIANGLE, not crs)
         # A named column is taken instead of the geometry.
         assert dynhull("load", name, path, "--x", "x", "--y", "y").exit_code == 0
         assert client.count(name, [[0, 0]]).counts.tolist() == [len(geometries)]

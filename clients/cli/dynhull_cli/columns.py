@@ -6,10 +6,29 @@ from pathlib import Path
 
 from dynhull.arrays import COLUMN_NAMES
 
+LONGITUDE_LATITUDE = "longitude", "latitude"
+DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
+GREATEST_LONGITUDE, GREATEST_LATITUDE = 360.0, 90.0
+
 
 def has_pair(columns: Sequence[str]) -> bool:
     """Whether a pair of known names is among the columns."""
     return _pair(columns) is not None
+
+
+def are_degrees(x: str, y: str) -> bool:
+    """Whether the names of two columns say that these are longitudes and latitudes."""
+    return (x.strip().lower(), y.strip().lower()) in DEGREES
+
+
+def why_no_place(lon: float, lat: float) -> str | None:
+    """Why two numbers are no longitude and latitude; None if they are."""
+    if abs(lat) > GREATEST_LATITUDE:
+        hint = "; the longitude comes first" if abs(lon) <= GREATEST_LATITUDE else ""
+        return f"the latitude is {lat}, not from -90 to 90 degrees{hint}"
+    if abs(lon) > GREATEST_LONGITUDE:
+        return f"the longitude is {lon}, not from -360 to 360 degrees"
+    return None
 
 
 def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, y: str | None) -> tuple[int, int]:

@@ -1,9 +1,10 @@
 """The points of a CSV file that fits into memory, with their names and times."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from .columns import column_index, coordinate, decimal_mark
+from .columns import are_degrees, column_index, coordinate, decimal_mark, why_no_place
 from .csv_table import CsvFormat, CsvTable, csv_table, numbered
 from .plural import plural
 
@@ -12,9 +13,33 @@ SHOWN_BAD_ROWS = 5
 Row = tuple[str, str, tuple[float, float]]  # time, name, position
 
 
+@dataclass(frozen=True, slots=True)
+class PointFile:
+    """The points of a CSV file.
+
+    Attributes:
+        rows: its rows.
+        axes: the names of the columns of x and y.
+        geographic: whether these are longitudes and latitudes.
+        notes: lines of text: the number of rows, and the rows left out because they lack finite coordinates, a name or
+            a time.
+    """
+
+    rows: list[Row]
+    axes: tuple[str, str]
+    geographic: bool
+    notes: list[str]
+
+
 def read_points(
-    path: Path, x: str | None, y: str | None, identity: str | None = None, time: str | None = None
-) -> tuple[list[Row], list[str]]:
+    path: Path,
+    x: str | None,
+    y: str | None,
+    identity: str | None = None,
+    time: str | None = None,
+    *,
+    geographic: bool | None = False,
+) -> PointFile:
     """Read a CSV file.
 
     Args:
@@ -23,10 +48,7 @@ def read_points(
         y: the column of y.
         identity: the column of each point's name; None to name points by the number of their line.
         time: the column of each point's time; None for empty times.
-
-    Returns:
-        The rows, and lines of text: the number of rows, and the rows left out because they lack finite coordinates, a
-        name or a time.
+        geographic: whether points are longitudes and latitudes; None if the names of the columns say so.
 
     Raises:
         ValueError: the file does not have the columns, or no points.
@@ -37,12 +59,14 @@ def read_points(
             None if column is None else column_index(path, table.names, option, column)
             for option, column in (("--time", time), ("--id", identity))
         ]
-        rows, bad = _read(table, *labels)
-    columns = f"columns {table.names[table.x]} and {table.names[table.y]}"
+        axes = table.names[table.x], table.names[table.y]
+        on_globe = are_degrees(*axes) if geographic is None else geographic
+        rows, bad = _read(table, *labels, on_globe=on_globe)
     left_out = bad_rows_left_out(bad[:SHOWN_BAD_ROWS], len(bad))
     if not rows:
         raise ValueError("\n".join([f"{path} has no points", *left_out]))
-    return rows, [*table.notes, f"{path}: {plural(len(rows), 'point')} from {columns}", *left_out]
+    found = f"{path}: {plural(len(rows), 'point')} from columns {axes[0]} and {axes[1]}"
+    return PointFile(rows, axes, on_globe, [*table.notes, found, *left_out])
 
 
 def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
@@ -53,7 +77,7 @@ def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
     return [f"{plural(count, 'bad row')} left out:", *(f"  {each}" for each in first), *more]
 
 
-def _read(table: CsvTable, time: int | None, identity: int | None) -> tuple[list[Row], list[str]]:
+def _read(table: CsvTable, time: int | None, identity: int | None, *, on_globe: bool) -> tuple[list[Row], list[str]]:
     """Good rows, and a reason for each bad one."""
     records = [(line, row, dict(enumerate(row))) for line, row in numbered(table.rows, table.first_line)]
     places = table.x, table.y
@@ -63,6 +87,8 @@ def _read(table: CsvTable, time: int | None, identity: int | None) -> tuple[list
         try:
             table.require_no_more_fields(row)
             x, y = (coordinate(fields.get(place), table.names[place], mark) for place in places)
+            if on_globe and (problem := why_no_place(x, y)):
+                raise ValueError(problem)
             when, name = (_label(fields, table.names, place) for place in (time, identity))
         except ValueError as reason:
             bad.append(f"line {line}: {reason}")

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynhull.keys import KeyType
-from dynhull_client import HullClient, Points
+from dynhull_client import HullClient, HullInfo, Points
 
 from .columns import plain
 from .rows import STANDARD_INPUT
@@ -43,14 +42,16 @@ def given_keys(arguments: list[str] | None) -> list[str]:
 
 def keys_for(client: HullClient, name: str, keys: Sequence[str]) -> list[str] | list[int]:
     """The keys as the hull has them: as integers if its keys are; as text also where there is no such hull yet."""
-    _, keyed = key_type_of(client, name)
-    return [integer_key(key, f"key {row}") for row, key in enumerate(keys, start=1)] if keyed == "int" else list(keys)
+    known = known_hull(client, name)
+    if known is None or known.keyed != "int":
+        return list(keys)
+    return [integer_key(key, f"key {row}") for row, key in enumerate(keys, start=1)]
 
 
-def key_type_of(client: HullClient, name: str) -> tuple[bool, KeyType | None]:
-    """Whether there is such a hull, and the kind of its keys."""
+def known_hull(client: HullClient, name: str) -> HullInfo | None:
+    """The hull, None if there is no such hull."""
     first = next(client.list_hulls(name), None)
-    return (True, first.keyed) if first is not None and first.name == name else (False, None)
+    return first if first is not None and first.name == name else None
 
 
 def integer_key(key: Any, place: str) -> int:

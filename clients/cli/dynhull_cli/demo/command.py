@@ -42,6 +42,15 @@ def demo(
     ] = None,
     time: Annotated[str | None, typer.Option(help="Column to order by: one batch for each value.")] = None,
     batches: Annotated[int, typer.Option(min=1, help="Without --time: number of batches to cut the file into.")] = 100,
+    geographic: Annotated[
+        bool | None,
+        typer.Option(
+            "--geographic/--plane",
+            help="Whether the points of --points are on the globe, in degrees, or in the plane. Default: on the globe "
+            "if the columns are named lon and lat, or the like.",
+            show_default=False,
+        ),
+    ] = None,
     window: Annotated[
         str | None,
         typer.Option(
@@ -74,7 +83,17 @@ def demo(
     console = Console(highlight=False, soft_wrap=True)
     try:
         check_out(out, [".png"])
-        scene = _scene(day, hours, points, x, y, identity, time, batches, duration(window, "--window"))
+        max_age = duration(window, "--window")
+        if points is not None:
+            if max_age is not None:
+                raise ValueError("--window is for the flights, not for --points")
+            from .table import Table
+
+            scene: Scene = Table(points, x, y, identity, time, batches, geographic=geographic)
+        elif geographic is not None:
+            raise ValueError("--geographic and --plane are for --points: the flights are on the globe")
+        else:
+            scene = _flights(day, hours, max_age)
         verified = show(console, scene, out)
     except (ValueError, OSError, RuntimeError, DynhullError) as error:
         message = Text.assemble(("error: ", "red"), str(error))
@@ -84,23 +103,7 @@ def demo(
         raise typer.Exit(1)
 
 
-def _scene(
-    day: str,
-    hours: int,
-    points: Path | None,
-    x: str | None,
-    y: str | None,
-    identity: str | None,
-    time: str | None,
-    batches: int,
-    max_age: "timedelta | None",
-) -> "Scene":
-    if points is not None:
-        if max_age is not None:
-            raise ValueError("--window is for the flights, not for --points")
-        from .table import Table
-
-        return Table(points, x, y, identity, time, batches)
+def _flights(day: str, hours: int, max_age: "timedelta | None") -> "Scene":
     try:
         date = datetime.strptime(day, "%Y-%m-%d").date()
     except ValueError:

@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..csv_points import Row, read_points
+from dynhull.globe import Gnomonic
+
+from ..columns import are_degrees
+from ..csv_points import PointFile, Row, read_points
 from .scene import Frame, Points
 
 if TYPE_CHECKING:
     from datetime import timedelta
 
 MILESTONES = 24
+SQUARE_KILOMETRE = 1e6  # square metres
 
 
 class Table:
@@ -23,25 +27,46 @@ class Table:
     With a time column, there is one batch for each value, in order: as numbers if all are numbers, otherwise as text.
     Without, the file is cut into `batches` equal parts. With an id column, a row whose id was seen before moves that
     point; without, every row adds a point. Rows without finite coordinates are counted and shown.
+
+    Args:
+        path: the file.
+        x: the column of x.
+        y: the column of y.
+        identity: the column of ids.
+        time: the column of times.
+        batches: the number of parts without times.
+        geographic: whether the points are on the globe; None if the names of the columns say so.
+
+    Raises:
+        ValueError: the file does not have the columns, or no points, or some are too far apart for a hull on the globe.
     """
 
     max_age: "timedelta | None" = None
     counted = "points"
     step = "batches"
-    length_unit = "units"
-    area_unit = "square units"
-    area_scale = 1.0
-    center: "tuple[float, float] | None" = None
     circles: dict[str, tuple[float, float, float]] = {}  # noqa: RUF012  (nobody changes it)
     rivals: tuple[str, str] | None = None
 
     def __init__(
-        self, path: Path, x: str | None, y: str | None, identity: str | None, time: str | None, batches: int
+        self,
+        path: Path,
+        x: str | None,
+        y: str | None,
+        identity: str | None,
+        time: str | None,
+        batches: int,
+        *,
+        geographic: bool | None = None,
     ) -> None:
         self.title = path.name
         self.hull_name = "points"
-        rows, self.notes = read_points(path, x, y, identity, time)
-        self._batches = _by_time(rows) if time else _equal_parts(rows, batches)
+        file = read_points(path, x, y, identity, time, geographic=geographic)
+        self.center = _center(file) if file.geographic else None
+        self.length_unit, self.area_unit, self.area_scale = "units", "square units", 1.0
+        if file.geographic:
+            self.length_unit, self.area_unit, self.area_scale = "km", "km²", 1 / SQUARE_KILOMETRE
+        self.notes = [*file.notes, *_frame(file)]
+        self._batches = _by_time(file.rows) if time else _equal_parts(file.rows, batches)
         self.keyed = identity is not None
         self.length = len(self._batches)
         self.background = np.empty((0, 2))
@@ -57,6 +82,27 @@ class Table:
             milestone = i % every == 0 or i == self.length - 1
             keys = list(put) if self.keyed else []
             yield Frame(clock, _array(put.values()), _array(there.values()), names, milestone, keys)
+
+
+def _center(file: PointFile) -> tuple[float, float]:
+    """The direction of the mean of all points, for which a hull on the globe must reach them all."""
+    places = _array(position for *_, position in file.rows)
+    frame = Gnomonic.about(places)
+    try:
+        frame.project_all(places)
+    except ValueError as error:
+        raise ValueError(f"{error}. --plane takes degrees for points of a plane") from None
+    return frame.center
+
+
+def _frame(file: PointFile) -> list[str]:
+    """A line about the frame; none where nobody would expect the globe."""
+    columns = " and ".join(file.axes)
+    if file.geographic:
+        return [f"on the globe: {columns} are degrees; --plane takes them for a plane"]
+    if are_degrees(*file.axes):
+        return [f"in the plane: {columns} are x and y, and areas square degrees"]
+    return []
 
 
 def _by_time(rows: Iterable[Row]) -> list[tuple[str, list[Row]]]:

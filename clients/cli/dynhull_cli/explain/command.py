@@ -90,8 +90,8 @@ def _full_name(beginning: str) -> str:
 def _read(path: Path, x: str | None, y: str | None) -> "tuple[list[Point], list[str]]":
     from ..csv_points import read_points
 
-    rows, notes = read_points(path, x, y)
-    return [position for _, _, position in rows], notes
+    file = read_points(path, x, y)
+    return [position for _, _, position in file.rows], file.notes
 
 
 def _story(algorithm: str, name: str, points: "list[Point]", collinear: Boundary) -> "Story":

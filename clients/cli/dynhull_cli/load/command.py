@@ -15,7 +15,7 @@ from ..times import TimeUnit
 from .options import STANDARD_INPUT, Format, Options
 
 if TYPE_CHECKING:
-    from dynhull_client import HullClient
+    from dynhull_client import HullClient, HullInfo
 
 
 def _input(text: str, *names: str, **more: Any) -> Any:
@@ -82,7 +82,7 @@ def load(
         typer.Option(
             "--geographic/--plane",
             help="Whether a new hull is on the globe, in degrees, or in the plane. Default: on the globe if the "
-            "columns are named lon and lat, or the like.",
+            "columns are named lon and lat, or the like, and for GeoJSON.",
             show_default=False,
         ),
     ] = None,
@@ -122,9 +122,10 @@ def load(
     With --key, each row puts its key: a row for a known key moves it, and rows are applied in the order of the file. A
     missing hull is created with keys that are strings; create it before the load if it shall have other settings.
 
-    A missing hull is created on the globe if the columns are named lon and lat, or longitude and latitude: its edges
-    are great circles, and its points within 85 degrees of a centre, which the first points choose.
+    A missing hull is created on the globe if the columns are named lon and lat, or longitude and latitude, and for
+    GeoJSON: its edges are great circles, and its points within 85 degrees of a centre, which the first points choose.
     """
+    from ..keyed_rows import known_hull
     from .bad_rows import BadRows, open_bad_rows
     from .loading import load_points, producer_name, report_reading, require_readable
     from .source import integers_of_any_size, open_source
@@ -137,15 +138,16 @@ def load(
     options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires)
     if file is None and sys.stdin.isatty():
         raise ValueError("no file: give its name, or - to type the points in")
-    integers = not dry_run and key is not None and _has_integer_keys(client, name)
+    there = cache(partial(known_hull, client, name))
+    integers = not dry_run and key is not None and _has_integer_keys(there(), name)
     with (
         integers_of_any_size(),
         open_source(STANDARD_INPUT if file is None else file, format, options, integer_keys=integers) as opened,
         open_bad_rows(bad_rows, opened) as bad_file,
     ):
         bad = BadRows(bad_file, max_bad)
-        frame = partial(_frame, None if dry_run or replace else client, name, geographic)
-        source = dataclasses.replace(opened, geographic=cache(frame))
+        known = (lambda: None) if dry_run or replace else there
+        source = dataclasses.replace(opened, geographic=lambda: _frame(known(), geographic))
         if dry_run:
             report_reading(name, source, bad, as_json)
             return
@@ -155,7 +157,16 @@ def load(
         if resume and producer is None:
             raise ValueError(f"{source.name} has no name to resume by: give --producer NAME, the same each time")
         loaded, points = load_points(
-            client, name, source, bad, producer, patience, geographic=geographic, resume=resume, replace=replace
+            client,
+            name,
+            source,
+            bad,
+            producer,
+            patience,
+            known=known,
+            geographic=geographic,
+            resume=resume,
+            replace=replace,
         )
     if as_json:
         typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points))
@@ -165,20 +176,16 @@ def load(
         )
 
 
-def _has_integer_keys(client: "HullClient", name: str) -> bool:
+def _has_integer_keys(known: "HullInfo | None", name: str) -> bool:
     """Whether the keys of the hull are integers. ValueError if it has none."""
-    from ..keyed_rows import key_type_of
-
-    known, keyed = key_type_of(client, name)
-    if known and keyed is None:
+    if known is not None and known.keyed is None:
         raise ValueError(f"the points of {name!r} have no keys: leave out --key, or load into another hull")
-    return keyed == "int"
+    return known is not None and known.keyed == "int"
 
 
-def _frame(client: "HullClient | None", name: str, geographic: bool | None) -> bool | None:
-    """Whether an existing hull is geographic; what was asked for if there is none, or without a client."""
-    known = None if client is None else next(client.list_hulls(name), None)
-    return known.geographic if known is not None and known.name == name else geographic
+def _frame(known: "HullInfo | None", geographic: bool | None) -> bool | None:
+    """Whether an existing hull is geographic; what was asked for if there is none."""
+    return geographic if known is None else known.geographic
 
 
 def _check(decimal: str | None, *, replace: bool, resume: bool, again: bool) -> None:

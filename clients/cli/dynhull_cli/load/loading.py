@@ -25,13 +25,13 @@ from ..json_lines import json_line
 from ..plural import plural
 from .bad_rows import BadRows
 from .chunks import Points, Rows, blocks
-from .options import Format
 from .source import Source
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from dynhull.keys import KeyType
+    from dynhull_client import HullInfo
 
 BATCH_POINTS = 8192  # part of the promise of --resume: the number of a batch says which points are in it
 PRODUCER_DIGITS = 32  # of the file's digest
@@ -75,13 +75,15 @@ def load_points(
     producer: str | None,
     patience: float,
     *,
+    known: "Callable[[], HullInfo | None]",
     geographic: bool | None,
     resume: bool,
     replace: bool,
 ) -> tuple[int, int | None]:
     """Create the hull where it is missing, and add the points that earlier runs of the same load did not add.
 
-    A new hull is geographic if `geographic` says so or, without it, if the names of the columns do.
+    A new hull is geographic if `geographic` says so or, without it, if the input does. `known` returns the hull that
+    was there before, None without one.
 
     Returns:
         The number of points added, and the number in the hull afterwards; None where nothing was left to add.
@@ -97,7 +99,7 @@ def load_points(
         if first is None:
             raise ValueError(_no_points(source, bad))
         _print_notes(source.notes)
-        on_globe = _make(client, name, source, geographic, silent=resume, replace=replace)
+        on_globe = _make(client, name, source, known, geographic, silent=resume, replace=replace)
         writer = client.writer(
             name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
         )
@@ -136,7 +138,14 @@ def _print_notes(notes: Iterable[str]) -> None:
 
 
 def _make(
-    client: HullClient, name: str, source: Source, geographic: bool | None, *, silent: bool, replace: bool
+    client: HullClient,
+    name: str,
+    source: Source,
+    known: "Callable[[], HullInfo | None]",
+    geographic: bool | None,
+    *,
+    silent: bool,
+    replace: bool,
 ) -> bool:
     """Create the hull unless it exists. Returns whether it is geographic."""
     keyed: KeyType | None = None
@@ -150,33 +159,33 @@ def _make(
     on_globe = source.degrees if geographic is None else geographic
     try:
         client.create_hull(name, keyed=keyed, geographic=on_globe)
-    except HullExistsError as known:
+    except HullExistsError as error:
         if not silent:
-            typer.echo(f"{known}: adding to it", err=True)
-        return _known_frame(client, name, source, geographic)
+            typer.echo(f"{error}: adding to it", err=True)
+        info = known() or client.get_hull(name).info
+        _check_frame(info, source, geographic)
+        return info.geographic
     if on_globe:
         what = " and ".join(source.axes) or "x and y"
         typer.echo(f"{name}: a new hull on the globe: {what} are degrees; --plane makes it a plane", err=True)
-    elif source.degrees or source.format is Format.GEOJSON:
+    elif source.degrees:
         typer.echo(
             f"{name}: a new hull in the plane, in square degrees; --geographic makes it one on the globe", err=True
         )
     return on_globe
 
 
-def _known_frame(client: HullClient, name: str, source: Source, geographic: bool | None) -> bool:
-    """Whether an existing hull is geographic; ValueError if it is not what was asked for."""
-    known = client.get_hull(name).info.geographic
-    if geographic is not None and geographic != known:
-        kind, option = ("geographic", "--plane") if known else ("a plane", "--geographic")
-        raise ValueError(f"the hull {name!r} is {kind}: leave out {option}, or load into another hull")
-    if source.degrees and not known:
+def _check_frame(info: "HullInfo", source: Source, geographic: bool | None) -> None:
+    """Warn if degrees go into a plane; ValueError if the existing hull is not what was asked for."""
+    if geographic is not None and geographic != info.geographic:
+        kind, option = ("geographic", "--plane") if info.geographic else ("a plane", "--geographic")
+        raise ValueError(f"the hull {info.name!r} is {kind}: leave out {option}, or load into another hull")
+    if source.degrees and not info.geographic:
         typer.echo(
-            f"{name} is a plane: it takes {source.axes[0]} and {source.axes[1]} for x and y, and has square degrees. "
-            f"`dynhull create NAME --geographic` makes a hull on the globe",
+            f"{info.name} is a plane: it takes {' and '.join(source.axes)} for x and y, and has square degrees. "
+            "`dynhull create NAME --geographic` makes a hull on the globe",
             err=True,
         )
-    return known
 
 
 @contextmanager

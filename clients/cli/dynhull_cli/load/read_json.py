@@ -19,6 +19,9 @@ from .source import Source
 
 PREFIX = 4096  # bytes, which show the kind of JSON
 RECORD_SEPARATOR = b"\x1e"  # before each line of a GeoJSON text sequence (RFC 8142)
+# The coordinate reference system that GeoJSON could name before RFC 7946; null for an unknown one.
+CRS = re.compile(rb'"crs"\s*:\s*(?:(null)|\{[^{}]*\{\s*"name"\s*:\s*"([^"]*)")')
+IN_DEGREES = ("CRS84", ":4326")
 ALONE = re.compile(rb'"type"\s*:\s*"(Feature|(Multi)?(Point|LineString|Polygon)|GeometryCollection)"')
 
 
@@ -31,7 +34,18 @@ def read_json(source: Source) -> Chunks:
         return read_ndjson(source)
     if b'"features"' not in start and ALONE.search(start):
         return _read_items(source, "", "feature", _row_reader(source))
+    _note_reference_system(source, start)
     return _read_collection(source)
+
+
+def _note_reference_system(source: Source, start: bytes) -> None:
+    """The coordinates are longitudes and latitudes (RFC 7946, section 4) unless an older file names another system."""
+    found = CRS.search(start)
+    name = (found[1] or found[2]).decode(errors="replace") if found else ""
+    if not found or name.endswith(IN_DEGREES):
+        source.in_degrees()
+    else:
+        source.notes.append(f"{source.name}: its coordinates are not degrees: its crs is {name}")
 
 
 def _read_collection(source: Source) -> Chunks:
@@ -143,15 +157,17 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
             return [position(value)]
         if not isinstance(value, dict):
             raise ValueError("neither an object nor an array")
-        if value.get("type") == "Feature":
-            return _of_feature(value, source.options.vertices)
-        if "coordinates" in value or "geometries" in value:
-            return positions(value, source.options.vertices)
+        feature = value.get("type") == "Feature"
+        if feature or "coordinates" in value or "geometries" in value:
+            if not source.axes:
+                source.in_degrees()
+            return positions(value.get("geometry") if feature else value, source.options.vertices)
         if members is None:
             names = list(value)
             i, j = coordinate_columns(source.name, names, x, y)
             members = names[i], names[j]
-            source.axes.extend(members)
+            if not source.axes:
+                source.axes.extend(members)
         return [(number(value.get(members[0]), members[0]), number(value.get(members[1]), members[1]))]
 
     return read

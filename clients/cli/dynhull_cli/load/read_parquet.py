@@ -35,6 +35,8 @@ def read_parquet(source: Source) -> Chunks:
         yield from _of_columns(source, parquet)
     else:
         source.notes.append(f"{source.name}: points from the geometry column {geometry}")
+        if _in_degrees(parquet.schema_arrow, geometry):
+            source.in_degrees()
         yield from _of_geometries(source, parquet, geometry)
 
 
@@ -98,6 +100,12 @@ def _geometry_column(name: str, schema: Any) -> str | None:
     if encoding not in ("WKB", "point"):
         raise ValueError(f"{name}: the geometry column {column} is encoded as {encoding}; WKB and point can be read")
     return column
+
+
+def _in_degrees(schema: Any, column: str) -> bool:
+    """Whether the geometries are longitudes and latitudes: the default of GeoParquet, or by PROJJSON."""
+    crs = json.loads(schema.metadata[GEO_KEY])["columns"][column].get("crs", {"type": "GeographicCRS"})
+    return isinstance(crs, dict) and crs.get("type") == "GeographicCRS"
 
 
 def _of_geometries(source: Source, parquet: Any, column: str) -> Chunks:

@@ -12,8 +12,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any, cast
 
-from dynhull.arrays import COLUMN_NAMES
-
+from ..columns import LONGITUDE_LATITUDE, are_degrees
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from .chunks import Chunks
@@ -24,7 +23,6 @@ DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
 SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
 TABLES = {Format.CSV, Format.TSV}
-DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
 APPLIES_TO = {
     "x": set(Format) - {Format.GEOJSON},
     "y": set(Format) - {Format.GEOJSON},
@@ -53,7 +51,7 @@ class Source:
         options: how to read it.
         integer_keys: whether keys are integers.
         notes: lines about what was detected while reading and may surprise.
-        axes: the names of the columns of x and y, once they are known; empty for geometries.
+        axes: the names of the columns of x and y, once they are known; empty for geometries that are not in degrees.
         geographic: returns whether the points are places on the globe, None if the names of the columns say so. Called
             once there are points.
     """
@@ -71,8 +69,12 @@ class Source:
 
     @property
     def degrees(self) -> bool:
-        """Whether the names of its columns say that these are longitudes and latitudes."""
-        return tuple(name.strip().lower() for name in self.axes) in DEGREES
+        """Whether its points are longitudes and latitudes, by the names of its columns or by its format."""
+        return bool(self.axes) and are_degrees(*self.axes)
+
+    def in_degrees(self) -> None:
+        """Note that its geometries are longitudes and latitudes."""
+        self.axes[:] = LONGITUDE_LATITUDE
 
     def chunks(self) -> Chunks:
         """The points; those that are no places are bad rows. ValueError where the input is not of this format."""
