@@ -106,7 +106,7 @@ class Segment:
 
     def holds(self, p: Point, closed: bool) -> bool:  # noqa: ARG002  # an open one is empty: see `hull_area`
         """Whether p is on the segment. O(1)."""
-        return _on_segment(p, self.a, self.b)
+        return on_segment(p, self.a, self.b)
 
     def within(self, p: Point, margin: float) -> bool:
         """Whether p is at most `margin` from the segment. O(1)."""
@@ -187,7 +187,7 @@ def _where_in_ring(ring: Ring, p: Point) -> int:
     return 1 if inside else -1
 
 
-def _on_segment(p: Point, a: Point, b: Point) -> bool:
+def on_segment(p: Point, a: Point, b: Point) -> bool:
     return min(a, b) <= p <= max(a, b) and orientation(a, b, p) == 0
 
 
@@ -210,8 +210,8 @@ def _segments_meet(p: Point, q: Point, a: Point, b: Point) -> bool:
     return (
         orientation(p, q, a) * orientation(p, q, b) <= 0
         and orientation(a, b, p) * orientation(a, b, q) <= 0
-        and (p != q or _on_segment(p, a, b))
-        and (a != b or _on_segment(a, p, q))
+        and (p != q or on_segment(p, a, b))
+        and (a != b or on_segment(a, p, q))
     )
 
 

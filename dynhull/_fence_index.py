@@ -174,7 +174,7 @@ class FenceIndex:
             _number(fence),
             as_polygons(polygons),
             bool(closed),
-            _length(margin, "margin"),
+            as_length(margin, "margin"),
             bool(cross),
             self._keys(inside),
         )
@@ -200,9 +200,9 @@ class FenceIndex:
             _number(fence),
             as_coordinate(x, "x"),
             as_coordinate(y, "y"),
-            _length(radius, "radius"),
+            as_length(radius, "radius"),
             bool(closed),
-            _length(margin, "margin"),
+            as_length(margin, "margin"),
             bool(cross),
             self._keys(inside),
         )
@@ -236,7 +236,7 @@ class FenceIndex:
             ValueError: the vertices are not those of a convex polygon, or not finite; the margin is bad; or
                 `without_self` without a margin or with an open area. Nothing has changed.
         """
-        number, corners, distance = _number(fence), as_points(vertices, "vertices"), _length(margin, "margin")
+        number, corners, distance = _number(fence), as_points(vertices, "vertices"), as_length(margin, "margin")
         if without_self and not distance > 0:
             raise ValueError(
                 "margin is 0.0: without_self needs a positive margin, as no vertex is inside of the others"
@@ -244,7 +244,7 @@ class FenceIndex:
         if without_self and not closed:
             raise ValueError("closed is False: with without_self the area is closed")
         if not without_self:
-            _require_convex(corners)
+            require_convex(corners)
         self._fences.set_hull(
             number, corners, bool(closed), distance, bool(cross), bool(without_self), self._keys(inside)
         )
@@ -304,14 +304,14 @@ def _number(fence: int) -> int:
     return number
 
 
-def _length(value: float, name: str) -> float:
+def as_length(value: float, name: str) -> float:
     length = as_coordinate(value, name)
     if length < 0:
         raise ValueError(f"{name} is {length!r}: must not be negative")
     return length
 
 
-def _require_convex(vertices: Points) -> None:
+def require_convex(vertices: Points) -> None:
     """Raise ValueError unless these are what `vertices` of a hull may return. O(h)."""
     if len(vertices) < 2:
         return

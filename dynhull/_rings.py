@@ -22,11 +22,13 @@ if TYPE_CHECKING:
     from ._exact import Exact
     from .arrays import Points
 
+    Heights = npt.NDArray[np.float64]
     Signs = npt.NDArray[np.int8]
     Rows = npt.NDArray[np.intp]
 
 CORNERS_OF_A_RING = 3  # at least
-PAIRS_AT_A_TIME = 1 << 18  # of edges: bounds the memory of a check
+PAIRS_AT_A_TIME = 1 << 18  # of edges, or of points and edges: bounds the memory of a check
+POINTS_AT_A_TIME = 1 << 10
 
 
 class _Edges(NamedTuple):
@@ -214,18 +216,33 @@ def _sign_between(ring: Points, p: Point, q: Point) -> int:
 
 
 def ring_signs(ring: Points, points: Points) -> Signs:
-    """(k,) signs of (k, 2) points: +1 inside of a simple ring, 0 on it, -1 outside. Exact. O(k) for each corner."""
-    inside = np.zeros(len(points), np.bool_)
+    """(n,) signs of (n, 2) points: +1 inside of a simple ring, 0 on it, -1 outside. Exact.
+
+    O(n log n + k) for k corners, and O(1) for each pair of a point and an edge that overlap in y: at worst O(n k).
+    """
+    a, b = ring, np.roll(ring, -1, axis=0)
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    passed = np.zeros(len(points), np.bool_)
     on = np.zeros(len(points), np.bool_)
-    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-        low, high = np.minimum(a, b), np.maximum(a, b)
-        rows = np.flatnonzero((points[:, 1] >= low[1]) & (points[:, 1] <= high[1]) & (points[:, 0] <= high[0]))
-        if not rows.size:
-            continue
+    for rows, edges in at_one_height(points, low[:, 1], high[:, 1]):
         near = points[rows]
-        turns = np.asarray(orient2d(a, b, near))
-        on[rows] |= (turns == 0) & (near[:, 0] >= low[0])
-        passes = (a[1] > near[:, 1]) != (b[1] > near[:, 1])
-        inside[rows] ^= passes & ((turns > 0) == (b[1] > a[1]))
-    signs: Signs = np.where(on, 0, np.where(inside, 1, -1)).astype(np.int8)
+        y = near[:, None, 1]
+        p, e = np.nonzero((low[edges, 1] <= y) & (y <= high[edges, 1]) & (near[:, None, 0] <= high[edges, 0]))
+        e, at = edges[e], near[p]
+        turns = np.asarray(orient2d(a[e], b[e], at))
+        on[rows[p[(turns == 0) & (at[:, 0] >= low[e, 0])]]] = True
+        rises, ends_below = a[e, 1] <= at[:, 1], b[e, 1] <= at[:, 1]
+        crossed = p[(rises != ends_below) & ((turns > 0) == rises)]
+        passed[rows] ^= np.bincount(crossed, minlength=len(rows)) % 2 == 1
+    signs: Signs = np.where(on, 0, np.where(passed, 1, -1)).astype(np.int8)
     return signs
+
+
+def at_one_height(points: Points, low: Heights, high: Heights) -> Iterator[tuple[Rows, Rows]]:
+    """Rows of points, and of edges from height `low` to `high`, that may meet: each such pair in one portion."""
+    order = np.argsort(points[:, 1], kind="stable")
+    for start in range(0, len(order), POINTS_AT_A_TIME):
+        rows = order[start : start + POINTS_AT_A_TIME]
+        edges = np.flatnonzero((low <= points[rows[-1], 1]) & (high >= points[rows[0], 1]))
+        for first in range(0, len(edges), PAIRS_AT_A_TIME // len(rows)):
+            yield rows, edges[first : first + PAIRS_AT_A_TIME // len(rows)]

@@ -6,7 +6,7 @@ import math
 import os
 import ssl
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from grpc_health.v1 import health_pb2
 
 from .certificates import server_context
 from .engine.engine import Engine
+from .engine.fence_verification import FenceVerification
+from .engine.fences import LiveFence
 from .engine.live_hull import LiveHull
 from .engine.scrub import Scrub
 from .engine.supervisor import Supervisor
@@ -40,6 +42,7 @@ from .rpc.metrics import Metrics, StateCollector
 from .rpc.metrics_page import MetricsPage
 from .rpc.places import Places
 from .settings import Settings, is_loopback
+from .state.fences.faults import FenceFault
 from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
 from .storage.memory import MemoryStorage
@@ -47,7 +50,7 @@ from .storage.port import Storage
 from .storage.sqlite.storage import SQLiteStorage
 
 SERVICES = DESCRIPTOR.full_name, FENCES.full_name
-# SERVING until the scrub finds a hull that differs from Chan's algorithm.
+# SERVING until the scrub finds a hull that differs from Chan's algorithm, or a fence that differs from a recomputation.
 SCRUB = "dynhull.v1.scrub"
 
 SERVING = health_pb2.HealthCheckResponse.SERVING
@@ -55,6 +58,8 @@ NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 
 # Seconds for statuses to reach clients at shutdown; a client that does not read must not delay it.
 LAST_STATUSES = 1.0
+# Of the faults that the scrub finds in a fence, those that are logged.
+LOGGED_FAULTS = 10
 # Milliseconds between pings on an idle connection, and until a connection that does not answer them is closed.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
 # Bytes of each call that a client may send before the server reads them.
@@ -178,7 +183,7 @@ class Server:
             interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
             self._engine.keep_house(self._settings.snapshot_points, interval)
         if self._settings.scrub_cpu:
-            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared)
+            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared, self._followed)
             self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
         log.info("serving", extra={"address": self.address})
 
@@ -235,13 +240,23 @@ class Server:
         self._stop_metrics = page.close
 
     def _compared(self, hull: LiveHull, outcome: Verification) -> None:
-        equal = outcome.equal
-        self._metrics.verified("scrub", equal, outcome.seconds)
-        if not equal:
+        self._metrics.verified("scrub", outcome.equal, outcome.seconds)
+        if outcome.difference is not None or not outcome.keys_equal:
             log.error(
                 "a hull differs from Chan's algorithm, or its keys from its points",
                 extra={"hull": hull.name, "difference": outcome.difference, "keys_equal": outcome.keys_equal},
             )
+            self._health.set(NOT_SERVING, SCRUB)
+        self._complain(outcome.fence_faults)
+
+    def _followed(self, _: LiveFence, outcome: FenceVerification) -> None:
+        self._metrics.verified("scrub", outcome.equal, outcome.seconds)
+        self._complain(outcome.faults)
+
+    def _complain(self, faults: Sequence[FenceFault]) -> None:
+        for fault in faults[:LOGGED_FAULTS]:
+            log.error("a fence differs from its recomputation", extra=fault._asdict())
+        if faults:
             self._health.set(NOT_SERVING, SCRUB)
 
 

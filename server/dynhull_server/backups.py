@@ -42,10 +42,11 @@ def check(
         Path, typer.Argument(metavar="DATA", help="A data folder or a backup; a server may be using it.")
     ] = DATA,
 ) -> None:
-    """Examine a data folder or a backup, and report on each hull. Nothing is changed.
+    """Examine a data folder or a backup, and report on each hull and fence. Nothing is changed.
 
-    All batches and snapshots are compared with their checksums, also those that the next start would not need. While a
-    server uses the folder, the data committed at one moment is examined, but not the log.
+    All batches and snapshots are compared with their checksums, also those that the next start would not need. Of
+    fences, who is inside is compared with positions and areas, and the events with each other and with who is inside.
+    While a server uses the folder, the data committed at one moment is examined, but not the log.
 
     The exit code is 0 if everything is intact, 1 if anything is damaged, and 2 if there is no data folder:
 

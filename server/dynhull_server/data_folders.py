@@ -29,15 +29,23 @@ def check_folder(data: Path) -> bool:
         report = copies.check(data, progress)
     for hull in report.hulls:
         typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
-    for problem in [*report.notes, *report.fatal]:
+    for fence in report.fences:
+        state = "WRONG" if fence.faults else "whole"
+        typer.echo(f"fence {fence.name}: {fence.last:,} events, {fence.inside:,} inside: {state}")
+    wrong = [str(fault) for fence in report.fences for fault in fence.faults]
+    for problem in [*report.notes, *report.fatal, *wrong]:
         typer.echo(problem, err=True)
-    if report.fatal:
+    if wrong and not report.fatal:
+        typer.echo(
+            f"{data}: fences are wrong, as told above: restore a backup, or delete and create these fences again"
+        )
+    elif report.fatal:
         typer.echo(f"{data}: damaged; it cannot be served: restore a backup")
     elif report.notes:
         typer.echo(f"{data}: damaged; it can be served without the parts named above")
     else:
         typer.echo(f"{data}: {_hulls(report)}, all whole")
-    return not report.fatal and not report.notes
+    return not report.fatal and not report.notes and not wrong
 
 
 def _hulls(report: copies.Report) -> str:

@@ -78,7 +78,7 @@ class Settings(BaseModel):
         0.05,
         ge=0,
         le=1,
-        description="Share of a processor for the scrub, which compares hulls with Chan's algorithm; 0 for none.",
+        description="Share of a processor for the scrub, which recomputes hulls and fences; 0 for none.",
     )
     scrub_pause: float = Field(60.0, gt=0, description="Seconds between rounds of the scrub.")
 

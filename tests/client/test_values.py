@@ -43,6 +43,7 @@ EXPORTED = [
     "Event",
     "Fence",
     "FenceConsumer",
+    "FenceDifference",
     "FenceEvent",
     "FenceExistsError",
     "FenceNotFoundError",

@@ -13,6 +13,7 @@ from server_process import server_process
 from dynhull import DynamicHull
 from dynhull_client import HullClient
 from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.live_hull import LiveHull
 from dynhull_server.engine.scrub import Scrub
 from dynhull_server.engine.threads import Machine
 from dynhull_server.engine.verification import LARGE, Verification
@@ -29,7 +30,11 @@ class Liar(DynamicHull):
 async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:
     """The comparisons that `number` rounds of a scrub make."""
     seen: list[tuple[str, Verification]] = []
-    scrub = Scrub(engine, Machine().clock, 1.0, lambda hull, outcome: seen.append((hull.name, outcome)))
+
+    def compared(hull: LiveHull, outcome: Verification) -> None:
+        seen.append((hull.name, outcome))
+
+    scrub = Scrub(engine, Machine().clock, 1.0, compared, lambda *_: None)
     for _ in range(number):
         await scrub.round()
     return seen

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 from .connected import AsJson, connected
 from .exits import Exit
 from .json_lines import json_line
+from .plural import plural
 
 
 @connected
@@ -23,6 +24,9 @@ def verify(
 ) -> None:
     """Compare hulls, vertex by vertex, with what Chan's algorithm computes from their stored points.
 
+    The fences that compare a hull or its keys are compared, too: who is inside with positions and areas, and events
+    with each other and with who is inside.
+
         dynhull verify fleet/north && deploy
 
     If a hull differs, its line shows the first difference and the exit code is 1.
@@ -30,7 +34,7 @@ def verify(
     different = 0
     for name in names or [info.name for info in client.list_hulls()]:
         found = client.verify(name, timeout=timeout)
-        different += not (found.equal and found.keys_equal)
+        different += not found.whole
         typer.echo(json_line(name=name, **asdict(found)) if as_json else f"{name}: {_summary(found)}")
     if different:
         sys.exit(Exit.FAILED)
@@ -41,6 +45,14 @@ def _summary(found: "Verification") -> str:
         return f"DIFFERENT at revision {found.revision:,}: {found.difference}"
     if not found.keys_equal:
         return f"DIFFERENT at revision {found.revision:,}: the points are not the positions of the keys"
+    if found.fence_differences:
+        first = found.fence_differences[0]
+        where = f"event {first.sequence}, " if first.sequence else ""
+        who = "" if first.key is None else f"key {first.key} of {first.hull}, "
+        what = f"fence {first.fence}: {where}{who}expected {first.expected}, found {first.found}"
+        return f"DIFFERENT at revision {found.revision:,}: {what}"
     rounds = ", ".join(f"{each.guess:,}" for each in found.rounds)
     how = f"Chan's guesses: {rounds}" if rounds else "nothing to compute"
-    return f"verified at revision {found.revision:,}: {found.points:,} points, {found.vertices:,} vertices ({how})"
+    fences = f", {plural(found.fences, 'fence')}" if found.fences else ""
+    counts = f"{found.points:,} points, {found.vertices:,} vertices{fences}"
+    return f"verified at revision {found.revision:,}: {counts} ({how})"

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterable
 from html import escape
 
-from dynhull_client import Difference
+from dynhull_client import Verification
 
 from .advice import about_hull
 from .degrees import SQUARE_KILOMETRE
@@ -80,13 +80,18 @@ def _verified(verified: Verified | None) -> str:
         return "… not verified yet"
     when = _ago(time.monotonic() - verified.at)
     outcome = verified.outcome
-    if outcome.difference is None:
+    if outcome.whole:
         return f'<span class="good">✓ equal</span> at revision {outcome.revision:,}, {when}'
-    return f'<span class="bad">✗ different</span> at revision {outcome.revision:,}: {_difference(outcome.difference)}'
+    return f'<span class="bad">✗ different</span> at revision {outcome.revision:,}: {_difference(outcome)}'
 
 
-def _difference(difference: Difference) -> str:
-    return f"vertex {difference.row} is {difference.live}, recomputed {difference.recomputed}"
+def _difference(outcome: Verification) -> str:
+    if outcome.difference is not None:
+        vertex = outcome.difference
+        return f"vertex {vertex.row} is {vertex.live}, recomputed {vertex.recomputed}"
+    if not outcome.keys_equal:
+        return "the points are not the positions of the keys"
+    return f"the fence {escape(outcome.fence_differences[0].fence)}"
 
 
 def _ago(seconds: float) -> str:

@@ -598,7 +598,11 @@ def sample_points(
 
 
 def verify(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Verification]:
-    """Compare the live hull with one that Chan's algorithm computes from the stored points."""
+    """Compare the live hull with one that Chan's algorithm computes from the stored points.
+
+    The fences that compare its keys, or it as a whole, are compared with positions and areas, too, and their events
+    with each other.
+    """
     request = pb.VerifyRequest(name=name, min_revision=min_revision)
     return Call("Verify", request, messages.decode_verification, timeout)
 

@@ -421,10 +421,27 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True)
+class FenceDifference:
+    """One thing about a fence that is not as it must be: `expected` and `found` say in words what must be, and what is.
+
+    `hull` and `key` name the subject, if there is one; `sequence` is that of the wrong event, 0 for a state.
+    """
+
+    fence: str
+    hull: str
+    key: str | int | None
+    sequence: int
+    expected: str
+    found: str
+
+
+@dataclass(frozen=True, slots=True)
 class Verification:
     """The live hull compared with a hull computed anew from the stored points; `difference` is None if `equal`.
 
     `keys_equal` says whether the points of a keyed hull are the positions of its keys; True for a hull without keys.
+    `fences` is the number of fences that compare the hull or its keys, and `fence_differences` is what is wrong with
+    their states and events, the first of it.
     """
 
     revision: int
@@ -434,6 +451,13 @@ class Verification:
     rounds: tuple[ChanRound, ...]
     difference: Difference | None
     keys_equal: bool = True
+    fences: int = 0
+    fence_differences: tuple[FenceDifference, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether everything that was compared is as it must be."""
+        return self.equal and self.keys_equal and not self.fence_differences
 
 
 def shown_geometry(vertices: Points, center: tuple[float, float] | None) -> dict[str, Any]:
@@ -599,7 +623,23 @@ def decode_verification(message: hull_service_pb2.VerifyResponse) -> Verificatio
         difference = Difference(first.index, _only(first.live), _only(first.recomputed))
     rounds = tuple(ChanRound(r.guess, r.groups, r.steps, r.cost, r.closed) for r in message.rounds)
     counts = message.point_count, message.vertex_count
-    return Verification(message.revision, message.equal, *counts, rounds, difference, message.keys_equal)
+    differences = tuple(map(_decode_fence_difference, message.fence_differences))
+    return Verification(
+        message.revision,
+        message.equal,
+        *counts,
+        rounds,
+        difference,
+        message.keys_equal,
+        message.fence_count,
+        differences,
+    )
+
+
+def _decode_fence_difference(message: hull_service_pb2.FenceDifference) -> FenceDifference:
+    chosen = message.WhichOneof("key")
+    key = None if chosen is None else getattr(message, chosen)
+    return FenceDifference(message.fence, message.subject_hull, key, message.sequence, message.expected, message.found)
 
 
 def _window(message: hull_pb2.Window) -> Window:

@@ -807,7 +807,7 @@ class VerifyRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
 
 class VerifyResponse(_message.Message):
-    __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference", "keys_equal")
+    __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference", "keys_equal", "fence_count", "fence_differences")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     EQUAL_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
@@ -815,6 +815,8 @@ class VerifyResponse(_message.Message):
     ROUNDS_FIELD_NUMBER: _ClassVar[int]
     FIRST_DIFFERENCE_FIELD_NUMBER: _ClassVar[int]
     KEYS_EQUAL_FIELD_NUMBER: _ClassVar[int]
+    FENCE_COUNT_FIELD_NUMBER: _ClassVar[int]
+    FENCE_DIFFERENCES_FIELD_NUMBER: _ClassVar[int]
     revision: int
     equal: bool
     point_count: int
@@ -822,7 +824,27 @@ class VerifyResponse(_message.Message):
     rounds: _containers.RepeatedCompositeFieldContainer[ChanRound]
     first_difference: VertexDifference
     keys_equal: bool
-    def __init__(self, revision: _Optional[int] = ..., equal: bool = ..., point_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., rounds: _Optional[_Iterable[_Union[ChanRound, _Mapping]]] = ..., first_difference: _Optional[_Union[VertexDifference, _Mapping]] = ..., keys_equal: bool = ...) -> None: ...
+    fence_count: int
+    fence_differences: _containers.RepeatedCompositeFieldContainer[FenceDifference]
+    def __init__(self, revision: _Optional[int] = ..., equal: bool = ..., point_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., rounds: _Optional[_Iterable[_Union[ChanRound, _Mapping]]] = ..., first_difference: _Optional[_Union[VertexDifference, _Mapping]] = ..., keys_equal: bool = ..., fence_count: _Optional[int] = ..., fence_differences: _Optional[_Iterable[_Union[FenceDifference, _Mapping]]] = ...) -> None: ...
+
+class FenceDifference(_message.Message):
+    __slots__ = ("fence", "subject_hull", "string_key", "integer_key", "sequence", "expected", "found")
+    FENCE_FIELD_NUMBER: _ClassVar[int]
+    SUBJECT_HULL_FIELD_NUMBER: _ClassVar[int]
+    STRING_KEY_FIELD_NUMBER: _ClassVar[int]
+    INTEGER_KEY_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    EXPECTED_FIELD_NUMBER: _ClassVar[int]
+    FOUND_FIELD_NUMBER: _ClassVar[int]
+    fence: str
+    subject_hull: str
+    string_key: str
+    integer_key: int
+    sequence: int
+    expected: str
+    found: str
+    def __init__(self, fence: _Optional[str] = ..., subject_hull: _Optional[str] = ..., string_key: _Optional[str] = ..., integer_key: _Optional[int] = ..., sequence: _Optional[int] = ..., expected: _Optional[str] = ..., found: _Optional[str] = ...) -> None: ...
 
 class ChanRound(_message.Message):
     __slots__ = ("guess", "groups", "steps", "cost", "closed")

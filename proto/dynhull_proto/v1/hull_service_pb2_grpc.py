@@ -432,7 +432,9 @@ class HullServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def Verify(self, request, context):
-        """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull.
+        """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
+        which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
+        A caller with a token learns of the fences that it may read.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -154,7 +154,10 @@ class HullServiceStub:
     rate: the events received so far always give the exact hull at the revision of the last one.
     """
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
-    """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull."""
+    """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
+    which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
+    A caller with a token learns of the fences that it may read.
+    """
 
 @_typing.type_check_only
 class HullServiceAsyncStub(HullServiceStub):
@@ -282,7 +285,10 @@ class HullServiceAsyncStub(HullServiceStub):
     rate: the events received so far always give the exact hull at the revision of the last one.
     """
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
-    """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull."""
+    """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
+    which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
+    A caller with a token learns of the fences that it may read.
+    """
 
 class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     """Exact convex hulls of points that are inserted and deleted.
@@ -563,6 +569,9 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _hull_service_pb2.VerifyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.VerifyResponse, _abc.Awaitable[_hull_service_pb2.VerifyResponse]]:
-        """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull."""
+        """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
+        which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
+        A caller with a token learns of the fences that it may read.
+        """
 
 def add_HullServiceServicer_to_server(servicer: HullServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

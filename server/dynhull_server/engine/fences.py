@@ -60,13 +60,13 @@ class LiveFence:
 
     async def inside(self) -> Inside:
         """The subjects that are inside, all at one moment. O(number of them)."""
-        return await self._read(
+        return await self.read(
             lambda fence, events: Inside(_last(fence, events), tuple(members(fence))), rows=self.fence.inside
         )
 
     async def waiting(self) -> Inside:
         """As `inside`, with the times since when they wait for their dwell events."""
-        return await self._read(who_waits, rows=self.fence.inside)
+        return await self.read(who_waits, rows=self.fence.inside)
 
     async def acknowledge(self, consumer: str, sequence: int | None, uid: str = "") -> Consumer:
         """Acknowledge events for a consumer, which is created if it is new."""
@@ -113,7 +113,13 @@ class LiveFence:
             self._moved.set()
             self._moved = None
 
-    async def _read(self, function: Callable[[Fence, Sequence[FenceEvent]], T], rows: int) -> T:
+    async def read(self, function: Callable[[Fence, Sequence[FenceEvent]], T], rows: int) -> T:
+        """The value of a function of the fence between two changes, and of its events that are not yet committed.
+
+        Args:
+            function: the function.
+            rows: the number of subjects that it reads, about.
+        """
         found: T = await self._engine.ask(ReadFence(Waiter(), self.name, self._engine.time(), function, rows=rows))
         return found
 

@@ -2,7 +2,8 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
@@ -16,6 +17,7 @@ from dynhull.keys import PackedKeys
 
 from ..state.contents.keyed import KINDS
 from ..state.errors import (
+    FenceNotFoundError,
     HullEmptyError,
     HullNotFoundError,
     HullReplacedError,
@@ -23,12 +25,15 @@ from ..state.errors import (
     RevisionForgottenError,
 )
 from ..state.events import ReadHull, ReadTogether, Recenter
+from ..state.fences.fence import Fence
+from ..state.fences.recomputing import Sides, sides_of
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
 from ..state.outline import GlobeOutline, Outline
 from ..state.records import Center, HullSettings, Keys
 from ..state.sample import sample
 from .difference import Differences
+from .fence_verification import MOST_FAULTS, verify_events, verify_sides
 from .recalls import Recalls
 from .steps import BLOCK, FEW_ROWS, at_once, in_blocks
 from .verification import Verification, verify
@@ -234,12 +239,44 @@ class LiveHull:
 
         return await self.ask_rows(extreme, len(directions), min_revision)
 
-    async def verify(self, min_revision: int = 0) -> tuple[Counts, Verification]:
-        """Compare the live hull with Chan's algorithm on the stored points. Writes continue meanwhile."""
-        counts, (points, vertices, stored) = await self.read(
-            lambda state: (state.hull.points(), state.vertices(), state.entities()), self.counts.points, min_revision
+    async def verify(
+        self, min_revision: int = 0, prefixes: tuple[str, ...] = ("",), *, events: bool = True
+    ) -> tuple[Counts, Verification]:
+        """Compare the live hull with Chan's algorithm on the stored points. Writes continue meanwhile.
+
+        Also compare the sides of its keys in fences with their positions.
+
+        Args:
+            min_revision: the revision to wait for.
+            prefixes: only fences whose names begin with one of these are compared.
+            events: whether to compare the events of these fences, too.
+        """
+        run = self._engine.aside
+        counts, (points, vertices, stored, sides) = await self.read(
+            lambda state: (state.hull.points(), state.vertices(), state.entities(), self._sides(prefixes)),
+            self.counts.points + len(self.fences()),
+            min_revision,
         )
-        return counts, await verify(points, vertices, self._engine.aside, stored, counts.center)
+        outcome = await verify(points, vertices, run, stored, counts.center)
+        if sides is None:
+            return counts, outcome
+        found = [await verify_sides(sides, run)]
+        for fence in self.fences(prefixes) if events else ():
+            with suppress(FenceNotFoundError):
+                found.append(await verify_events(self._engine.fences.live(fence), run))
+        faults = tuple(fault for each in found for fault in each.faults)[:MOST_FAULTS]
+        seconds = outcome.seconds + sum(each.seconds for each in found)
+        return counts, replace(outcome, fences=len(sides), fence_faults=faults, seconds=seconds)
+
+    def fences(self, prefixes: tuple[str, ...] = ("",)) -> list[Fence]:
+        """The fences that compare its keys, or it as a whole, and whose names begin with one of the prefixes."""
+        line = self._engine.core.line(self.name)
+        return [] if line is None else [each for each in line.comparing(self.name) if each.name.startswith(prefixes)]
+
+    def _sides(self, prefixes: tuple[str, ...]) -> Sides | None:
+        """What fences have about it, during a read: none is created or deleted meanwhile. None if there is no fence."""
+        fences = self.fences(prefixes)
+        return sides_of(self.name, fences) if fences else None
 
     async def sample(self, size: int, min_revision: int = 0) -> tuple[Counts, Points]:
         """A sample of at most `size` of the points. Writes continue meanwhile."""

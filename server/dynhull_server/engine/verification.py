@@ -16,6 +16,7 @@ from dynhull.keys import PackedKeys
 from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
+from ..state.fences.faults import FenceFault
 from ..state.records import Center, Contents
 from . import chan_process
 from .steps import Run
@@ -38,7 +39,8 @@ class Verification:
     """The result of Chan's algorithm; `difference` is None where the live hull has the same vertices.
 
     `seconds` is processor time. `keys_equal` is whether the positions of the keys are the points of the hull, each key
-    once; True for a hull without keys.
+    once; True for a hull without keys. `fences` is the number of fences that compare the hull, and `fence_faults` what
+    is wrong with them.
     """
 
     points: int
@@ -47,11 +49,13 @@ class Verification:
     difference: Difference | None
     seconds: float
     keys_equal: bool = True
+    fences: int = 0
+    fence_faults: tuple[FenceFault, ...] = ()
 
     @property
     def equal(self) -> bool:
         """Whether there is no fault."""
-        return self.difference is None and self.keys_equal
+        return self.difference is None and self.keys_equal and not self.fence_faults
 
 
 async def verify(

@@ -16,6 +16,7 @@ from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import Applied
 from ..state.contents.keyed import Found
+from ..state.fences.faults import FenceFault
 from ..state.hull_state import Cause, Counts, VertexKeys
 from ..state.records import NO_TIME, Center, Contents, Frame, HullSettings, Identity, Keys, Times
 
@@ -269,6 +270,8 @@ def encode_verification(
         point_count=verification.points,
         vertex_count=verification.vertices,
         keys_equal=verification.keys_equal,
+        fence_count=verification.fences,
+        fence_differences=map(_encode_fault, verification.fence_faults),
         rounds=[
             hull_service_pb2.ChanRound(
                 guess=each.guess, groups=each.groups, steps=each.steps, cost=each.cost, closed=each.closed
@@ -280,4 +283,19 @@ def encode_verification(
         message.first_difference.index = verification.difference.index
         message.first_difference.live.CopyFrom(encode_points(verification.difference.live, encoding))
         message.first_difference.recomputed.CopyFrom(encode_points(verification.difference.recomputed, encoding))
+    return message
+
+
+def _encode_fault(fault: FenceFault) -> hull_service_pb2.FenceDifference:
+    message = hull_service_pb2.FenceDifference(
+        fence=fault.fence,
+        subject_hull=fault.hull,
+        sequence=fault.sequence,
+        expected=fault.expected,
+        found=fault.found,
+    )
+    if isinstance(fault.key, str):
+        message.string_key = fault.key
+    elif fault.key is not None:
+        message.integer_key = fault.key
     return message

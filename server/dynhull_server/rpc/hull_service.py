@@ -340,7 +340,7 @@ class HullService:
     async def Verify(self, request: pb.VerifyRequest, call: Call) -> pb.VerifyResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        counts, verification = await hull.verify(request.min_revision)
+        counts, verification = await hull.verify(request.min_revision, tuple(call.access.readable("")))
         self._metrics.verified("call", verification.equal)
         return encode.encode_verification(counts, verification, encoding)
 

@@ -62,7 +62,7 @@ class Metrics:
         )
         self._verifications = Counter(
             "dynhull_verifications",
-            "Hulls compared with Chan's algorithm, by origin of the request and outcome.",
+            "Hulls and fences compared with a recomputation, by origin of the request and outcome.",
             ["origin", "outcome"],
             registry=self.registry,
         )

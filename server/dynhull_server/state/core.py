@@ -268,6 +268,11 @@ class Core:
             raise FenceNotFoundError(name)
         return fence
 
+    def line(self, name: str) -> Line | None:
+        """The fences of a hull, and of those that share its queue; None for a hull without fences."""
+        queue = self._queues.get(name)
+        return None if queue is None else queue.line
+
     @property
     def busy(self) -> bool:
         """Whether any trip is in progress."""

@@ -38,7 +38,10 @@ from dynhull_server.state.events import (
     Tick,
 )
 from dynhull_server.state.fences import line_trip
+from dynhull_server.state.fences.event_order import EventOrder, subjects_of
 from dynhull_server.state.fences.fence import Fence
+from dynhull_server.state.fences.fence_leg import members
+from dynhull_server.state.fences.recomputing import sides_of, wrong_sides
 from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
 from dynhull_server.state.fences.subjects import Subjects
 from dynhull_server.state.hull_state import HullState
@@ -109,6 +112,21 @@ class Torture:
         if not self.core.busy:
             self.counts["checked"] += 1
             self.core.check()
+            self.verify()
+
+    def verify(self) -> None:
+        """The server's own recomputation finds nothing wrong."""
+        for name in self.core.hulls:
+            line = self.core.line(name)
+            if line is not None:
+                assert not list(wrong_sides(sides_of(name, line.comparing(name)))), name
+        name = self.rng.choice(FENCES)
+        fence = self.core.fences.get(name)
+        if fence is not None:
+            order = EventOrder(name)
+            order.take(self.storage.read_events(fence.number, 0, 10**9))
+            assert not order.finish(subjects_of(members(fence)), fence.last, fence.consumers.values()), name
+            self.counts["verified"] += 1
 
     def examine(self, effect: Examine) -> None:
         states = [

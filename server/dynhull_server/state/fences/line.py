@@ -118,6 +118,12 @@ class Line:
         area = self.areas.get(name)
         return 0 if area is None else sum(fence.subject_count for fence in area.fences.values())
 
+    def comparing(self, name: str) -> list[Fence]:
+        """The fences that compare the keys of a hull, and those that compare it as a whole with their areas."""
+        subjects = self.subjects.get(name)
+        pairs = [fence for fence in self.pairs.get(name, ()) if fence.row.config.subjects == name]
+        return pairs if subjects is None else [*subjects.fences.values(), *pairs]
+
     def changed(self, hulls: Iterable[Hull]) -> Iterator[tuple[Subjects, Crossings]]:
         """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing."""
         touched: dict[str, Subjects] = {}

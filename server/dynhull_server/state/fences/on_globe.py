@@ -14,6 +14,7 @@ from dynhull.globe import Gnomonic, distance
 from ..errors import HullUnsuitableError, InvalidFenceError
 from ..frames import off_globe, out_of_reach
 from ..hull import Hull
+from ..records import Center
 from .config import Area, CircleArea, FenceConfig, PolygonArea, Ring
 
 # A circle is a polygon with this many corners, every half degree of azimuth, each at the radius on WGS 84: its edges
@@ -78,11 +79,8 @@ def metres(rings: Rings, places: Points) -> list[float]:
     return nearest
 
 
-def compared(area: Hull, other: Hull, limit: float) -> tuple[bool, float]:
+def compared(a: Points, b: Points, limit: float, center: Center) -> tuple[bool, float]:
     """Whether two hulls about one centre intersect or are at most `limit` metres apart, and their distance."""
-    a, b = area.state.vertices(), other.state.vertices()
-    center = area.state.center
-    assert center is not None  # checked when the fence was created
     frame = Gnomonic(center)
     if intersect(Cloud(outline(frame, a)), Cloud(outline(frame, b))):
         return True, 0.0

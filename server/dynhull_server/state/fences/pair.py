@@ -11,6 +11,7 @@ from dynhull.convex import Cloud
 from dynhull.gjk import contact, intersect
 
 from ..hull import Hull
+from ..records import Center
 from .on_globe import compared
 
 # Distances whose rounded value differs from the limit by less, of the size of the hulls, are compared exactly: a
@@ -50,27 +51,41 @@ class Pair:
     def look(self) -> None:
         """Look at the hulls: O(log² h) for h vertices, or O(h²) where rounding errors could decide about a limit."""
         a, b = self.area.state.vertices(), self.other.state.vertices()
+        self.near, self.distance = nearness(a, b, self._limit, self.area.state.center)
         self._as_of = self._changes()
-        self.distance, self.near = math.inf, False
-        if len(a) and len(b) and self.area.state.center is not None:
-            self.near, self.distance = compared(self.area, self.other, self._limit)
-        elif len(a) and len(b):
-            self.distance = contact(Cloud(a), Cloud(b)).distance
-            self.near = intersect(Cloud(a), Cloud(b)) or (self._limit > 0 and self._within(a, b))
-            if self.near and not self._limit:
-                self.distance = 0.0
 
     def _changes(self) -> tuple[int, int]:
         return self.area.state.hull.changes, self.other.state.hull.changes
 
-    def _within(self, a: Points, b: Points) -> bool:
-        """Whether two hulls that do not intersect are at most the limit apart."""
-        size = max(float(np.abs(a).max()), float(np.abs(b).max()), self._limit)
-        if abs(self.distance - self._limit) > DOUBTFUL * size:
-            return self.distance < self._limit
-        limit = Fraction(self._limit) ** 2
-        one, other = ([(Fraction(x), Fraction(y)) for x, y in each.tolist()] for each in (a, b))
-        return _some_nearer(one, other, limit) or _some_nearer(other, one, limit)
+
+def nearness(a: Points, b: Points, limit: float, center: Center | None) -> tuple[bool, float]:
+    """Whether two hulls intersect or are at most `limit` apart, and their distance, infinite if one is empty.
+
+    Running time as of `Pair.look`.
+
+    Args:
+        a: the vertices of one,
+        b: and of the other.
+        limit: the distance up to which they are near; 0 for the intersection.
+        center: the centre of both if they are geographic; None for planes.
+    """
+    if not (len(a) and len(b)):
+        return False, math.inf
+    if center is not None:
+        return compared(a, b, limit, center)
+    distance = contact(Cloud(a), Cloud(b)).distance
+    near = intersect(Cloud(a), Cloud(b)) or (limit > 0 and _within(a, b, limit, distance))
+    return near, 0.0 if near and not limit else distance
+
+
+def _within(a: Points, b: Points, limit: float, distance: float) -> bool:
+    """Whether two hulls that do not intersect are at most the limit apart, given their distance, rounded."""
+    size = max(float(np.abs(a).max()), float(np.abs(b).max()), limit)
+    if abs(distance - limit) > DOUBTFUL * size:
+        return distance < limit
+    square = Fraction(limit) ** 2
+    one, other = ([(Fraction(x), Fraction(y)) for x, y in each.tolist()] for each in (a, b))
+    return _some_nearer(one, other, square) or _some_nearer(other, one, square)
 
 
 def _some_nearer(corners: list[Corner], ring: list[Corner], limit: Fraction) -> bool:

@@ -4,13 +4,14 @@ import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...state.records import HullRow, Kept
 from ..port import NEWEST, DamagedError, Progress, StorageError
 from .disk import Access, Disk
 from .examine import Findings, examine, format_of, load
+from .fence_check import FenceReport, check_fences
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import migrate
 from .reading import read_hull
@@ -41,6 +42,7 @@ class Report:
 
     Attributes:
         hulls: the hulls, ordered by name.
+        fences: the fences, ordered by name, if they were compared.
         notes: losses and damage that do not prevent serving the folder.
         fatal: the reasons why it cannot be served; empty where it can.
     """
@@ -48,6 +50,7 @@ class Report:
     hulls: list[HullReport]
     notes: list[str]
     fatal: list[str]
+    fences: list[FenceReport] = field(default_factory=list)
 
 
 def check(path: Path, progress: Progress) -> Report:
@@ -62,7 +65,11 @@ def check(path: Path, progress: Progress) -> Report:
     """
     with _opened(path) as opened:
         findings = examine(opened.connection, opened.version, opened.own, progress)
-        return _report(findings, opened.notes)
+        report = _report(findings, opened.notes)
+        if report.fatal:
+            return report
+        fences = check_fences(opened.connection, findings.ledger)
+        return replace(report, fences=fences)
 
 
 def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = False) -> Report:

@@ -1,0 +1,143 @@
+"""Comparison of stored fences with positions, areas and events: whole rows can say what cannot be."""
+
+import sqlite3
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from dynhull.arrays import Points
+from dynhull.keys import Keys, PackedKeys
+
+from ...state.contents import replayed
+from ...state.fences.event_order import EventOrder
+from ...state.fences.faults import FenceFault
+from ...state.fences.recomputing import Nearness, Side, Sides, wrong_sides
+from ...state.fences.records import KeptFence, Key, Subject
+from ...state.records import Center, Contents
+from ..port import NEWEST
+from .fence_ledger import FenceRows
+from .fence_reading import read_events, read_fence
+from .ledger import HullRows, Ledger
+from .reading import read_hull
+
+# Faults of a fence, and of a hull, at most.
+MOST_FAULTS = 100
+EVENTS_TOGETHER = 1000
+
+
+@dataclass(slots=True)
+class FenceReport:
+    """A description of one fence.
+
+    Attributes:
+        name: its name.
+        last: the sequence of its last event.
+        inside: the number of subjects inside.
+        faults: what is wrong.
+    """
+
+    name: str
+    last: int
+    inside: int
+    faults: list[FenceFault]
+
+
+def check_fences(connection: sqlite3.Connection, ledger: Ledger) -> list[FenceReport]:
+    """Compare all fences of a database whose rows are whole. The reports, ordered by name.
+
+    Args:
+        connection: a connection with an open transaction.
+        ledger: the rows.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    return _Check(connection, ledger).run()
+
+
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """A fence as stored: who is on its inner side, keys or a hull as a whole."""
+
+    kept: KeptFence
+    sides: set[Subject | str]
+    report: FenceReport
+
+
+class _Check:
+    def __init__(self, connection: sqlite3.Connection, ledger: Ledger) -> None:
+        self._connection = connection
+        self._ledger = ledger
+        self._hulls = {hull.row.name: hull for hull in ledger.hulls.values()}
+        self._outlines: dict[str, tuple[Points, Center | None]] = {}
+
+    def run(self) -> list[FenceReport]:
+        fences = sorted(self._ledger.fences.values(), key=lambda fence: fence.row.name)
+        stored = [self._follow(fence) for fence in fences]
+        for name in sorted(self._hulls):
+            sides = self._sides(name, stored)
+            reports = {each.report.name: each.report for each in stored}
+            for fault in islice(wrong_sides(sides), MOST_FAULTS):
+                reports[fault.fence].faults.append(fault)
+        return [each.report for each in stored]
+
+    def _follow(self, fence: FenceRows) -> _Stored:
+        """Read a fence, and follow its events: those since it was stored who is inside, and all that are kept."""
+        name = fence.row.name
+        kept = read_fence(self._connection, fence, fence.first)
+        newest = EventOrder(name, kept.inside.sequence, kept.inside.members)
+        newest.take(kept.events)
+        order = EventOrder(name, kept.first - 1)
+        while order.last < kept.last:
+            events = read_events(self._connection, fence.since(order.last), order.last, EVENTS_TOGETHER)
+            before = order.last
+            order.take(events)
+            if order.last <= before:  # not in order, or missing, which is a fault
+                break
+        inside = set(newest.inside())
+        faults = order.finish(inside, kept.last, kept.consumers.values())
+        faults += [fault for fault in newest.faults if fault not in faults]
+        # Those with a delay are on the other side than is reported.
+        sides = inside ^ kept.delays.keys()
+        return _Stored(kept, sides, FenceReport(name, kept.last, len(inside), faults))
+
+    def _sides(self, name: str, stored: list[_Stored]) -> Sides:
+        """What fences have about a hull."""
+        found = Sides(name)
+        hull = self._hulls[name]
+        identity = hull.row.settings.identity
+        for each in stored:
+            config = each.kept.row.config
+            area = config.area_hull
+            if config.kind == "other" and config.subjects == name and area is not None:
+                (vertices, center), (others, _) = self._outline(area), self._outline(name)
+                pair = Nearness(each.report.name, config.near, vertices, others, center, name in each.sides)
+                found.pairs.append(pair)
+            elif config.compares(name) and identity != "multiset":
+                if found.contents is None:
+                    found.contents, found.center = self._contents(hull)
+                corners = None if area is None else self._outline(area)[0]
+                keys = [subject[1] for subject in each.sides if subject[0] == name]
+                delays = {key: delay for (of, key), delay in each.kept.delays.items() if of == name}
+                found.sides.append(Side(each.report.name, config, corners, _packed(keys, identity), delays))
+        return found
+
+    def _contents(self, hull: HullRows) -> tuple[Contents, Center | None]:
+        contents = replayed(read_hull(self._connection, hull, NEWEST), hull.row.settings)
+        return contents.stored(), None if contents.globe is None else contents.globe.center
+
+    def _outline(self, name: str) -> tuple[Points, Center | None]:
+        """The vertices of a hull, and its centre."""
+        if name not in self._outlines:
+            hull = self._hulls[name]
+            contents = replayed(read_hull(self._connection, hull, NEWEST), hull.row.settings)
+            center = None if contents.globe is None else contents.globe.center
+            self._outlines[name] = contents.hull.vertices(), center
+        return self._outlines[name]
+
+
+def _packed(keys: list[Key], identity: str) -> Keys:
+    if identity == "str":
+        return PackedKeys.pack(map(str, keys))
+    return np.array(keys, np.uint64)
