@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from metrics import scrape
-from patience import wait_until
+from patience import PATIENCE, wait_until
 from receiver import Received, Receiver, receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 from server_process import run, server_process
@@ -216,7 +216,7 @@ def test_sigterm_ends_a_pause(client: HullClient, address: str, name: str, endpo
         pass_through(client, name, KEYS)
         assert relay.wait_for("not delivered, trying again")["pause"] == 3600
         relay.process.terminate()
-        relay.process.wait(10)
+        relay.process.wait(PATIENCE)
     assert acknowledged(client, name) == 0
 
 

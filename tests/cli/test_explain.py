@@ -9,6 +9,7 @@ from itertools import pairwise
 import pytest
 from command_line import dynhull
 from killers import KILLERS
+from patience import PATIENCE
 from PIL import Image
 from playwright.sync_api import expect, sync_playwright
 
@@ -116,6 +117,7 @@ def test_the_page_in_a_browser(tmp_path):
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.goto((tmp_path / "page.html").as_uri())
+        expect.set_options(timeout=1000 * PATIENCE)
         expect(page.locator("#caption")).to_have_text("1/30 the tree of the first 12 points")
         expect(page.locator("polyline[stroke-dasharray]")).to_have_count(0)
         page.keyboard.press("ArrowRight")

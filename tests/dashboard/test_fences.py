@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
-from patience import wait_until
+from patience import PATIENCE, wait_until
 from peers import program
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 from proxy import proxy
@@ -259,10 +259,10 @@ def test_events_that_were_dropped_while_the_server_was_away(
             client.put(fleet, [f"new-{row}"], [[2, 2]])
         wait_until(lambda: client.get_fence(fence).first_sequence == 9)
         between.server = server[0].address
-        expect(events(page).locator(".type")).to_have_text([*["★ enter"] * 3, "⚠ lost", "≡ snapshot"], timeout=20_000)
+        expect(events(page).locator(".type")).to_have_text([*["★ enter"] * 3, "⚠ lost", "≡ snapshot"])
         expect(events(page).nth(3)).to_contain_text("events 2 to 8")
         expect(events(page).nth(3)).to_contain_text("the server no longer had them")
-        expect(page.get_by_role("alert")).to_be_hidden(timeout=20_000)
+        expect(page.get_by_role("alert")).to_be_hidden()
         expect(table_row(page, fence).locator("td").nth(2)).to_have_text("11 of 13")
 
 
@@ -289,8 +289,8 @@ def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Bro
             expect(page.get_by_role("alert")).to_contain_text(f"No connection to {first.address}")
             expect(table_row(page, "NAME")).to_contain_text("Connection lost")
             with server_process(*kept, "--port", first.address.split(":")[1], wrap=WRAP):
-                expect(page.get_by_role("alert")).to_be_hidden(timeout=20_000)
-                client.put("fleet", ["b"], [[2, 2]], timeout=20)
+                expect(page.get_by_role("alert")).to_be_hidden()
+                client.put("fleet", ["b"], [[2, 2]], timeout=PATIENCE)
                 expect(events(page).locator(".subject")).to_have_text(["b", "1 key inside: a"])
                 wait_for_inside(page, "NAME", {"a": [1, 1], "b": [2, 2]})
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
-from patience import wait_until
+from patience import PATIENCE, wait_until
 from peers import program
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 from server_process import Server, run, server_process
@@ -418,8 +418,8 @@ def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path
             expect(banner(page)).to_contain_text(f"No connection to {first.address}")
             wait_for_vertices(page, "fleet", SQUARE)
             with server_process(*kept, "--port", first.address.split(":")[1]):
-                expect(banner(page)).to_be_hidden(timeout=20_000)
-                client.apply("fleet", insert=[[9, 9]], timeout=20)
+                expect(banner(page)).to_be_hidden()
+                client.apply("fleet", insert=[[9, 9]], timeout=PATIENCE)
                 wait_for_vertices(page, "fleet", [[0, 0], [4, 0], [9, 9], [0, 4]])
 
 
@@ -432,7 +432,7 @@ def test_a_dashboard_that_goes_and_comes_back(browser: Browser, server: tuple[Se
     expect(page.get_by_text(silence)).to_be_visible()
     wait_for_vertices(page, hull, SQUARE)
     with dashboard_process(address, "--port", url.rsplit(":", 1)[1]):
-        expect(page.get_by_text(silence)).to_be_hidden(timeout=20_000)
+        expect(page.get_by_text(silence)).to_be_hidden()
         wait_for_vertices(page, hull, SQUARE)
         page.close()
 

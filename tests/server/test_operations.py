@@ -14,8 +14,9 @@ import pytest
 from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
+from patience import PATIENCE
 from processor import wait_for_rest
-from server_process import PATIENCE, server_process
+from server_process import server_process
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -130,7 +131,7 @@ def test_a_signal_that_another_thread_gets_ends_the_server() -> None:
         wait_for_rest(pid)
         other = next(int(task.name) for task in Path(f"/proc/{pid}/task").iterdir() if int(task.name) != pid)
         assert ctypes.CDLL(None).tgkill(pid, other, signal.SIGTERM) == 0
-        assert server.process.wait(20) == 0
+        assert server.process.wait(PATIENCE) == 0
 
 
 def test_python_m_is_the_same_and_keeps_its_data_here(tmp_path: Path) -> None:

@@ -9,10 +9,11 @@ from urllib.parse import urlencode
 
 from forked import COMMAND, Process
 from patience import PATIENCE
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 DESKTOP = {"viewport": {"width": 1440, "height": 900}}
-PATIENCE_OF_BROWSER = 30_000  # milliseconds
+PATIENCE_OF_BROWSER = 1000 * PATIENCE  # milliseconds
+expect.set_options(timeout=PATIENCE_OF_BROWSER)
 LOUD = "warning", "error"
 VERTICES = """name => {
     const {renderers} = Bokeh.documents[0]?.get_model_by_name("plane") ?? {renderers: []}

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-PATIENCE = 60  # seconds
+PATIENCE = 120  # seconds: many times what anything takes beside other programs
 LONGEST_PAUSE = 0.05  # seconds: conditions may be calls, and take processor time from what they wait for
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import grpc
 import numpy as np
+from patience import PATIENCE
 from promises import require
 
 from dynhull_client import HullCopy
@@ -22,7 +23,6 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 IN_FLIGHT = 12
 SEVERAL = 5  # batches in a message, at most
 BREATH = 0.004  # seconds between the batches or calls of an actor, which leave the processor to the others
-PATIENCE = 60.0  # seconds, for anything to happen at all
 # What a client gets when a server dies, stalls, or is cut off; all of it may be tried again.
 PASSING = {
     grpc.StatusCode.UNAVAILABLE,

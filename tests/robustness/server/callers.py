@@ -28,6 +28,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 from forked import COMMAND, Process
+from patience import PATIENCE
 from promises import BrokenPromiseError, require
 
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
@@ -39,7 +40,6 @@ KEPT = ["kept/a", "kept/b", "kept/c", KEYED]
 CHURNED = ["churned/a", "churned/b", "churned/c"]
 STEADY = "steady"
 CALLERS = 24
-PATIENCE = 30.0  # seconds, for anything that must happen
 LONGEST_STAY = 0.02  # seconds until a caller disconnects
 # Otherwise a channel to a new server waits for the pause that one to the killed server has begun.
 OWN = [("grpc.use_local_subchannel_pool", 1)]

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
-from actors import BREATH, PATIENCE, Seen, Shared, Streamer, Watcher, Writer, persist
+from actors import BREATH, Seen, Shared, Streamer, Watcher, Writer, persist
+from patience import PATIENCE
 from promises import require
 from timeline import FLEETS, SECOND, Change, Contents, Entity, Key, Kind, Timeline, draw, encode, outline
 

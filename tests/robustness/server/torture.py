@@ -46,7 +46,6 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import wall_clock
 from actors import (
-    PATIENCE,
     Leaver,
     PointWriter,
     Reader,
@@ -57,6 +56,7 @@ from actors import (
     persist,
 )
 from forked import COMMAND, Process
+from patience import PATIENCE
 from promises import require
 from proxy import Proxy
 from server_process import run
@@ -286,10 +286,10 @@ class Torture:
             require(len(numbers) == 1, f"{where}: a batch of {writer.name} is only in some of {writer.hulls}")
             last[writer.name] = numbers.pop()
         points, revision = self._points(last)
-        hull = stub.GetHull(pb.GetHullRequest(name=HULL), timeout=10).hull
+        hull = stub.GetHull(pb.GetHullRequest(name=HULL), timeout=PATIENCE).hull
         require(hull.revision == revision, f"{where}: revision {hull.revision} of batches {last}")
         require(hull.point_count == points.total(), f"{where}: {hull.point_count} points of {points.total()}")
-        require(stub.Verify(pb.VerifyRequest(name=HULL), timeout=10).equal, f"{where}: the hull is wrong")
+        require(stub.Verify(pb.VerifyRequest(name=HULL), timeout=PATIENCE).equal, f"{where}: the hull is wrong")
         self._check_counts(stub, points)
         for each in self.hulls:
             each.check_copy(stub, last, where)
