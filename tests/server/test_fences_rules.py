@@ -20,6 +20,8 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 CIRCLE = {"radius": 5}
 SECOND = 1_000_000
 MANY = 5000  # more than make an event in one commit
+# Seconds that a subject stays where calls must be made meanwhile, beside other programs; over a restart of the server.
+STAY, LONG_STAY = 1.5, 6
 
 
 @pytest.fixture(scope="module", params=["memory", "durable"])
@@ -66,16 +68,16 @@ def stayed(event: fence_pb2.FenceEvent) -> int:
 def test_who_stays_inside_makes_one_event(
     stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
 ) -> None:
-    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(0.4))
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(STAY))
     put(stub, fleet, a=(1, 0), b=(9, 0))
     revision = put(stub, fleet, a=(2, 0))  # it stays inside
     entered, dwelt = waited(fences, name, 2)
     assert [told(each) for each in (entered, dwelt)] == ["ENTER a SUBJECT_APPEARED", "DWELL a TIME_PASSED"]
     assert dwelt.first_time == entered.time
-    assert stayed(dwelt) >= 0.4 * SECOND
+    assert stayed(dwelt) >= STAY * SECOND
     assert (dwelt.subject_hull, dwelt.subject_revision, dwelt.position.x, dwelt.distance) == (fleet, revision, 2, 0)
     assert not entered.HasField("first_time")
-    time.sleep(0.8)
+    time.sleep(1.2 * STAY)
     put(stub, fleet, a=(9, 0))
     put(stub, fleet, a=(3, 0))
     found = waited(fences, name, 5, after=2)
@@ -90,7 +92,7 @@ def test_who_stays_inside_makes_one_event(
 def test_a_stay_that_breaks_off_begins_anew(
     stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
 ) -> None:
-    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(1))
+    create(fences, name, circle_area=CIRCLE, subject_hull=fleet, initial="FENCE_INITIAL_NONE", dwell=span(STAY))
     put(stub, fleet, a=(1, 0), b=(1, 1), c=(2, 2))
     put(stub, fleet, a=(9, 0))
     remove(stub, fleet, "b")
@@ -100,7 +102,7 @@ def test_a_stay_that_breaks_off_begins_anew(
     assert dwells(found) == ["c", "a"]
     again = next(each for each in found[4:] if each.type == fence_pb2.FENCE_EVENT_TYPE_ENTER)
     assert found[-1].first_time == again.time
-    assert stayed(found[-1]) >= SECOND
+    assert stayed(found[-1]) >= STAY * SECOND
 
 
 def test_conflated_watches_leave_out_stays_that_have_ended(
@@ -139,7 +141,7 @@ def test_areas_that_move_end_and_begin_a_stay(
     stub.CreateHull(pb.CreateHullRequest(name=zone))
     insert(stub, zone, 0, 0, 10, 0, 10, 10, 0, 10)
     put(stub, fleet, a=(1, 1), b=(12, 5))
-    create(fences, name, hull_area={"name": zone}, subject_prefix=f"{name}/", dwell=span(0.4))
+    create(fences, name, hull_area={"name": zone}, subject_prefix=f"{name}/", dwell=span(STAY))
     revision = insert(stub, zone, 15, 5)
     delete(stub, zone, 0, 0)
     found = waited(fences, name, 4, after=1)
@@ -161,7 +163,7 @@ def test_with_a_margin_the_distance_is_that_to_the_area(
         "hull": {"hull_area": {"name": zone}},
     }[area]
     put(stub, fleet, a=(5, 0), b=(4, 0), c=(6.5, 0))
-    create(fences, name, **config, subject_hull=fleet, margin=2, dwell=span(0.5), report_crosses=True)
+    create(fences, name, **config, subject_hull=fleet, margin=2, dwell=span(STAY), report_crosses=True)
     put(stub, fleet, a=(6.5, 0))
     found = waited(fences, name, 3, after=1)
     assert dwells(found) == ["a", "b"]
@@ -248,10 +250,11 @@ def test_a_stay_goes_on_while_the_server_is_down(tmp_path: Path, name: str) -> N
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             put(stub, keyed(stub, name), a=(1, 0))
-            fences.CreateFence(fs.CreateFenceRequest(name="new", config=config | {"dwell": span(1)}))
             fences.CreateFence(fs.CreateFenceRequest(name="replaced", config=config))
             begun = time.time_ns() // 1000
+            fences.CreateFence(fs.CreateFenceRequest(name="new", config=config | {"dwell": span(1)}))
             fences.ReplaceFence(fs.ReplaceFenceRequest(name="replaced", config=config | {"dwell": span(1)}))
+            ended = time.time_ns() // 1000
         server.process.kill()
     time.sleep(1)
     with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
@@ -260,7 +263,7 @@ def test_a_stay_goes_on_while_the_server_is_down(tmp_path: Path, name: str) -> N
             (dwelt,) = waited(fences, fence, 1)
             assert told(dwelt) == "DWELL a TIME_PASSED"
             assert stayed(dwelt) >= SECOND
-            assert abs(dwelt.first_time.ToMicroseconds() - begun) < SECOND
+            assert begun <= dwelt.first_time.ToMicroseconds() <= ended
 
 
 @pytest.mark.parametrize("fault", ["commit", "settle"])
@@ -293,7 +296,7 @@ def test_the_dwell_of_who_is_inside_of_the_others(
     """With `without_self` the distance is that from the hull of the others."""
     put(stub, fleet, a=(0, 0), b=(8, 0), c=(8, 8), d=(0, 8), e=(4, 4))
     area = {"name": fleet, "without_self": True}
-    create(fences, name, hull_area=area, subject_hull=fleet, margin=3, dwell=span(0.5), initial="FENCE_INITIAL_NONE")
+    create(fences, name, hull_area=area, subject_hull=fleet, margin=3, dwell=span(STAY), initial="FENCE_INITIAL_NONE")
     put(stub, fleet, e=(4, -2), f=(8, 8))
     found = waited(fences, name, 5)
     assert words(found[:2]) == ["ENTER c AREA_MOVED", "ENTER f AREA_MOVED SUBJECT_APPEARED"]
@@ -364,7 +367,7 @@ def test_time_confirms_a_change(stub: HullServiceStub, fences: FenceServiceStub,
         circle_area=CIRCLE,
         subject_hull=fleet,
         initial="FENCE_INITIAL_NONE",
-        min_dwell=span(0.4),
+        min_dwell=span(STAY),
         dwell=span(0.2),
         margin=1,
     )
@@ -380,7 +383,7 @@ def test_time_confirms_a_change(stub: HullServiceStub, fences: FenceServiceStub,
         "EXIT b SUBJECT_MOVED TIME_PASSED",
     ]
     entered = next(each for each in found if told(each).startswith("ENTER"))
-    assert (entered.subject_revision, stayed(entered) >= 0.4 * SECOND) == (revision, True)
+    assert (entered.subject_revision, stayed(entered) >= STAY * SECOND) == (revision, True)
     assert 0 < entered.distance < 1
     assert found[-1].string_key == "a"
     assert found[-1].first_time == entered.time
@@ -389,16 +392,16 @@ def test_time_confirms_a_change(stub: HullServiceStub, fences: FenceServiceStub,
 def test_with_both_rules_both_must_hold(stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str) -> None:
     put(stub, fleet, z=(9, 9))
     config = {"circle_area": CIRCLE, "subject_hull": fleet, "initial": "FENCE_INITIAL_NONE"}
-    create(fences, name, **config, confirmations=2, min_dwell=span(0.5))
+    create(fences, name, **config, confirmations=2, min_dwell=span(STAY))
     put(stub, fleet, a=(0, 0), b=(1, 1))
     put(stub, fleet, a=(0, 0))
     assert events(fences, name) == []
     (first,) = waited(fences, name, 1)
-    assert (told(first), stayed(first) >= 0.5 * SECOND) == ("ENTER a SUBJECT_APPEARED TIME_PASSED", True)
+    assert (told(first), stayed(first) >= STAY * SECOND) == ("ENTER a SUBJECT_APPEARED TIME_PASSED", True)
     put(stub, fleet, b=(1, 1))
     (second,) = events(fences, name, after=1)
     assert told(second) == "ENTER b SUBJECT_APPEARED"
-    assert stayed(second) >= 0.5 * SECOND
+    assert stayed(second) >= STAY * SECOND
 
 
 def test_who_is_gone_needs_no_confirmation(
@@ -441,9 +444,10 @@ def test_what_waits_survives_kills(tmp_path: Path, name: str) -> None:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             put(stub, keyed(stub, name), a=(9, 0), b=(1, 0), c=(1, 1))
             create(fences, "counts", **config, confirmations=3)
-            create(fences, "times", **config, min_dwell=span(2))
+            create(fences, "times", **config, min_dwell=span(LONG_STAY))
             begun = time.time_ns() // 1000
             put(stub, name, a=(1, 0), b=(9, 0), c=(9, 1))
+            ended = time.time_ns() // 1000
             put(stub, name, a=(2, 0), c=(2, 2))
         server.process.kill()
     with server_process("--data", str(tmp_path), killed=True) as server:
@@ -455,8 +459,8 @@ def test_what_waits_survives_kills(tmp_path: Path, name: str) -> None:
             found = waited(fences, "times", 2)
             expected = ["ENTER a SUBJECT_MOVED TIME_PASSED", "EXIT b SUBJECT_MOVED TIME_PASSED"]
             assert words(found) == expected
-            assert all(2 * SECOND <= each.time.ToMicroseconds() - begun < 20 * SECOND for each in found)
-            assert all(abs(each.first_time.ToMicroseconds() - begun) < SECOND for each in found)
+            assert all(stayed(each) >= LONG_STAY * SECOND for each in found)
+            assert all(begun <= each.first_time.ToMicroseconds() <= ended for each in found)
         server.process.kill()
     with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         fences = FenceServiceStub(channel)

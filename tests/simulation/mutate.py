@@ -13,6 +13,7 @@ from pathlib import Path
 import dynhull_server
 
 HERE = Path(__file__).parent
+PACKAGE = Path(dynhull_server.__file__).parent
 PATCHES = sorted((HERE / "mutants").glob("*.patch"))
 # Lives within which a fault must be found.
 MOST_LIVES = 10_000
@@ -32,15 +33,18 @@ class Hunt:
 
 def fits(patch: Path) -> None:
     """Raise RuntimeError if a patch no longer applies to the code."""
-    with tempfile.TemporaryDirectory() as folder:
-        _put_in(patch, Path(folder))
+    _apply(patch, PACKAGE.parent, "--check")
 
 
 def _put_in(patch: Path, folder: Path) -> None:
     """Make a copy of the package with a fault in it."""
     ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(Path(dynhull_server.__file__).parent, folder / "dynhull_server", ignore=ignored)
-    command = ["git", "apply", "-C1", str(patch)]
+    shutil.copytree(PACKAGE, folder / "dynhull_server", ignore=ignored)
+    _apply(patch, folder)
+
+
+def _apply(patch: Path, folder: Path, *options: str) -> None:
+    command = ["git", "apply", "-C1", *options, str(patch)]
     applied = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if applied.returncode:
         raise RuntimeError(f"{patch.name} does not fit the code any more: renew it\n{applied.stderr}")
