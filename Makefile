@@ -11,6 +11,8 @@ unexport PYTHONDONTWRITEBYTECODE
 export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
 T ?=
+# Twice as many workers as cores: many tests wait, for processes, disks and clocks.
+WORKERS = -n 4 --dist worksteal
 # `make test` counts lines where Python reports them itself (sys.monitoring, 3.12); tracing on 3.11 takes twice as long.
 MONITORING = $(shell $(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "")')
 COVERAGE_CORE = $(or $(MONITORING),ctrace)
@@ -27,7 +29,7 @@ demo: .venv/.demo  ## replay a real day of flights through a real server and ver
 	$(BIN)/dynhull demo --day $(DAY)
 
 test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
-	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),-n 2 --dist worksteal $(COVERAGE))
+	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),$(WORKERS) $(COVERAGE))
 
 FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
 	-DDYNHULL_FAIL_ALLOCATIONS
@@ -50,7 +52,7 @@ fuzz-reference: .venv/.test-core  ## every operation checked against a model; a 
 	$(BIN)/python tests/support/lives.py --operations $(OPERATIONS)
 
 coverage: .venv/.test .venv/.peers  ## run all tests and print the share of lines that they run, server processes included
-	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report=term
+	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(WORKERS) --cov --cov-report=term
 
 format: .venv/.check  ## format the Python, C++ and proto files
 	$(BIN)/ruff check --select I --fix .

@@ -220,6 +220,7 @@ def test_sigterm_ends_a_pause(client: HullClient, address: str, name: str, endpo
     assert acknowledged(client, name) == 0
 
 
+@pytest.mark.long
 def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path, endpoint: Receiver) -> None:
     hold, total = threading.Event(), 4000
 

@@ -266,6 +266,7 @@ def test_events_that_were_dropped_while_the_server_was_away(
         expect(table_row(page, fence).locator("td").nth(2)).to_have_text("11 of 13")
 
 
+@pytest.mark.long
 def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     kept = "--data", str(tmp_path)
     with server_process(*kept, killed=True, wrap=WRAP) as first, HullClient(first.address) as client:

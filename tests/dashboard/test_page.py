@@ -301,6 +301,7 @@ def test_the_hull_is_verified_when_asked_to(browser: Browser, url: str, client: 
         expect(state).to_contain_text("✓ equal at revision 2,")
 
 
+@pytest.mark.long
 def test_each_empty_state_says_what_to_do(browser: Browser, tmp_path: Path) -> None:
     points = tmp_path / "points.csv"
     points.write_text("x,y\n0,0\n4,0\n4,4\n")

@@ -32,6 +32,7 @@ def run(command: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 def test_an_alarm_from_an_empty_folder(
     take_program: Callable[[str, str], Path], site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -59,6 +59,6 @@ def test_fuzz(compiler, tmp_path):
     program = tmp_path / "fuzz"
     build = [compiler, "-std=c++20", "-O0", "-ffp-contract=off", "-DDYNHULL_FAIL_ALLOCATIONS", "-DDYNHULL_LEAF=4"]
     subprocess.run([*build, str(HERE / "fuzz.cpp"), "-o", str(program)], check=True)
-    for arguments in (SEEDS, ["--seconds", "2"]):
+    for arguments in (SEEDS, ["--seconds", "1"]):
         run = subprocess.run([str(program), *arguments], capture_output=True, text=True, check=False)
         assert run.returncode == 0, run.stdout

@@ -10,5 +10,5 @@ def test_random_lives(compiler, tmp_path):
     program = tmp_path / "fuzz_window"
     source = Path(__file__).with_name("fuzz_window.cpp")
     subprocess.run([compiler, *FLAGS, source, "-o", program], check=True)
-    run = subprocess.run([program, "--seconds", "2"], capture_output=True, text=True, check=False)
+    run = subprocess.run([program, "--seconds", "1"], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr

@@ -169,6 +169,7 @@ def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
         np.testing.assert_array_equal(reading.result().distances, expected)
 
 
+@pytest.mark.long
 @needs_proc
 def test_a_large_answer_is_given_up_when_its_caller_goes() -> None:
     """The call ends with its caller: the server then uses less time than for an answer about a tenth of the entries."""

@@ -354,6 +354,7 @@ def ended(address: str) -> float:
     return sum(value for name, value in samples if name.startswith("dynhull_calls_total") and '"Query"' in name)
 
 
+@pytest.mark.long
 @needs_proc
 def test_a_client_that_does_not_read_its_answers_is_not_read_either() -> None:
     """It would send for ever; the server rests, has taken little, and others are answered."""
@@ -400,6 +401,7 @@ def test_a_client_that_takes_too_long_is_told() -> None:
         assert (code, info.metadata["limit"]) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "max_watch_lag")
 
 
+@pytest.mark.long
 @needs_proc
 def test_callers_that_leave_in_the_middle_leave_nothing_behind() -> None:
     """Cancelled while a read waits, while one is computed, between messages and while answers are sent."""

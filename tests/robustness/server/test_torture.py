@@ -6,7 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 
+
+@pytest.mark.long
 def test_no_promise_is_broken():
     torture = Path(__file__).with_name("torture.py")
     run = subprocess.run([sys.executable, torture, "--faults", "10"], capture_output=True, text=True, check=False)
