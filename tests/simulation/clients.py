@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from typing import Any, Protocol, cast
 
 import numpy as np
-import numpy.typing as npt
 
-from dynhull import KeyedHull
 from dynhull.arrays import Points
 from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.watch_fence import Sent
 from dynhull_server.state.batch import Applied, Batch, KeyedBatch
+from dynhull_server.state.contents.live import AnyKeyedHull
 from dynhull_server.state.errors import (
     ConsumerNotFoundError,
     FenceExistsError,
@@ -43,17 +42,20 @@ from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.fences.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.fence import Fence
 from dynhull_server.state.fences.records import Consumer, Inside
-from dynhull_server.state.hull_state import HullState
-from dynhull_server.state.records import HullSettings, Identity, Times, Window
+from dynhull_server.state.hull_state import Counts, HullState
+from dynhull_server.state.records import Center, HullSettings, Identity, Times, Window
 
 from .entities import Key
 from .fence_model import PREFIX
+from .globe import CENTERS, FAR, GLOBE, places, points
 from .model import SKIPS, Asked, Content, Model, tag
 from .plan import TIMED, Operation
 
 NO_POINTS = np.empty((0, 2))
 # The points of one batch have an x of their own each, in eighths.
 EIGHT = 8
+# The fields of a batch that have points.
+POINTS = "inserts", "puts.points"
 # The strips of a fence end there; above and below there are no points.
 LAST_STRIP, LOWEST, HIGHEST = 40, -1_000, 10**7
 
@@ -69,6 +71,9 @@ class Server(Protocol):
 
     async def delete(self, name: str) -> None:
         """Remove a hull."""
+
+    async def recenter(self, name: str, center: Center | None, rows: int) -> Counts:
+        """Move the centre of a hull."""
 
     async def delete_at_once(self, name: str, times: int) -> None:
         """Remove a hull repeatedly, and ignore the answers."""
@@ -122,13 +127,14 @@ class Server(Protocol):
         """What one layer has and the other has not."""
 
 
-# The vertices of a hull, and their keys if it has keys.
-Outline = tuple[Points, Sequence[Key] | None]
+# The vertices of a hull, their keys if it has keys, and the centre.
+Outline = tuple[Points, Sequence[Key] | None, Center | None]
 
 
 def outline(state: HullState) -> Outline:
-    """The vertices, and their keys."""
-    return state.vertices(), state.vertex_keys().tolist() if isinstance(state.hull, KeyedHull) else None
+    """The vertices, their keys, and the centre."""
+    keys = state.vertex_keys().tolist() if isinstance(state.hull, AnyKeyedHull) else None
+    return state.vertices(), keys, state.center
 
 
 class TornBatch:
@@ -191,6 +197,8 @@ class Client:
                 await self.read(op["name"], op["rows"])
             case "recall":
                 await self.recall(op)
+            case "recenter":
+                await self.recenter(op)
             case "last":
                 await self.last(op["name"])
             case "fence" | "refence" | "unfence" | "follow" | "ack" | "unack" | "inside":
@@ -218,6 +226,18 @@ class Client:
         else:
             self.model.deleted(asked)
 
+    async def recenter(self, op: Operation) -> None:
+        name, center = op["name"], None if op["center"] is None else tuple(op["center"])
+        asked = self.model.ask_recenter(name, center)
+        try:
+            counts = await self.server.recenter(name, center, op["rows"])
+        except Exception as error:
+            self.refused(asked, error, (HullNotFoundError, HullUnsuitableError))
+            if isinstance(error, HullUnsuitableError):
+                self.model.not_recentered(asked, center)
+        else:
+            self.model.recentered(asked, center, counts)
+
     # Batches
 
     async def write(self, op: Operation) -> None:
@@ -242,7 +262,7 @@ class Client:
         attempts, parts = [], []
         for name in names:
             last = name == names[-1]
-            part = {key: value for key, value in op.items() if last or key not in ("delete", "torn")}
+            part = {key: value for key, value in op.items() if last or key not in ("delete", "torn", "far")}
             attempt, write = self._batch(part | {"name": name}, producer, sequence)
             write.name = name
             attempts.append(attempt)
@@ -363,37 +383,42 @@ class Client:
         elif "delete" in op and seen and seen[-1][2]:
             x = float(seen[-1][2][0])
             deletes = np.array([[x, x * x]])
-        x = float(attempt)
-        return Batch(np.array([[x, x * x]]), deletes, 0, op.get("delete") == "lenient")
+        name, x = op["name"], float(attempt)
+        inserts = places(name, np.array([[x, x * x]]))
+        if op.get("far"):
+            inserts = np.concatenate((inserts, [FAR]))
+        return Batch(inserts, places(name, deletes), 0, op.get("delete") == "lenient")
 
     def _timed_points(self, op: Operation, attempt: int) -> Batch:
         """A batch to a window. It deletes a point that nobody inserts, and perhaps one that was there."""
         seen = self.seen.get(op["name"])
         leaving = seen[-1][2][: len(op["removes"])] if seen else ()
         deleted = np.array([-attempt, *leaving])
-        x, times = self._new(op, attempt)
-        return Batch(np.column_stack((x, x * x)), np.column_stack((deleted, deleted**2)), 0, True, times)
+        inserts, times = self._new(op, attempt)
+        return Batch(inserts, places(op["name"], np.column_stack((deleted, deleted**2))), 0, True, times)
 
-    def _new(self, op: Operation, attempt: int) -> tuple[npt.NDArray[np.float64], Times | None]:
-        """The x of each row, and the times."""
+    def _new(self, op: Operation, attempt: int, lift: float = 0.0) -> tuple[Points, Times | None]:
+        """The point of each row, and the times."""
         x = attempt + np.arange(len(op["keys"])) / EIGHT
-        return x, np.full(len(x), self.server.time() + op["time"], np.int64) if "time" in op else None
+        new = places(op["name"], np.column_stack((x, x * x + lift)))
+        if op.get("far") and len(new) > 1:  # one alone would be a centre
+            new[-1] = FAR
+        return new, np.full(len(x), self.server.time() + op["time"], np.int64) if "time" in op else None
 
     def _puts(self, op: Operation, attempt: int, kind: str) -> KeyedBatch:
         """A batch of keys; those that it puts are not among those that it removes."""
-        x, times = self._new(op, attempt)
-        lift = op.get("lift", 0)
+        new, times = self._new(op, attempt, op.get("lift", 0))
         named = (str, int)[kind == "int"]
         removes = [tag(attempt, kind), *(named(key) for key in op["removes"] if key not in op["keys"])]
         return KeyedBatch(
             cast("Any", kind),
             as_keys(list(map(named, op["keys"])), kind),
-            np.column_stack((x, x * x + lift)),
+            new,
             as_keys(removes, kind),
             times,
             op.get("only"),
             op.get("ttl"),
-            np.full(len(x), self.server.time() + op["deadline"], np.int64) if "deadline" in op else None,
+            np.full(len(new), self.server.time() + op["deadline"], np.int64) if "deadline" in op else None,
             refuse_missing="refuse" in op,
         )
 
@@ -407,6 +432,8 @@ class Client:
         if not op["create"] or op["do"] == "stream":
             reasons.append(HullNotFoundError)
         self.refused(asked, error, tuple(reasons), attempts)
+        if isinstance(error, InvalidBatchError) and error.field in POINTS and not op.get("far"):
+            self.model.out_of_reach(asked)
         if isinstance(error, SequenceGapError):
             self._next[op["name"] + self._producer(op)] = error.expected
 
@@ -423,9 +450,11 @@ class Client:
 
     def saw(self, asked: Asked, uid: str, revision: int, outline: Outline) -> None:
         """An answer has the vertices at a revision."""
-        vertices, keys = outline
+        vertices, keys, center = outline
+        vertices = points(asked.name, vertices)
         seen = content(vertices)
         self.model.read(asked, uid, revision, seen)
+        self.model.centered(uid, revision, center)
         if keys is not None:
             self.model.named(uid, revision, vertices[:, 0].tolist(), keys)
         self.seen.setdefault(asked.name, []).append((uid, revision, seen))
@@ -447,7 +476,7 @@ class Client:
             self.refused(asked, error, (HullNotFoundError, HullReplacedError, RevisionForgottenError))
             return
         if vertices is not None:
-            self.model.recalled(uid, revision, content(vertices))
+            self.model.recalled(uid, revision, content(points(name, vertices)))
 
     async def last(self, name: str) -> None:
         asked = self.model.ask(name)
@@ -563,7 +592,7 @@ def _reasons(op: Operation) -> list[type[Exception]]:
         reasons.append(PointMissingError)
     if "refuse" in op:
         reasons.append(KeyMissingError)
-    if "keys" in op:
+    if "keys" in op or op["name"] in GLOBE:
         reasons.append(InvalidBatchError)
     if op["numbered"] and "skips" not in op:
         reasons.append(SequenceGapError)
@@ -580,9 +609,13 @@ def content(vertices: Points) -> Content:
 def _settings(op: Operation) -> HullSettings:
     identity = cast("Identity", TIMED.get(op["name"], "multiset"))
     window = Window(**op["window"]) if "window" in op else None
-    if op["name"] == "w" and window is None:
+    if op["name"] in ("w", "gw") and window is None:
         window = Window(max_points=2)
-    return HullSettings(identity, op.get("max_points", 0), window, op.get("by_event_time", False))
+    by_event_time, center = op.get("by_event_time", False), op.get("center")
+    if op["name"] not in GLOBE:
+        return HullSettings(identity, op.get("max_points", 0), window, by_event_time)
+    center = None if center is None else tuple(center)
+    return HullSettings(identity, op.get("max_points", 0), window, by_event_time, "geographic", center)
 
 
 def config_of(op: Operation) -> FenceConfig:
@@ -618,6 +651,8 @@ async def probe(server: Server, model: Model, name: str, *, anew: bool) -> None:
     client.calm = True
     if name in model.alive:
         await client.read(name)
+        if model.alive[name].center == FAR:
+            await client.recenter({"name": name, "center": CENTERS[0], "rows": 1})
     write: Operation = {"do": "write", "name": name, "create": True, "numbered": False, "rows": 1}
     if name in TIMED:
         write |= {"do": "put", "keys": [0], "removes": [1], "time": 0}

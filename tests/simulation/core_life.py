@@ -44,6 +44,7 @@ from dynhull_server.state.events import (
     Gone,
     NotExamined,
     ReadHull,
+    Recenter,
     Reply,
     Request,
     Retried,
@@ -66,15 +67,16 @@ from dynhull_server.state.fences.requests import (
     ReadFence,
     ReplaceFence,
 )
-from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import NO_TIME, HullSettings
+from dynhull_server.state.records import NO_TIME, Center, HullSettings
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
 from .clients import Client, Outline, content, outline
 from .entities import loaded
 from .fence_model import PREFIX
+from .globe import points
 from .model import SKIPS, Model, Truth
 from .plan import Operation
 from .schedule import Schedule
@@ -280,6 +282,10 @@ class CoreServer:
 
     async def delete(self, name: str) -> None:
         await self._ask(DeleteHull(Answer(), name, self.time()))
+
+    async def recenter(self, name: str, center: Center | None, rows: int) -> Counts:
+        counts: Counts = (await self._ask(Recenter(Answer(), name, center, rows=rows)))[0]
+        return counts
 
     async def delete_at_once(self, name: str, times: int) -> None:
         requests = [DeleteHull(Answer(), name, self.time()) for _ in range(times)]
@@ -497,9 +503,11 @@ def compare(core: Core, model: Model) -> None:
         truth, state = model.alive[name], hull.state
         if hull.row != truth.row:
             raise model.finds(f"in memory there is {hull.row}, kept is {truth.row}")
-        held = (hull.counts.revision, state.counts.revision, content(state.hull.points()))
+        held = (hull.counts.revision, state.counts.revision, content(points(name, state.hull.points())))
         if held != (truth.revision, truth.revision, truth.contents[-1]):
             raise model.finds(f"{name} is {held} in memory, kept is {truth.revision, truth.contents[-1]}")
+        if (state.center, hull.counts.center) != (truth.center, truth.center):
+            raise model.finds(f"the centre of {name} is {state.center, hull.counts.center}, kept is {truth.center}")
         if truth.timed:
             _compare_entities(name, state, truth, model)
         known = {name: last for name, last in truth.producers.items() if not model.days or name.endswith(SKIPS)}
@@ -539,7 +547,7 @@ def compare_fences(core: Core, model: Model) -> None:
 
 def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -> None:
     kept, entities = state.kept(), truth.entities
-    held = loaded(kept.contents)
+    held = loaded(name, kept.contents)
     if (held, kept.clock) != (entities.held, entities.clock):
         raise model.finds(f"{name} holds {held} at {kept.clock}, kept is {entities.held} at {entities.clock}")
 

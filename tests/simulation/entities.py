@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from dynhull_server.state.fences.records import Cause
 from dynhull_server.state.records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, PointRows
 
+from .globe import points
+
 Key = str | float
 
 # What a batch did: keys that are new, known keys written, stale and skipped puts, keys removed and keys evicted.
@@ -26,7 +28,7 @@ class Entity:
 
 
 class Entities:
-    """The points of one hull.
+    """The points of one hull, given by its name and settings.
 
     Attributes:
         held: the points there are.
@@ -34,7 +36,8 @@ class Entities:
         gone: why points have left in the last revision.
     """
 
-    def __init__(self, settings: HullSettings) -> None:
+    def __init__(self, name: str, settings: HullSettings) -> None:
+        self._name = name
         self._settings = settings
         self._window = settings.window
         self.held: dict[Key, Entity] = {}
@@ -50,10 +53,11 @@ class Entities:
         removes = [key for key in _listed(rows.removes) if key in self.held]
         self._remove(removes, Cause.REMOVED)
         count = {"new": 0, "moved": 0, "stale": 0, "skipped": 0}
+        put = points(self._name, rows.points).tolist()
         for row, key in enumerate(_listed(rows.keys)):
             time = NO_TIME if rows.times is None else int(rows.times[row])
             deadline = FOREVER if rows.deadlines is None else int(rows.deadlines[row])
-            x, y = rows.points[row].tolist()
+            x, y = put[row]
             entity = Entity(x, time, deadline, y)
             count[self._put(key, entity, rows.condition)] += 1
         return count["new"], count["moved"], count["stale"], count["skipped"], len(removes), self._evict()
@@ -66,9 +70,9 @@ class Entities:
     def apply_points(self, rows: PointRows) -> Effect:
         """Insert and delete points."""
         assert rows.times is not None  # there is a window
-        deletes = [x for x in rows.deletes[:, 0].tolist() if x in self.held]
+        deletes = [x for x, _ in points(self._name, rows.deletes).tolist() if x in self.held]
         self._remove(deletes, Cause.REMOVED)
-        for (x, y), time in zip(rows.inserts.tolist(), rows.times.tolist(), strict=True):
+        for (x, y), time in zip(points(self._name, rows.inserts).tolist(), rows.times.tolist(), strict=True):
             self.held[x] = Entity(x, time, y=y)
         return len(rows.inserts), 0, 0, 0, len(deletes), self._evict()
 
@@ -108,9 +112,9 @@ class Entities:
         ]
 
 
-def loaded(contents: Contents) -> dict[Key, Entity]:
+def loaded(name: str, contents: Contents) -> dict[Key, Entity]:
     """The points of a snapshot."""
-    xs, ys, n = *contents.points.T.tolist(), len(contents)
+    xs, ys, n = *points(name, contents.points).T.tolist(), len(contents)
     keys = xs if contents.keys is None else _listed(contents.keys)
     times = [NO_TIME] * n if contents.times is None else contents.times.tolist()
     deadlines = [FOREVER] * n if contents.deadlines is None else contents.deadlines.tolist()

@@ -7,25 +7,29 @@ its x, and all points of a parabola are vertices: so an answer names the batches
 * Of batches to several hulls all are kept by one commit, or none; and who has seen one of them sees the others.
 * No batch is there twice, and no two of one producer have the same number.
 * A read at a revision is the truth at that revision, and so is a recall.
+* A hull on the globe has the centre of its creation, of its first points or of the last request to move it.
 * No answer to a later request is older than an answer that has been seen.
 * Events of fences follow from the revisions: see `fence_model`.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
 from collections import Counter, defaultdict, deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from support.sides import Rings, hull
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.fences.records import Cause
+from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, KeyRows, PointRows, Record
+from dynhull_server.state.records import Append, Center, Create, Delete, Expiry, HullRow, KeyRows, PointRows, Record
 
 from .entities import Effect, Entities, Entity, Key
 from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
+from .globe import FAR, GLOBE, mean, points
 
 Content = tuple[float, ...]
 
@@ -49,6 +53,7 @@ class Truth:
     `keys` are the keys at each revision, by their x, and `entities` those that there are; of hulls without keys or
     window none.
     `attempts` are the batches of the revisions, `held` the entities at each, and `gone` why others left in it;
+    `centers` are those at each revision, and `recenters` the revisions that moved the centre and are not answered.
     `corners` is for fences. `since` is the number of commits when it was made.
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
     """
@@ -62,12 +67,15 @@ class Truth:
     held: list[dict[Key, Entity]] = field(default_factory=lambda: [{}])
     gone: list[dict[Key, Cause]] = field(default_factory=lambda: [{}])
     attempts: list[int | None] = field(default_factory=lambda: [None])
+    centers: list[Center | None] = field(init=False)
+    recenters: set[int] = field(default_factory=set)
     corners: dict[int, Rings] = field(default_factory=dict)
     since: int = 0
     entities: Entities = field(init=False)
 
     def __post_init__(self) -> None:
-        self.entities = Entities(self.row.settings)
+        self.entities = Entities(self.row.name, self.row.settings)
+        self.centers = [self.row.settings.center]
 
     @property
     def timed(self) -> bool:
@@ -76,6 +84,15 @@ class Truth:
     @property
     def revision(self) -> int:
         return len(self.contents) - 1
+
+    @property
+    def center(self) -> Center | None:
+        return self.centers[-1]
+
+    def mean(self) -> Center | None:
+        """The centre that all points choose; None without points."""
+        content = np.array(self.contents[-1])
+        return mean(self.row.name, np.column_stack((content, content**2))) if len(content) else None
 
     def entities_at(self, revision: int) -> dict[Key, Entity]:
         """The points at a revision."""
@@ -140,6 +157,7 @@ class Model:
         self._effects: dict[int, tuple[Effect, int]] = {}
         self._floor: dict[str, tuple[int, int]] = {}
         self._attempts = self._uids_given = 0
+        self._centers_asked: dict[str, set[Center | None]] = defaultdict(set)
         self._open: Counter[tuple[str, str]] = Counter()
         self._asked: Counter[tuple[str, str]] = Counter()
         self._numbered: dict[tuple[str, str, int], list[Truth]] = defaultdict(list)
@@ -218,11 +236,15 @@ class Model:
         if record.revision != truth.revision + 1:
             raise self.finds(f"revision {record.revision} is kept after revision {truth.revision}")
         truth.attempts.append(None)
+        truth.centers.append(self._center(truth, record))
+        if _only_moves_center(record):
+            self._recenter(truth, record)
+            return None
         if isinstance(record.rows, Expiry):
             self._revise(truth, record, record.rows)
             return None
         rows = record.rows
-        attempt = _attempt(rows, timed=truth.timed)
+        attempt = _attempt(truth, rows)
         if attempt in self._refused:
             raise self.finds(f"batch {attempt} is kept after it was refused")
         if attempt in self._places:
@@ -231,7 +253,7 @@ class Model:
             self._revise(truth, record, rows)
         elif isinstance(rows, PointRows):
             content = {*truth.contents[-1], attempt}
-            for x in rows.deletes[:, 0].tolist():
+            for x, _ in points(truth.row.name, rows.deletes).tolist():
                 if x not in content and not rows.lenient:
                     raise self.finds(f"batch {attempt} deletes a point that is not there")
                 content.discard(x)
@@ -250,6 +272,35 @@ class Model:
         truth.attempts[-1] = attempt
         return attempt
 
+    def _center(self, truth: Truth, record: Record) -> Center | None:
+        """The centre after a record: as it was, or as the first points choose it, or as somebody has asked for."""
+        rows, name, center = record.rows, truth.row.name, truth.center
+        if isinstance(rows, Expiry) or name not in GLOBE:
+            return center
+        if _only_moves_center(record):
+            wanted = {truth.mean() if each is None else each for each in self._centers_asked[name]}
+            if record.center not in wanted:
+                raise self.finds(f"{name} is moved to {record.center}, asked for was {wanted}")
+            return record.center
+        inserted = rows.points if isinstance(rows, KeyRows) else rows.inserts
+        chosen = mean(name, points(name, inserted)) if center is None and len(inserted) else None
+        if record.center != chosen:
+            raise self.finds(f"revision {record.revision} of {name} is kept with the centre {record.center}: {chosen}")
+        center = chosen or center
+        if len(inserted) and (center == FAR or [*FAR] in inserted.tolist()):
+            raise self.finds(f"revision {record.revision} of {name} has points out of the reach of {center}")
+        return center
+
+    def _recenter(self, truth: Truth, record: Record) -> None:
+        """The centre of a hull is moved, and nothing else."""
+        if record.clock != truth.entities.clock:
+            raise self.finds(f"the clock of {truth.row.name} changes with its centre")
+        truth.contents.append(truth.contents[-1])
+        truth.held.append(truth.held[-1])
+        truth.keys.append(truth.keys[-1])
+        truth.gone.append({})
+        truth.recenters.add(truth.revision)
+
     def _revise(self, truth: Truth, record: Record, rows: KeyRows | PointRows | Expiry) -> None:
         """A hull with keys or a window has a new revision."""
         entities = truth.entities
@@ -258,9 +309,9 @@ class Model:
                 if record.clock is None or not entities.expire(rows, record.clock):
                     raise self.finds(f"revision {record.revision} of {truth.row.name} lets others leave: {record}")
             case KeyRows():
-                self._effects[_attempt(rows, timed=True)] = entities.apply(rows), len(rows.keys)
+                self._effects[_attempt(truth, rows)] = entities.apply(rows), len(rows.keys)
             case _:
-                self._effects[_attempt(rows, timed=True)] = entities.apply_points(rows), len(rows.inserts)
+                self._effects[_attempt(truth, rows)] = entities.apply_points(rows), len(rows.inserts)
         if entities.clock is not None and (record.clock is None or record.clock < entities.clock):
             raise self.finds(f"the clock of {truth.row.name} goes back from {entities.clock} to {record.clock}")
         entities.clock = record.clock
@@ -463,6 +514,46 @@ class Model:
         if seen != kept:
             raise self.finds(f"revision {revision} was recalled as {seen}, and is kept as {kept}")
 
+    def centered(self, uid: str, revision: int, center: Center | None) -> None:
+        """The centre was read."""
+        kept = self._uids[uid].centers[revision]
+        if center != kept:
+            raise self.finds(f"the centre at revision {revision} was sent as {center}, and is {kept}")
+
+    def ask_recenter(self, name: str, center: Center | None) -> Asked:
+        """Another centre of a hull is asked for, None for the mean direction of its points."""
+        self._centers_asked[name].add(center)
+        return self.ask(name)
+
+    def recentered(self, asked: Asked, center: Center | None, counts: Counts) -> None:
+        """The centre has been moved."""
+        for truth, revision in self._since(asked):
+            moved = revision == counts.revision and revision in truth.recenters
+            if moved and truth.centers[revision] == counts.center and center in (None, counts.center):
+                truth.recenters.remove(revision)
+                self._answered(asked, (truth.row.number, revision))
+                return
+        raise self.finds(f"{asked.name} is said to be moved to {center} by {counts}, which is not kept")
+
+    def not_recentered(self, asked: Asked, center: Center | None) -> None:
+        """A centre was refused: points are too far from it, or there are none to choose one."""
+        contents = [truth.contents[revision] for truth, revision in self._since(asked)]
+        reason = {None: not all(contents), FAR: any(contents)}
+        if not reason.get(center):
+            raise self.finds(f"{asked.name} refused the centre {center}")
+
+    def out_of_reach(self, asked: Asked) -> None:
+        """A batch was refused because of places that are too far from the centre."""
+        if not any(truth.centers[revision] == FAR for truth, revision in self._since(asked)):
+            raise self.finds(f"{asked.name} refused a place that it reaches")
+
+    def _since(self, asked: Asked) -> Iterator[tuple[Truth, int]]:
+        """The hulls of a name, and their revisions, that there have been since a request."""
+        for number, truth in self._hulls.items():
+            if truth.row.name == asked.name and number >= asked.floor[0]:
+                first = asked.floor[1] if number == asked.floor[0] else 0
+                yield from ((truth, revision) for revision in range(first, truth.revision + 1))
+
     def last(self, asked: Asked, producer: str, sequence: int) -> None:
         """The last number of a producer was answered."""
         kept = [each.producers.get(producer, 0) for each in self._hulls.values() if each.row.name == asked.name]
@@ -475,8 +566,13 @@ def tag(attempt: int, kind: str) -> Key:
     return f"{FIRST_TAG + attempt}" if kind == "str" else FIRST_TAG + attempt
 
 
-def _attempt(rows: PointRows | KeyRows, *, timed: bool) -> int:
+def _only_moves_center(record: Record) -> bool:
+    return record.center is not None and not len(record.rows)
+
+
+def _attempt(truth: Truth, rows: PointRows | KeyRows) -> int:
     """The number of a batch: in a hull with keys or a window it is in the first row to remove."""
     if isinstance(rows, KeyRows):
         return int(rows.removes[0]) - FIRST_TAG
-    return -int(rows.deletes[0, 0]) if timed else int(rows.inserts[0, 0])
+    named = points(truth.row.name, rows.deletes if truth.timed else rows.inserts)[0, 0]
+    return int(-named if truth.timed else named)

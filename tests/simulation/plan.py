@@ -13,12 +13,14 @@ An operation names what to do and to which hull; with `leave` its caller disconn
 import random
 from typing import Any
 
+from .globe import CENTERS, FAR, GLOBE
+
 Plan = dict[str, Any]
 Operation = dict[str, Any]
 
 NAMES = ("a", "b", "c")
 # Hulls with keys, and of which type these are; and one of points in a window.
-TIMED = {"k": "str", "w": "multiset", "l": "int", "kk": "str"}
+TIMED = {"k": "str", "w": "multiset", "l": "int", "kk": "str", "gk": "str", "gw": "multiset"}
 
 # What can be asked for, and how often. Each plan has some of it much more often, and some not at all: faults hide where
 # a few operations meet (swarm testing: Groce and others, 2012).
@@ -66,6 +68,10 @@ AREAS = ("a", "k", "kk", "l", "w")
 # The share of plans with fences.
 WITH_FENCES = 0.12
 
+# How often a plan with hulls on the globe asks for another centre, and the share of plans with such hulls.
+RECENTERS = 20
+ON_GLOBE = 0.1
+
 SWARM = (0, 1, 1, 5)
 
 # The share of the shell's plans in which a hull is recalled from the storage beside its deletion: by chance the two
@@ -93,6 +99,10 @@ def random_plan(seed: int, layer: str) -> Plan:
     names = NAMES[: draw.randint(1, 1 if with_times else 3)]
     timed = tuple(draw.sample(("k", "w", "l"), draw.randint(1, 3))) if with_times else ()
     fences = tuple(draw.sample(tuple(FENCED), draw.choice((1, 1, 2, 3)))) if with_fences else ()
+    on_globe = not with_fences and random.Random(f"globe {seed}").random() < ON_GLOBE
+    if on_globe:
+        names = (*names[: draw.randint(0, 1)], "g")
+        timed = tuple(draw.sample(("k", "gk", "gw"), draw.randint(0, 3)))
     if with_fences:
         timed = tuple(dict.fromkeys(("k", *timed, *(("kk",) if draw.random() < 0.4 else ()))))
     weights = {do: often * draw.choice(SWARM) for do, often in (CORE if layer == "core" else SHELL).items()}
@@ -102,13 +112,15 @@ def random_plan(seed: int, layer: str) -> Plan:
         weights["put"] += 20
         if layer != "core":  # the engine does it itself
             weights["keep"] = 0
+    if on_globe:
+        weights["recenter"] = RECENTERS * draw.choice(SWARM)
     if not timed:
         weights |= {"put": 0, "tick": 0}
         weights["together"] *= len(names) > 1
     immediate = layer != "sqlite" and draw.random() < 0.15
     lives = [_life(draw, (names, timed, fences), weights) for _ in range(draw.choice((1, 1, 2, 3)))]
-    for name in timed:
-        if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window
+    for name in (*timed, "g") if on_globe else timed:
+        if draw.random() < 0.7:  # otherwise most would be made by their first batch, without a window, or never
             create = {"do": "create", "name": name, "max_points": 0} | _settings(draw, name)
             lives[0]["clients"][0].insert(0, create)
     if with_fences:
@@ -174,14 +186,15 @@ def _operation(draw: random.Random, all_names: Names, weights: dict[str, int]) -
     every = (*names, *timed)
     op: Operation = {"do": do, "name": draw.choice({"write": names, "stream": names, "put": timed}.get(do, every))}
     if do == "put":
-        op["create"] = op["name"] != "w" and draw.random() < 0.5  # a first batch makes no windows
+        # A first batch makes neither windows nor hulls on the globe.
+        op["create"] = op["name"] not in ("w", *GLOBE) and draw.random() < 0.5
         op["numbered"] = draw.random() < 0.5
         op["rows"] = draw.choice((1, 1, 1, 200))
         op |= _puts(draw)
         if fences:
             op["lift"] = draw.choice((0, 0, 2, 30))
     elif do in ("write", "stream"):
-        op["create"] = draw.random() < 0.7
+        op["create"] = op["name"] not in GLOBE and draw.random() < 0.7
         op["numbered"] = draw.random() < 0.5
         op["rows"] = draw.choice((1, 1, 1, 200, 200, 200_000))
         if draw.random() < 0.2:
@@ -210,14 +223,19 @@ def _operation(draw: random.Random, all_names: Names, weights: dict[str, int]) -
             op["crowd"] = 400
     elif do == "create":
         op["max_points"] = draw.choice((0, 0, 2))
-        if op["name"] in timed:
-            op |= _settings(draw, op["name"])
+        op |= _settings(draw, op["name"])
+    elif do == "recenter":
+        op["name"] = draw.choice([name for name in every if name in GLOBE])
+        op["center"] = draw.choice((None, *CENTERS, *CENTERS, FAR))
+        op["rows"] = draw.choice((1, 200_000))
     elif do in ("rest", "tick"):
         op["seconds"] = 10 ** draw.uniform(-3, 0.8)
     elif do in ("recall", "watch"):
         op["back"] = draw.randint(0, 3)
     elif do == "read":
         op["rows"] = draw.choice((1, 1, 200))
+    if do in ("write", "put", "stream", "together") and op.get("names", [op["name"]])[-1] in GLOBE:
+        op["far"] = draw.random() < 0.1
     if draw.random() < 0.2:
         op["leave"] = int(draw.expovariate(1 / 3))
     return op
@@ -271,7 +289,12 @@ def _config(draw: random.Random, kind: str, subjects: str) -> dict[str, Any]:
 
 
 def _settings(draw: random.Random, name: str) -> dict[str, Any]:
-    """Of a hull with keys or a window; times in microseconds."""
+    """Of a hull with keys or a window, or on the globe; times in microseconds."""
+    center = {"center": draw.choice((None, *CENTERS))} if name in GLOBE else {}
+    return center | (_timed_settings(draw, name) if name in TIMED else {})
+
+
+def _timed_settings(draw: random.Random, name: str) -> dict[str, Any]:
     keyed = TIMED[name] != "multiset"
     settings: dict[str, Any] = {"by_event_time": keyed and draw.random() < 0.5}
     if draw.random() < 0.8 or not keyed:

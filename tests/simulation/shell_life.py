@@ -20,8 +20,9 @@ from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.fences.config import FenceConfig
 from dynhull_server.state.fences.fence import Fence
 from dynhull_server.state.fences.records import Consumer, Inside
+from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import HullSettings
+from dynhull_server.state.records import Center, HullSettings
 
 from .clients import Client, Outline, outline
 from .core_life import compare
@@ -119,6 +120,9 @@ class ShellServer:
     async def delete(self, name: str) -> None:
         await self._engine.delete(name)
 
+    async def recenter(self, name: str, center: Center | None, _: int) -> Counts:
+        return (await self._engine.get(name).recenter(center))[0]
+
     async def delete_at_once(self, name: str, times: int) -> None:
         await asyncio.gather(*(self._engine.delete(name) for _ in range(times)), return_exceptions=True)
 
@@ -203,7 +207,7 @@ class ShellServer:
         hull = self._engine.get(op["name"])
         view = VerticesView(hull, keys=hull.settings.identity != "multiset")
         async with aclosing(watch(hull, view, progress_interval=1.0)) as events:
-            held: Outline | None = None
+            held: tuple[Points, Any] | None = None
             for _ in range(1 + op["back"]):
                 asked = self.model.ask(op["name"])
                 event = await anext(events)
@@ -213,7 +217,7 @@ class ShellServer:
                     case Progress():
                         pass
                 assert held is not None
-                client.saw(asked, hull.uid, event.counts.revision, held)
+                client.saw(asked, hull.uid, event.counts.revision, (*held, event.counts.center))
 
     # Its life
 
