@@ -16,7 +16,7 @@ from ._predicates import orient2d
 from ._rings import as_polygons
 from ._value import Value
 from .arrays import as_coordinate, as_points
-from .keys import Keys, PackedKeys, as_keys
+from .keys import Keys, PackedKeys, as_keys, key_list, take_keys
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -35,7 +35,7 @@ class Crossings(Value):
     Attributes:
         fences: (n,) numbers of fences.
         changes: (n,) +1 entered; -1 left; 0 crossed: outside before and after, but the straight way between meets the
-            area as it is now.
+            area as it is now; 2 was inside as an entity of another hull, and stays inside (see `FenceIndex.carry`).
         causes: (n,) sums of `MOVED` (the subject changed its place), `AREA` (the area changed), `APPEARED` (the key is
             new), `REMOVED` (the key was removed) and `EXPIRED` (the key left by `expire` or `evict`).
         keys: n keys, `PackedKeys` or an array of uint64.
@@ -121,7 +121,7 @@ class FenceIndex:
     ([7], [1], ['UA17'], [4])
     """
 
-    __slots__ = ("_fences", "_subjects")
+    __slots__ = ("_carried", "_fences", "_subjects")
 
     def __init__(self, subjects: KeyedHull) -> None:
         if not isinstance(subjects, KeyedHull):
@@ -130,6 +130,7 @@ class FenceIndex:
             )
         tree = subjects._tree
         self._subjects = subjects
+        self._carried: dict[str | int, FenceIndex] = {}  # keys from other indexes, since crossings were last taken
         self._fences: Fences | _kernel.Fences
         if isinstance(tree, Entities):
             self._fences = Fences(tree)
@@ -275,6 +276,49 @@ class FenceIndex:
         """The number of fences."""
         return len(self._fences)
 
+    def carry(self, source: FenceIndex, keys: Any) -> npt.NDArray[np.bool_]:
+        """Let entities that were removed from one hull and put into another have moved, in fences of both indexes.
+
+        To be called when both hulls have changed, before `take`. Such a subject takes its state along: the next `take`
+        of this index compares it with its place in the other hull, and reports the change 2 if it was inside there and
+        is inside here; that of `source` does not report that it left. For other fences it is gone there, and new here.
+
+        Args:
+            source: the index of the other hull.
+            keys: n keys that both hulls may have.
+
+        Returns:
+            (n,) which of them have moved: those that were removed from the other hull, other than by `expire` and
+            `evict`, and are new in this one, and that no other `carry` has taken.
+
+        Raises:
+            ValueError: `source` is this index, or the keys of the hulls are of different types.
+
+        O(k) for k keys and the subjects that have left.
+
+        >>> import dynhull
+        >>> yard, road = dynhull.KeyedHull(), dynhull.KeyedHull()
+        >>> before, after = dynhull.FenceIndex(yard), dynhull.FenceIndex(road)
+        >>> yard.put("van", 1, 1)
+        True
+        >>> for fences in before, after:
+        ...     fences.set_circle(7, 0, 0, 5)
+        >>> yard.remove("van"), road.put("van", 2, 2)
+        (True, True)
+        >>> after.carry(before, ["van"]).tolist()
+        [True]
+        >>> found = after.take()
+        >>> found.changes.tolist(), found.previous.tolist(), len(before.take())
+        ([2], [[1.0, 1.0]], 0)
+        """
+        if source is self or source._subjects.key_type != self._subjects.key_type:
+            raise ValueError("source must be the index of another hull with keys of the same type")
+        own = as_keys(keys, self._subjects.key_type, "keys")
+        carried = self._fences.carry(source._fences, own)  # type: ignore[arg-type]  # both are of one implementation
+        if carried.any():
+            self._carried.update(dict.fromkeys(key_list(take_keys(own, np.flatnonzero(carried))), source))
+        return carried
+
     def take(self) -> Crossings:
         """The crossings since the last `take`: of each fence and subject what differs between then and now.
 
@@ -285,7 +329,10 @@ class FenceIndex:
             MemoryError: memory does not suffice. No crossing is lost: the next call returns it.
         """
         taken = self._fences.take()
-        return NO_CROSSINGS[self._subjects.key_type] if taken is None else Crossings(*taken)
+        carried, self._carried = self._carried, {}
+        if taken is None:
+            return NO_CROSSINGS[self._subjects.key_type]
+        return _only_shared(Crossings(*taken), carried) if carried else Crossings(*taken)
 
     def _keys(self, inside: Any) -> Keys | None:
         return None if inside is None else as_keys(inside, self._subjects.key_type, "inside")
@@ -295,6 +342,30 @@ class FenceIndex:
         if not self._fences.has(number):
             raise KeyError(f"there is no fence {number}")
         return number
+
+
+def _only_shared(crossings: Crossings, carried: dict[str | int, FenceIndex]) -> Crossings:
+    """The crossings; in a fence that the index does not have from which a subject was carried, this is new."""
+    keys, fences = key_list(crossings.keys), crossings.fences.tolist()
+    new = np.array(
+        [key in carried and fence not in carried[key] for key, fence in zip(keys, fences, strict=True)], np.bool_
+    )
+    new &= crossings.causes & Crossings.MOVED != 0  # not so around the own hull
+    if not new.any():
+        return crossings
+    causes, previous = crossings.causes.copy(), crossings.previous.copy()
+    causes[new] ^= np.uint8(Crossings.MOVED | Crossings.APPEARED)
+    previous[new] = np.nan
+    rows = np.flatnonzero(~new | (crossings.changes != 0))  # who is new has come no way
+    return Crossings(
+        fences=crossings.fences[rows],
+        changes=crossings.changes[rows],
+        causes=causes[rows],
+        keys=take_keys(crossings.keys, rows),
+        points=crossings.points[rows],
+        previous=previous[rows],
+        distances=crossings.distances[rows],
+    )
 
 
 def _number(fence: int) -> int:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._areas import NOTHING, Area, Polygons, disk_area, hull_area
-from ._entities import Journal
+from ._entities import REMOVED, Journal
 from .arrays import as_tuples
 from .keys import PackedKeys, key_list
 from .static import convex_hull
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .keys import Keys
 
 MOVED, AREA, APPEARED = 1, 2, 4  # causes, beside those of `Journal.gone`
-ENTERED, LEFT, CROSSED = 1, -1, 0
+ENTERED, LEFT, CROSSED, STAYED = 1, -1, 0, 2
 UNDECIDED = object()  # the area of a fence whose keys were given, not decided
 
 Taken = tuple[
@@ -63,6 +63,8 @@ class Fences:
         self._entities = entities
         self._journal = Journal()
         self._fences: dict[int, _Fence] = {}
+        self._carried: dict[Key, Point] = {}  # subjects from another index, with their places there
+        self._given: set[Key] = set()  # keys that another index has
         entities.attach(self._journal)
 
     def detach(self) -> None:
@@ -144,6 +146,26 @@ class Fences:
 
     # Crossings
 
+    def carry(self, source: Fences, keys: Keys) -> npt.NDArray[np.bool_]:
+        """Let keys that were removed there and are new here have moved. Returns which of them have."""
+        here, there = self._entities.places(), source._entities.places()
+        carried = np.zeros(len(keys), np.bool_)
+        for row, key in enumerate(key_list(keys)):
+            removed = source._journal.gone.get(key) == REMOVED and key not in there and key not in source._given
+            before = source._carried.get(key, source._journal.before.get(key))
+            new = key in here and self._journal.before.get(key, key) is None and key not in self._carried
+            if not removed or before is None or not new:
+                continue
+            for number, fence in self._fences.items():
+                other = source._fences.get(number)
+                if other is not None and not fence.own and not other.own and key in other.inside:
+                    other.inside.remove(key)
+                    fence.inside.add(key)
+            self._carried[key] = before
+            source._given.add(key)
+            carried[row] = True
+        return carried
+
     def take(self) -> Taken | None:
         """What has crossed since the last call: fences, changes, causes, keys, places, previous, distances."""
         rows: list[tuple[int, int, int, Key, Point, Point, float]] = []
@@ -158,6 +180,9 @@ class Fences:
             everyone = changed or (fence.own and moved)
             for key in sorted({*self._journal.before, *(places if everyone else ())}):
                 previous = self._journal.before.get(key, places.get(key))
+                carried = not fence.own and key in self._carried
+                if carried:
+                    previous = self._carried[key]
                 now = places.get(key)
                 was = key in fence.inside
                 if now is None:
@@ -172,17 +197,21 @@ class Fences:
                 start = fence.earlier.get(key, previous)
                 if inside != was:
                     change = ENTERED if inside else LEFT
+                elif inside and carried and key not in fence.earlier:
+                    change = STAYED
                 elif not was and fence.cross and start not in (None, now) and area.meets(start, now, fence.closed):
                     change = CROSSED
                 else:
                     continue
-                fence.inside ^= {key} if change != CROSSED else set()
-                cause = APPEARED if previous is None else MOVED * (previous != now)
+                fence.inside ^= {key} if change in (ENTERED, LEFT) else set()
+                cause = APPEARED if previous is None else MOVED * (carried or previous != now)
                 cause |= AREA if changed or cause == 0 else 0
                 rows.append((number, change, cause, key, now, previous or nowhere, area.distance(now)))
             fence.decided = fence.settings()
             fence.earlier = {}
         self._journal.clear()
+        self._carried.clear()
+        self._given.clear()
         return self._columns(rows) if rows else None
 
     def _holds(self, fence: _Fence, p: Point) -> bool:

@@ -288,6 +288,9 @@ class Fences:
     def count(self, fence: int) -> int:
         """The number of keys inside."""
 
+    def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]:
+        """Let keys that were removed there and are new here have moved."""
+
     def take(self) -> Any:
         """
         What has crossed since the last call: fences, changes, causes, keys, places, previous, distances.

@@ -9,6 +9,7 @@ import pytest
 from hulls import KEYED_HULLS
 
 from dynhull import Crossings, FenceIndex, _rings
+from dynhull.keys import key_list
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 HOLE = [[1, 1], [2, 1], [2, 2], [1, 2]]
@@ -282,3 +283,129 @@ def _outcome(ring):
         return [each.tolist() for each in _rings.as_polygons([[ring]])[0]]
     except ValueError as error:
         return str(error)
+
+
+# Subjects that go over from one index to another
+
+
+def same_fences(index):
+    index.set_circle(1, 4, 4, 3, margin=1.0, cross=True)
+    index.set_polygons(2, [[SQUARE, HOLE]], cross=True)
+    index.set_polygons(3, [[SQUARE], [[[5, 0], [9, 0], [7, 9]]]], closed=False)
+
+
+def columns(crossings):
+    """The rows by fence and key, with NaN as None."""
+    values = zip(
+        rows(crossings),
+        crossings.points.tolist(),
+        crossings.previous.tolist(),
+        crossings.distances.tolist(),
+        strict=True,
+    )
+    return {(row[0], row[1]): (row[2:], *map(known, rest)) for row, *rest in values}
+
+
+def known(values):
+    return None if np.isnan(values).any() else values
+
+
+@kinds
+@pytest.mark.parametrize("key_type", ["str", "int"])
+def test_who_changes_hulls_has_moved_as_in_one_hull(make, key_type):
+    random = np.random.default_rng(7)
+    keys = [f"é{i}" if key_type == "str" else i for i in range(6)]
+    parts, whole = [make(key_type), make(key_type)], make(key_type)
+    indexes, single = [FenceIndex(hull) for hull in parts], FenceIndex(whole)
+    for index in (*indexes, single):
+        same_fences(index)
+    home, moves = {}, 0
+    for _ in range(150):
+        carried = {}
+        for row in random.permutation(6)[: random.integers(1, 4)].tolist():
+            key, place = keys[row], random.integers(0, 10, 2).tolist()
+            old, new = home.get(key), int(random.integers(3))
+            home[key] = new if new < 2 else None
+            if old is not None and old != new:
+                parts[old].remove(key)
+            if new < 2:
+                parts[new].put(key, *place)
+                whole.put(key, *place)
+            elif old is not None:
+                whole.remove(key)
+            if new < 2 and old not in (new, None):
+                carried[key] = old
+        if random.integers(5) == 0:
+            center = random.integers(2, 7, 2).tolist()
+            for index in (*indexes, single):
+                index.set_circle(1, *center, 3, margin=1.0, cross=True)
+        before = {(fence, key) for fence in (1, 2, 3) for key in key_list(single.inside(fence))}
+        for source, target in ((0, 1), (1, 0)):
+            given = [key for key, old in carried.items() if old == source]
+            assert indexes[target].carry(indexes[source], keys).tolist() == [key in given for key in keys]
+            assert not indexes[target].carry(indexes[source], keys).any()
+        found = {**columns(indexes[0].take()), **columns(indexes[1].take())}
+        expected = columns(single.take())
+        stayed = {row for row, values in found.items() if values[0][0] == 2}
+        assert stayed == {(fence, key) for fence, key in before - expected.keys() if key in carried}
+        for row in stayed:
+            assert found[row][0][1] & Crossings.MOVED
+            assert found[row][2] is not None
+        for row, values in expected.items():
+            if row[1] in carried and not values[0][1] & Crossings.MOVED:  # at the same place, in another hull
+                expected[row] = ((values[0][0], values[0][1] | Crossings.MOVED), *values[1:])
+        assert {row: values for row, values in found.items() if row not in stayed} == expected
+        moves += len(stayed)
+        for fence in (1, 2, 3):
+            parted = [key for index in indexes for key in key_list(index.inside(fence))]
+            assert sorted(key_list(single.inside(fence))) == sorted(parted)
+            assert single.count(fence) == indexes[0].count(fence) + indexes[1].count(fence)
+    assert moves > 15
+
+
+@kinds
+def test_who_changes_hulls_is_new_in_fences_of_one_hull(make):
+    yard, road = make.from_entities(["a", "b", "c"], [[1, 1], [9, 9], [-1, 5]]), make("str")
+    before, after = FenceIndex(yard), FenceIndex(road)
+    before.set_polygons(1, [[SQUARE]])
+    after.set_polygons(2, [[SQUARE]], cross=True)
+    after.set_hull(3, [], margin=0.5, without_self=True)
+    yard.remove_many(["a", "b", "c"])
+    road.put_many(["a", "b", "c"], [[1, 1], [2, 2], [5, -1]])
+    assert after.carry(before, ["a", "c", "b", "d"]).tolist() == [True, True, True, False]
+    found = after.take()
+    assert rows(found) == [(2, "a", 1, Crossings.APPEARED), (2, "b", 1, Crossings.APPEARED)]
+    assert np.isnan(found.previous).all()
+    assert rows(before.take()) == [(1, "a", -1, Crossings.REMOVED)]
+    assert after.take() == after.take()
+
+
+@kinds
+def test_who_has_expired_or_was_there_has_not_moved(make):
+    yard, road = make.from_entities(["a", "b"], [[1, 1], [1, 1]], [1.0, 2.0]), make.from_entities(["b"], [[9, 9]])
+    before, after = FenceIndex(yard), FenceIndex(road)
+    for index in (before, after):
+        index.set_polygons(1, [[SQUARE]])
+    yard.expire(1.0)
+    yard.remove("b")
+    road.put_many(["a", "b"], [[2, 2], [2, 2]])
+    assert not after.carry(before, ["a", "b"]).any()
+    assert rows(after.take()) == [(1, "a", 1, Crossings.APPEARED), (1, "b", 1, Crossings.MOVED)]
+    assert rows(before.take()) == [(1, "a", -1, Crossings.EXPIRED), (1, "b", -1, Crossings.REMOVED)]
+    for wrong in (after, FenceIndex(make("int"))):
+        with pytest.raises(ValueError, match="source must be the index of another hull"):
+            after.carry(wrong, ["a"])
+
+
+@kinds
+def test_who_changes_hulls_twice_before_anybody_looks(make):
+    hulls = [make.from_entities(["a"], [[1, 1]]), make("str"), make("str")]
+    indexes = [FenceIndex(hull) for hull in hulls]
+    for index in indexes:
+        index.set_polygons(1, [[SQUARE]])
+    for old, new in ((0, 1), (1, 2)):
+        hulls[old].remove("a")
+        hulls[new].put("a", 3, 3)
+        assert indexes[new].carry(indexes[old], ["a"]).tolist() == [True]
+    assert [rows(index.take()) for index in indexes] == [[], [], [(1, "a", 2, Crossings.MOVED)]]
+    assert [index.count(1) for index in indexes] == [0, 0, 1]

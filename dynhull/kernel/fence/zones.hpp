@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "../memory/chunks.hpp"
 #include "../tree/leaf.hpp"
 #include "strips.hpp"
 
@@ -50,7 +51,7 @@ inline Point anchor_of(const Box& box) {
 }
 
 struct alignas(LINE) Zone {
-  Box box;                         // without its right and upper side
+  Box box = Box::none();           // without its right and upper side
   std::vector<Piece> pieces = {};  // those of a fence one after the other
   std::size_t most = 0;            // subjects or pieces beyond which it is worth dividing; 0 for the usual number
   std::vector<std::uint32_t> covering = {};  // fences
@@ -99,7 +100,10 @@ class Zones {
  public:
   using Number = std::uint32_t;
 
-  Zones() { zones_.push_back({.box = {LOWEST, HIGHEST}}); }
+  Zones() {
+    zones_.reserve(1);
+    zones_.push_back({.box = {LOWEST, HIGHEST}});
+  }
 
   Zone& operator[](Number zone) { return zones_[zone]; }
   const Zone& operator[](Number zone) const { return zones_[zone]; }
@@ -123,13 +127,13 @@ class Zones {
     const std::uint32_t parent = parent_of(zone);
     const Box box = zones_[zone].box;
     nodes_.reserve(nodes_.size() + 1 + nodes_.size() / 4);
-    if (zones_.capacity() < zones_.size() + 3) zones_.reserve(zones_.size() + 3 + zones_.size() / 4);
+    zones_.reserve(zones_.size() + 3);
     const auto first = static_cast<Number>(zones_.size());
     const std::array<Number, 4> children = {zone, first, first + 1, first + 2};
     const auto node = static_cast<std::uint32_t>(nodes_.size());
     nodes_.push_back({split, {}});
     for (unsigned q = 0; q < 4; ++q) {
-      if (q > 0) zones_.emplace_back();
+      if (q > 0) zones_.push_back({});
       zones_[children[q]].box = quarter_of(box, split, q);
       nodes_[node].child[q] = children[q] | ZONE;
     }
@@ -150,10 +154,12 @@ class Zones {
   }
 
   std::size_t bytes() const {
-    std::size_t bytes = nodes_.capacity() * sizeof(Node) + zones_.capacity() * sizeof(Zone);
-    for (const Zone& zone : zones_)
+    std::size_t bytes = nodes_.capacity() * sizeof(Node) + zones_.bytes();
+    for (std::size_t i = 0; i < zones_.size(); ++i) {
+      const Zone& zone = zones_[i];
       bytes += (zone.covering.capacity() + zone.subjects.capacity() + zone.pending.capacity()) * sizeof(Number) +
                zone.pieces.capacity() * sizeof(Piece);
+    }
     return bytes;
   }
 
@@ -205,7 +211,7 @@ class Zones {
   }
 
   std::vector<Node> nodes_;
-  std::vector<Zone> zones_;
+  Chunks<Zone> zones_;
   std::uint32_t root_ = ZONE;
 };
 

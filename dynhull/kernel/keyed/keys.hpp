@@ -21,6 +21,9 @@ class IntegerKeys {
   bool same(const Arena&, std::size_t row, std::uint64_t stored) const { return keys_[row] == stored; }
   std::size_t bytes(std::size_t) const { return 0; }
   std::uint64_t store(Arena&, std::size_t row) const { return keys_[row]; }
+  std::string_view bytes_of(std::size_t row) const {
+    return {reinterpret_cast<const char*>(keys_.data() + row), sizeof keys_[row]};
+  }
 
  private:
   std::size_t count_;
@@ -46,6 +49,7 @@ class StringKeys {
   std::size_t bytes(std::size_t row) const { return lengths_[row]; }
   std::uint64_t store(Arena& arena, std::size_t row) const { return arena.add((*this)[row]); }
 
+  std::string_view bytes_of(std::size_t row) const { return (*this)[row]; }
   std::string_view operator[](std::size_t row) const { return {data_ + starts_[row], lengths_[row]}; }
 
  private:

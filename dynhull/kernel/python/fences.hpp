@@ -72,6 +72,36 @@ class FenceIndex {
     return packed(alone(ALL_ROWS, [&](Fences& fences) { return fences.inside(fence); }));
   }
 
+  // Lets keys that were removed from the hull of another index and are new here have moved. Returns which rows have.
+  // The hulls are locked one after the other.
+  nb::object carry(FenceIndex& source, const nb::object& keys) {
+    const auto checked = hull_->given_keys(keys);
+    const GivenKeys& given = checked.second;
+    const Output<bool> carried(given.size());
+    std::fill_n(carried.data(), given.size(), false);
+    std::vector<std::string> names;
+    given.with(hull_->strings(), [&](const auto& batch) {
+      for (std::size_t row = 0; row < batch.size(); ++row) names.emplace_back(batch.bytes_of(row));
+    });
+    auto departures = source.alone(names.size(), [&](Fences& fences) { return fences.departures(names); });
+    if (departures.empty()) return nb::cast(carried.array());
+    Departures arrived;
+    hull_->alone(names.size(), [&](Entities& entities, FramedTree&) {
+      given.with(hull_->strings(), [&](const auto& batch) {
+        entities.find(batch, [&](std::size_t row, std::uint32_t, std::uint32_t slot) {
+          const auto departure = departures.find(names[row]);
+          if (slot == NONE || departure == departures.end()) return;
+          arrived.reserve(arrived.size() + 1);
+          if (!fences_->arrive(slot, departure->second)) return;
+          carried.data()[row] = true;
+          arrived.insert(departures.extract(departure));
+        });
+      });
+    });
+    source.alone(names.size(), [&](Fences& fences) { fences.give(arrived); });
+    return nb::cast(carried.array());
+  }
+
   // Fences, changes, causes, keys, points, previous and distances; None if there are no rows.
   nb::object take() {
     std::size_t work = 0;

@@ -185,6 +185,13 @@ class KeyedHull : public Hull {
     return work(entities_, tree_);
   }
 
+  // The checked keys as a Python object, and as given.
+  std::pair<nb::object, GivenKeys> given_keys(const nb::object& keys) const {
+    if (auto given = GivenKeys::plain(keys, strings())) return {keys, std::move(*given)};
+    nb::object checked = keys_module("as_keys")(keys, key_type());
+    return {checked, GivenKeys::plain(checked, strings()).value()};
+  }
+
   // The slots of keys that are there.
   std::vector<std::uint32_t> slots_of(const nb::object& keys) {
     const GivenKeys given = given_keys(keys).second;
@@ -213,13 +220,6 @@ class KeyedHull : public Hull {
   static Only only_of(const nb::object& only) {
     if (only.is_none()) return Only::ALL;
     return nb::cast<std::string_view>(only) == "absent" ? Only::ABSENT : Only::PRESENT;
-  }
-
-  // The checked keys as a Python object, and as given.
-  std::pair<nb::object, GivenKeys> given_keys(const nb::object& keys) const {
-    if (auto given = GivenKeys::plain(keys, strings())) return {keys, std::move(*given)};
-    nb::object checked = keys_module("as_keys")(keys, key_type());
-    return {checked, GivenKeys::plain(checked, strings()).value()};
   }
 
   double time_of(const nb::object& time) const {

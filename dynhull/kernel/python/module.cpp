@@ -190,6 +190,9 @@ void add_fences(nb::module_& module) {
       .def("inside", &FenceIndex::inside, nb::sig("def inside(self, fence: int) -> dynhull.keys.Keys"), "fence"_a,
            "The keys inside, in order.")
       .def("count", &FenceIndex::count, "fence"_a, "The number of keys inside.")
+      .def("carry", &FenceIndex::carry,
+           nb::sig("def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]"),
+           "source"_a, "keys"_a, "Let keys that were removed there and are new here have moved.")
       .def("take", &FenceIndex::take, nb::sig("def take(self) -> typing.Any"),
            "What has crossed since the last call: fences, changes, causes, keys, places, previous, distances.")
       .def("check", &FenceIndex::check, "Raise AssertionError if an invariant is broken.")

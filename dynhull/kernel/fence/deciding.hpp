@@ -1,0 +1,254 @@
+// Who has crossed: by the zone of each subject, exactly, for the fences that cover or touch the zone and those that it
+// was inside of.
+#pragma once
+
+#include "reports.hpp"
+
+namespace dynhull {
+
+class Deciding : public Reports {
+ protected:
+  using Reports::Reports;
+
+  struct Found {
+    std::uint32_t fence, slot;
+    int change;
+    std::optional<double> distance;
+  };
+
+  // Where a subject was that has changed or is gone; around the own hull, one from another index was nowhere.
+  template <class Changed>
+  static Point place_before(const Fence& fence, const Changed& changed) {
+    return changed.fresh && (!changed.carried || fence.own) ? NOWHERE : changed.before;
+  }
+
+  static bool changed(const Fence& fence) {
+    return fence.given || fence.area != fence.decided || fence.own != fence.decided_own;
+  }
+
+  void decide(std::uint32_t slot) {
+    const Point p = (*slots_)[slot].place;
+    const std::uint32_t number = subjects_[slot].zone;
+    if (number == NONE) return;  // there are no zones
+    const Zone& zone = zones_[number];
+    Change* const change = change_of(slot);
+    // The state before is that of areas which are still there, and the way from there is within the zone.
+    const bool known = !everyone_ && recent_.empty() && change && !change->fresh && !change->carried &&
+                       !change->decided && zone.holds(change->before);
+    if (change) change->decided = true;
+    if (!known) decide_covering(slot, zone);
+    for (std::size_t i = 0; i < zone.pieces.size();) {
+      const std::span<const Piece> run = zone.run(i);
+      i += run.size();
+      const std::uint32_t handle = run[0].fence;
+      const bool was = members_.has(subjects_[slot].inside, handle);
+      const bool from_before = known && !run[0].wide;
+      const bool now =
+          from_before ? holds(run, change->before, was, p, was) : holds(run, zone.anchor(), run[0].inside, p, was);
+      if (now == was) continue;
+      find(handle, slot, now ? +1 : -1, now || run[0].disk ? std::nullopt : zone.distance(run, p));
+    }
+    if (change && crossable_ > 0) {
+      former_.clear();
+      for (const Found& each : found_)
+        if (each.slot == slot && each.change < 0) former_.push_back(each.fence);
+      cross_found();
+      decide_ways(*change, p);
+    }
+  }
+
+  // Crossings of some subjects are reported together, when their fences have been fetched.
+  void find(std::uint32_t handle, std::uint32_t slot, int change, std::optional<double> distance = {}) {
+    prefetch(fences_[handle].get());
+    found_.push_back({handle, slot, change, distance});
+  }
+  void cross_found() {
+    for (const Found& each : found_) cross(each.fence, each.slot, each.change, each.distance);
+    found_.clear();
+  }
+
+  // Decides for the fences that cover a zone, and for those that are not near it.
+  void decide_covering(std::uint32_t slot, const Zone& zone) {
+    const auto is_near = [&](std::uint32_t handle) { return zone.covered_by(handle) || !zone.run_of(handle).empty(); };
+    for (const std::uint32_t handle : members_.of(subjects_[slot].inside))
+      if (!is_near(handle) && !fences_[handle]->own) find(handle, slot, -1);
+    for (const std::uint32_t handle : zone.covering)
+      if (!members_.has(subjects_[slot].inside, handle)) find(handle, slot, +1);
+  }
+
+  // Decides for the fence of these pieces of a zone, by the way to p from another point of the zone, where it is known
+  // whether that is inside.
+  bool holds(std::span<const Piece> run, Point from, bool inside, Point p, bool was) const {
+    const std::optional<bool> after = run[0].simple ? inside_after(run, from, inside, p) : std::nullopt;
+    if (after && (*after || !run[0].wide || !was)) return *after;
+    const Area& area = *fences_[run[0].fence]->area;
+    const int where = after ? -1 : area.where(p);
+    if (where >= (area.closed ? 0 : 1)) return true;
+    if (!was || area.margin == 0) return false;
+    if (where == 0) return true;
+    if (area.kind == Area::Kind::DISK) return compare_distance(p, area.center, area.radius, area.margin) <= 0;
+    return std::any_of(run.begin(), run.end(), [&](const Piece& piece) {
+      return compare_distance(p, nearest_part(p, piece.edge), area.margin) <= 0;
+    });
+  }
+
+  // Reports the fences that a subject has passed through: it was outside, is outside, and the way meets the area.
+  void decide_ways(const Change& change, Point now) {
+    ways_.clear();
+    const std::uint32_t slot = change.slot;
+    const auto collect = [&](Point from) {
+      std::vector<std::uint32_t> ids(1, 0);
+      const Strip way = {{from, now}, 0, -1};
+      zones_.descend(
+          ids, [&](std::uint32_t) { return way; }, [](Point) { return false; },
+          [&](std::uint32_t number, std::span<const std::uint32_t>) {
+            for (const std::uint32_t handle : zones_[number].covering) ways_.push_back(handle);
+            for (const Piece& piece : zones_[number].pieces) ways_.push_back(piece.fence);
+          });
+    };
+    if ((!change.fresh || change.carried) && !(change.before == now)) collect(change.before);
+    for (const std::uint32_t handle : recent_) {  // a place at the time when a fence was set
+      const Fence* const fence = fences_[handle].get();
+      if (fence == nullptr || !fence->cross || !fence->earlier) continue;
+      const std::optional<Point> from = start(*fence, slot);
+      if (from && !(*from == now) && !(*from == change.before)) collect(*from);
+    }
+    std::sort(ways_.begin(), ways_.end());
+    ways_.erase(std::unique(ways_.begin(), ways_.end()), ways_.end());
+    for (const std::uint32_t handle : ways_) {
+      const Fence& fence = *fences_[handle];
+      if (!fence.cross || members_.has(subjects_[slot].inside, handle) || just_left(handle)) continue;
+      const std::optional<Point> from = start(fence, slot);
+      if (from && !(*from == now) && fence.area->meets(*from, now)) cross(handle, slot, 0);
+    }
+  }
+  bool just_left(std::uint32_t handle) const {
+    return std::find(former_.begin(), former_.end(), handle) != former_.end();
+  }
+
+  // Where a subject was before, or when the fence was set; nothing if it was not there.
+  std::optional<Point> start(const Fence& fence, std::uint32_t slot) const {
+    if (fence.earlier)
+      if (const auto entry = fence.earlier->find(key_of(slot)); entry != fence.earlier->end()) return entry->second;
+    const Change* const change = change_of(slot);
+    if (change == nullptr) return (*slots_)[slot].place;
+    return change->fresh && (!change->carried || fence.own) ? std::nullopt : std::optional(change->before);
+  }
+
+  void decide_waiting() {
+    for (; !waiting_.empty(); waiting_.pop_back()) {
+      const std::uint32_t number = waiting_.back();
+      const Zone& zone = zones_[number];
+      for (const std::uint32_t handle : zone.pending) {
+        const bool covers = zone.covered_by(handle);
+        const std::span<const Piece> run = zone.run_of(handle);
+        for (std::size_t at = 0; at < zone.subjects.size(); ++at) {
+          if (at + LOOKAHEAD < zone.subjects.size()) {
+            prefetch(&(*slots_)[zone.subjects[at + LOOKAHEAD]]);
+            prefetch(&subjects_[zone.subjects[at + LOOKAHEAD]]);
+          }
+          const std::uint32_t slot = zone.subjects[at];
+          const bool was = members_.has(subjects_[slot].inside, handle);
+          const bool now =
+              covers || (!run.empty() && holds(run, zone.anchor(), run[0].inside, (*slots_)[slot].place, was));
+          if (now != was) cross(handle, slot, now ? +1 : -1);
+        }
+      }
+      zones_[number].pending.clear();
+    }
+  }
+
+  // Reports a crossing and notes the new state.
+  void cross(std::uint32_t handle, std::uint32_t slot, int change, std::optional<double> distance = {}) {
+    Fence& fence = *fences_[handle];
+    const Change* const moved = change_of(slot);
+    Crossing row{};
+    row.fence = fence.number;
+    row.now = (*slots_)[slot].place;
+    row.before = moved ? place_before(fence, *moved) : row.now;
+    row.change = static_cast<std::int8_t>(change);
+    if (moved && moved->carried && !fence.own)
+      row.cause = MOVED;
+    else if (moved && moved->fresh)
+      row.cause = APPEARED;
+    else if (!(row.before == row.now))
+      row.cause = MOVED;
+    else
+      row.cause = 0;
+    if (changed(fence) || row.cause == 0) row.cause |= AREA;
+    row.distance = distance ? *distance : change > 0 ? 0 : fence.area->distance_to_boundary(row.now);
+    append_key(taken_, slot, row);
+    try {
+      if (change != 0 && (change > 0) != fence.own)
+        members_.add(subjects_[slot].inside, handle);
+      else if (change != 0)
+        members_.remove(subjects_[slot].inside, handle);
+    } catch (...) {
+      taken_.rows.pop_back();
+      throw;
+    }
+    fence.count += change;
+  }
+
+  // Reports who was inside as a subject of another index, and is inside.
+  void report_carried() {
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+      const Change& change = changes_[i];
+      if (!change.carried || !current(i)) continue;
+      for (const std::uint32_t handle : members_.of(subjects_[change.slot].inside)) {
+        const Fence& fence = *fences_[handle];
+        if (fence.own || (fence.earlier && fence.earlier->contains(key_of(change.slot)))) continue;
+        Crossing row{};
+        row.fence = fence.number;
+        row.now = (*slots_)[change.slot].place;
+        row.before = change.before;
+        row.distance = fence.area->distance(row.now);
+        row.change = 2;
+        row.cause = static_cast<std::uint8_t>(MOVED | (changed(fence) ? AREA : 0));
+        append_key(taken_, change.slot, row);
+      }
+    }
+  }
+
+  void report_gone() {
+    for (Gone& gone : gone_) {
+      if (gone.done) continue;
+      for (const std::uint32_t handle : owners_)
+        if (was_inside(handle, gone)) {
+          members_.add(gone.inside, handle);
+          try {
+            leave(handle, gone);
+          } catch (...) {
+            members_.remove(gone.inside, handle);
+            throw;
+          }
+        }
+      former_.assign(members_.of(gone.inside).begin(), members_.of(gone.inside).end());
+      for (const std::uint32_t handle : former_) {
+        if (fences_[handle]->own) continue;
+        leave(handle, gone);
+        members_.remove(gone.inside, handle);
+      }
+      gone.done = true;
+    }
+  }
+  void leave(std::uint32_t handle, const Gone& gone) {
+    Fence& fence = *fences_[handle];
+    Crossing row{};
+    row.fence = fence.number;
+    row.now = NOWHERE;
+    row.before = place_before(fence, gone);
+    row.distance = NO_TIME;
+    row.change = -1;
+    row.cause = static_cast<std::uint8_t>(gone.cause | (changed(fence) ? AREA : 0));
+    append_key(taken_, gone, row);
+    --fence.count;
+  }
+
+  std::size_t crossable_ = 0;  // fences that report who passes through, other than those around the own hull
+  Crossings taken_;
+  std::vector<Found> found_;
+  std::vector<std::uint32_t> ways_;
+};
+
+}  // namespace dynhull
