@@ -1,5 +1,6 @@
 """Fences on the dashboard, in a real browser, on a real server."""
 
+import asyncio
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -13,7 +14,8 @@ from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 from proxy import proxy
 from server_process import Server, run, server_process
 
-from dynhull_client import Circle, HullClient, Polygon
+from dynhull_client import AsyncHullClient, Circle, HullClient, Polygon
+from dynhull_dashboard.fence_feed import FenceFeed
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 YARD = Polygon([[0, 0], [10, 0], [10, 10], [0, 10]], ([[4, 4], [6, 4], [6, 6], [4, 6]],))
@@ -204,6 +206,35 @@ def test_a_hull_brings_its_fences(browser: Browser, url: str, fleet: str, yard: 
         wait_for_inside(page, yard, {"in": [1, 2]})
         let_go(page, yard)
         expect(table_row(page, yard)).to_have_count(0)
+
+
+def test_a_fence_that_is_created_again_around_hulls_with_another_centre(client: HullClient, name: str) -> None:
+    zone = [[179, -18], [181, -18], [181, -16], [179, -16]]
+
+    def create(center: tuple[float, float]) -> None:
+        client.create_hull(name, keyed="str", geographic=True, center=center)
+        client.create_fence(name, area=zone, subjects=name)
+
+    async def centers() -> list[object]:
+        async with AsyncHullClient(client.address) as source:
+            create((179, -17))
+            feed = FenceFeed(source, name)
+            found = []
+            try:
+                for center in ((179, -17), (-179, -17)):
+                    async with asyncio.timeout(PATIENCE):
+                        while feed.marks.center != center:
+                            await asyncio.sleep(0.05)
+                    found.append(feed.area.message)
+                    client.delete_fence(name)
+                    client.delete_hull(name)
+                    create((-179, -17))  # with the same settings
+            finally:
+                await feed.close()
+            return found
+
+    before, after = asyncio.run(centers())
+    assert before != after
 
 
 def test_the_fences_in_words(browser: Browser, url: str, client: HullClient, fleet: str, yard: str) -> None:

@@ -159,5 +159,5 @@ class FenceFeed:
 
 
 def _drawn(fence: Fence) -> tuple[object, ...]:
-    """The settings that the picture shows."""
-    return fence.area, fence.other_hull, fence.margin, fence.near
+    """What the picture shows: settings, and the centre of the hulls, which stays as long as the fence."""
+    return fence.uid, fence.area, fence.other_hull, fence.margin, fence.near

@@ -99,21 +99,8 @@ def create_fence(
             others, or without `exist_ok`.
         timeout: seconds, instead of the client's.
     """
-    config = _config(
-        area,
-        subjects,
-        other_hull,
-        boundary,
-        margin,
-        crosses,
-        dwell,
-        confirmations,
-        min_dwell,
-        near,
-        without_self,
-        max_events,
-        max_event_age,
-    )
+    given = locals()
+    config = _config(area, subjects, given)
     config.initial = choice("initial", initial, INITIALS)
     create: Call[Fence] = Call(
         "CreateFence",
@@ -157,22 +144,8 @@ def replace_fence(
     Subjects that are inside of one area and outside of the other make events with the cause "fence_changed". The same
     settings again make none.
     """
-    config = _config(
-        area,
-        subjects,
-        other_hull,
-        boundary,
-        margin,
-        crosses,
-        dwell,
-        confirmations,
-        min_dwell,
-        near,
-        without_self,
-        max_events,
-        max_event_age,
-    )
-    request = pb.ReplaceFenceRequest(name=name, config=config)
+    given = locals()
+    request = pb.ReplaceFenceRequest(name=name, config=_config(area, subjects, given))
     return Call("ReplaceFence", request, lambda response: decode_fence(response.fence), timeout)
 
 
@@ -281,35 +254,23 @@ def watch_fence(
     return WatchingFence(request, reconnect, timeout)
 
 
-def _config(
-    area: Any,
-    subjects: str | Prefix | None,
-    other_hull: str | None,
-    boundary: Boundary,
-    margin: float,
-    crosses: bool,
-    dwell: float | timedelta | None,
-    confirmations: int,
-    min_dwell: float | timedelta | None,
-    near: float,
-    without_self: bool,
-    max_events: int,
-    max_event_age: float | timedelta | None,
-) -> fence_pb2.FenceConfig:
+def _config(area: Any, subjects: str | Prefix | None, given: dict[str, Any]) -> fence_pb2.FenceConfig:
+    """The settings of a fence, given the arguments of the call by name: `create_fence` says what each of them is."""
+    other_hull: str | None = given["other_hull"]
     if (subjects is None) == (other_hull is None):
         raise ValueError("give either subjects or other_hull")
     config = fence_pb2.FenceConfig(
-        boundary=choice("boundary", boundary, BOUNDARIES),
-        margin=as_coordinate(margin, "margin"),
-        near_distance=as_coordinate(near, "near"),
-        report_crosses=crosses,
-        confirmations=0 if confirmations == 1 else confirmations,
-        max_events=max_events,
-        dwell=_span(dwell, "dwell"),
-        min_dwell=_span(min_dwell, "min_dwell"),
-        max_event_age=_span(max_event_age, "max_event_age"),
+        boundary=choice("boundary", given["boundary"], BOUNDARIES),
+        margin=as_coordinate(given["margin"], "margin"),
+        near_distance=as_coordinate(given["near"], "near"),
+        report_crosses=given["crosses"],
+        confirmations=0 if given["confirmations"] == 1 else given["confirmations"],
+        max_events=given["max_events"],
+        dwell=_span(given["dwell"], "dwell"),
+        min_dwell=_span(given["min_dwell"], "min_dwell"),
+        max_event_age=_span(given["max_event_age"], "max_event_age"),
     )
-    encode_area(as_area(area), without_self, config)
+    encode_area(as_area(area), given["without_self"], config)
     if isinstance(subjects, Prefix):
         config.subject_prefix = subjects.text
     elif subjects is not None:

@@ -1,6 +1,9 @@
 """`dynhull fences create` and `dynhull fences replace`."""
 
+import inspect
+from collections.abc import Callable
 from enum import StrEnum
+from functools import wraps
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -71,113 +74,25 @@ MaxEvents = Annotated[int, typer.Option(help="Number of events to keep; 0 for th
 MaxEventAge = Annotated[str | None, typer.Option(help="How long events are kept: 12h or 7d. Default: no limit.")]
 
 
-@connected
-def create(
-    client: "HullClient",
-    name: FenceName,
-    area: Area = None,
-    polygon: PolygonText = None,
-    circle: CircleNumbers = None,
-    subjects: Subjects = None,
-    subject_prefix: SubjectPrefix = None,
-    other_hull: OtherHull = None,
-    boundary: Boundary = BoundaryKind.CLOSED,
-    margin: Margin = 0.0,
-    initial: Annotated[
-        InitialKind, typer.Option(help="Report those who are inside at first in one event, in an enter each, or not.")
-    ] = InitialKind.SNAPSHOT,
-    crosses: Crosses = False,
-    dwell: Dwell = None,
-    confirmations: Confirmations = 0,
-    min_dwell: MinDwell = None,
-    near: Near = 0.0,
-    without_self: WithoutSelf = False,
-    max_events: MaxEvents = 0,
-    max_event_age: MaxEventAge = None,
-    exist_ok: Annotated[
-        bool, typer.Option("--exist-ok", help="Accept a fence that exists already with the same settings.")
-    ] = False,
-    as_json: AsJson = False,
-) -> None:
-    """Create a fence: it reports which subjects enter and leave an area, whichever side moves.
-
-        dynhull fences create depot --polygon 'POLYGON ((0 0, 4 0, 4 3, 0 0))' --subjects vehicles
-        dynhull fences create pack --area wolves --subjects sheep --margin 0.5
-
-    The area is a hull, polygons or a disk; the subjects are the keys of a hull, or of all hulls with a prefix. Whether
-    a subject is inside is exact.
-    """
-    from dynhull_client import FenceExistsError
-
-    chosen = _settings(
-        area, polygon, circle, subjects, subject_prefix, other_hull, boundary, margin, crosses, dwell, confirmations,
-        min_dwell, near, without_self, max_events, max_event_age,
-    )  # fmt: skip
-    created = True
-    try:
-        fence = client.create_fence(name, **chosen, initial=initial.value)
-    except FenceExistsError:
-        if not exist_ok:
-            raise
-        fence = client.create_fence(name, **chosen, initial=initial.value, exist_ok=True)  # refuses other settings
-        created = False
-    _print(fence, "created" if created else "exists", as_json)
-
-
-@connected
-def replace(
-    client: "HullClient",
-    name: FenceName,
-    area: Area = None,
-    polygon: PolygonText = None,
-    circle: CircleNumbers = None,
-    subjects: Subjects = None,
-    subject_prefix: SubjectPrefix = None,
-    other_hull: OtherHull = None,
-    boundary: Boundary = BoundaryKind.CLOSED,
-    margin: Margin = 0.0,
-    crosses: Crosses = False,
-    dwell: Dwell = None,
-    confirmations: Confirmations = 0,
-    min_dwell: MinDwell = None,
-    near: Near = 0.0,
-    without_self: WithoutSelf = False,
-    max_events: MaxEvents = 0,
-    max_event_age: MaxEventAge = None,
-    as_json: AsJson = False,
-) -> None:
-    """Replace the area and all settings of a fence. The subjects must stay the same.
-
-        dynhull fences replace depot --polygon depot.geojson --subjects vehicles
-
-    Subjects that are inside of one area and outside of the other enter or leave, with the cause fence_changed.
-    """
-    chosen = _settings(
-        area, polygon, circle, subjects, subject_prefix, other_hull, boundary, margin, crosses, dwell, confirmations,
-        min_dwell, near, without_self, max_events, max_event_age,
-    )  # fmt: skip
-    _print(client.replace_fence(name, **chosen), "replaced", as_json)
-
-
 def _settings(
-    area: str | None,
-    polygon: str | None,
-    circle: tuple[float, float, float] | None,
-    subjects: str | None,
-    subject_prefix: str | None,
-    other_hull: str | None,
-    boundary: BoundaryKind,
-    margin: float,
-    crosses: bool,
-    dwell: str | None,
-    confirmations: int,
-    min_dwell: str | None,
-    near: float,
-    without_self: bool,
-    max_events: int,
-    max_event_age: str | None,
+    area: Area = None,
+    polygon: PolygonText = None,
+    circle: CircleNumbers = None,
+    subjects: Subjects = None,
+    subject_prefix: SubjectPrefix = None,
+    other_hull: OtherHull = None,
+    boundary: Boundary = BoundaryKind.CLOSED,
+    margin: Margin = 0.0,
+    crosses: Crosses = False,
+    dwell: Dwell = None,
+    confirmations: Confirmations = 0,
+    min_dwell: MinDwell = None,
+    near: Near = 0.0,
+    without_self: WithoutSelf = False,
+    max_events: MaxEvents = 0,
+    max_event_age: MaxEventAge = None,
 ) -> dict[str, Any]:
-    """The arguments of the SDK; ValueError names the options that are missing or too many."""
+    """The arguments of the SDK for the options of both commands; ValueError names what is missing or too much."""
     from dynhull_client import Circle, Prefix
 
     from .areas import read_polygon
@@ -204,6 +119,67 @@ def _settings(
         "max_events": max_events,
         "max_event_age": duration(max_event_age, "--max-event-age"),
     }
+
+
+def _with_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """A command that has the options of `_settings` after its name; `command` receives what these return."""
+    table = inspect.signature(_settings).parameters
+
+    @wraps(command)
+    def run(client: "HullClient", name: str, **given: Any) -> None:
+        chosen = _settings(**{option: given.pop(option) for option in table})
+        command(client, name, chosen, **given)
+
+    client, name, _, *own = inspect.signature(command).parameters.values()
+    run.__signature__ = inspect.Signature([client, name, *table.values(), *own])  # type: ignore[attr-defined]
+    return run
+
+
+@connected
+@_with_settings
+def create(
+    client: "HullClient",
+    name: FenceName,
+    chosen: dict[str, Any],
+    initial: Annotated[
+        InitialKind, typer.Option(help="Report those who are inside at first in one event, in an enter each, or not.")
+    ] = InitialKind.SNAPSHOT,
+    exist_ok: Annotated[
+        bool, typer.Option("--exist-ok", help="Accept a fence that exists already with the same settings.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Create a fence: it reports which subjects enter and leave an area, whichever side moves.
+
+        dynhull fences create depot --polygon 'POLYGON ((0 0, 4 0, 4 3, 0 0))' --subjects vehicles
+        dynhull fences create pack --area wolves --subjects sheep --margin 0.5
+
+    The area is a hull, polygons or a disk; the subjects are the keys of a hull, or of all hulls with a prefix. Whether
+    a subject is inside is exact.
+    """
+    from dynhull_client import FenceExistsError
+
+    created = True
+    try:
+        fence = client.create_fence(name, **chosen, initial=initial.value)
+    except FenceExistsError:
+        if not exist_ok:
+            raise
+        fence = client.create_fence(name, **chosen, initial=initial.value, exist_ok=True)  # refuses other settings
+        created = False
+    _print(fence, "created" if created else "exists", as_json)
+
+
+@connected
+@_with_settings
+def replace(client: "HullClient", name: FenceName, chosen: dict[str, Any], as_json: AsJson = False) -> None:
+    """Replace the area and all settings of a fence. The subjects must stay the same.
+
+        dynhull fences replace depot --polygon depot.geojson --subjects vehicles
+
+    Subjects that are inside of one area and outside of the other enter or leave, with the cause fence_changed.
+    """
+    _print(client.replace_fence(name, **chosen), "replaced", as_json)
 
 
 def _require_one(*options: tuple[str, Any]) -> None:
