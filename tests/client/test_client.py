@@ -369,3 +369,14 @@ def test_what_no_connection_can_have(connect: type[HullClient]) -> None:
 def test_a_revision_that_does_not_come(client: HullClient, hull: str) -> None:
     with pytest.raises(DeadlineError, match=f"longer than 0.1 s; hull '{hull}' may not have reached revision 7"):
         client.get_hull(hull, min_revision=7, timeout=0.1)
+
+
+def test_clients_with_other_tokens_share_a_connection(connect: type[HullClient], address: str, name: str) -> None:
+    with connect(address) as client:
+        other = client.with_token("another")
+        other.create_hull(name)
+        assert client.get_hull(name).revision == 0
+        with pytest.raises(ValueError, match="printable ASCII"):
+            client.with_token("a b")
+    with pytest.raises(DynhullError, match="closed"):
+        other.get_hull(name)

@@ -3,9 +3,11 @@
 import asyncio
 import time
 from collections.abc import Callable
+from copy import copy
 from functools import partial
+from threading import Event
 from types import SimpleNamespace
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import grpc
 
@@ -57,8 +59,6 @@ class Connection:
         retries: int,
     ) -> None:
         require_not_negative(timeout=timeout, retries=retries)
-        if token is not None and not (token.isascii() and token.isprintable() and " " not in token):
-            raise ValueError("token must consist of printable ASCII characters without spaces")
         self.address, encrypted = target(address)
         if tls is None and encrypted:
             tls = grpc.ssl_channel_credentials()
@@ -74,9 +74,8 @@ class Connection:
         self._timeout = timeout
         self.retries = retries
         self._wait_for_ready = wait_for_ready
-        self._closed = False
-        # Call credentials would do the same, but gRPC sends them over TLS only, which a local server does not need.
-        self._metadata = () if token is None else (("authorization", f"Bearer {token}"),)
+        self._closed = Event()  # shared with those of other tokens
+        self._metadata = _authorization(token)
         if tls is None:
             self._channel = self._grpc.insecure_channel(self.address, OPTIONS)
         else:
@@ -84,9 +83,16 @@ class Connection:
         stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
         self.stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
 
+    def with_token(self, token: str | None) -> Self:
+        """The same connection for a caller with another token; None for none."""
+        other = copy(self)
+        other._metadata = _authorization(token)
+        other.blocking = partial(self.blocking, token=token)
+        return other
+
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call: a method of the stub with a message, or with an iterator of messages."""
-        if self._closed:
+        if self._closed.is_set():
             raise DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
         return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
 
@@ -95,6 +101,18 @@ class Connection:
 
     def _attempts(self, call: Call[Any]) -> Attempts:
         return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
+
+
+def _authorization(token: str | None) -> tuple[tuple[str, str], ...]:
+    """The metadata of every call; ValueError for a token that metadata cannot have.
+
+    Call credentials would do the same, but gRPC sends them over TLS only, which a local server does not need.
+    """
+    if token is None:
+        return ()
+    if not (token.isascii() and token.isprintable() and " " not in token):
+        raise ValueError("token must consist of printable ASCII characters without spaces")
+    return (("authorization", f"Bearer {token}"),)
 
 
 class BlockingConnection(Connection):
@@ -115,7 +133,7 @@ class BlockingConnection(Connection):
 
     def close(self) -> None:
         """End the connection and the calls on it."""
-        self._closed = True
+        self._closed.set()
         self._channel.close()
 
 
@@ -137,5 +155,5 @@ class AsyncConnection(Connection):
 
     async def close(self) -> None:
         """End the connection and the calls on it."""
-        self._closed = True
+        self._closed.set()
         await self._channel.close()

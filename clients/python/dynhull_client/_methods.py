@@ -2,7 +2,8 @@
 
 import inspect
 from collections.abc import Callable
-from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
+from copy import copy
+from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 
 import grpc
 
@@ -50,6 +51,16 @@ class Client(Generic[AnyConnection]):
     def address(self) -> str:
         """The server's host:port."""
         return self._connection.address
+
+    def with_token(self, token: str | None) -> Self:
+        """A client on the same connection that sends another bearer token; None for none.
+
+        For programs that call on behalf of many: it costs nothing, and needs no `close` of its own. Closing one of the
+        clients closes the connection of all.
+        """
+        other = copy(self)
+        other._connection = self._connection.with_token(token)
+        return other
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.address!r})"
