@@ -27,7 +27,11 @@ from typing import NoReturn
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
 
 # What the commands import when they run.
-RUN_BY = {"serve": ["dynhull_server.process"], "dashboard": ["dynhull_client", "dynhull_dashboard.serve"]}
+RUN_BY = {
+    "serve": ["dynhull_server.process"],
+    "gateway": ["dynhull_client", "dynhull_gateway.serve"],
+    "dashboard": ["dynhull_client", "dynhull_dashboard.serve"],
+}
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 
 CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl

@@ -25,7 +25,7 @@ PANELS = {
     "Hulls and their points": ("list", "create", "recenter", "delete", "insert", "put", "remove", "load", "import"),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Fences": ("fences", "relay"),
-    "Server": ("serve", "config", "token", "dashboard", "bench"),
+    "Server": ("serve", "config", "token", "gateway", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export"),
     "Getting to know dynhull": ("demo", "explain"),
 }

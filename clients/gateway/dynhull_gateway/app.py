@@ -1,0 +1,81 @@
+"""The gateway as an application: what it answers to, and in which order."""
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.middleware.cors import CORSMiddleware
+
+import dynhull_client
+from dynhull_client import AsyncHullClient
+
+from . import fences, health, hulls, points, problems, questions, uploads
+from .bodies import LimitedBodies
+from .figures import Figures, Measured
+from .gathering import Gatherer
+from .paths import PathsAsSent
+from .problems import RESPONSES, Problem
+from .schemas import Batch
+from .settings import Settings
+
+DESCRIPTION = """Exact convex hulls of points that are inserted, moved and deleted.
+
+Every error is an `application/problem+json` (RFC 9457) that names the field, the position and the value at fault. A
+token of the server is sent as `Authorization: Bearer`. Numbers are doubles; there is null where a double is infinite or
+not a number. A slash in the name of a hull or a fence is written `%2F` in a path."""
+SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
+
+
+def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
+    """The application, in front of a server. The caller closes the client."""
+    app = FastAPI(
+        title="dynhull gateway",
+        version=dynhull_client.__version__,
+        description=DESCRIPTION,
+        docs_url=None,  # their pages load scripts from elsewhere
+        redoc_url=None,
+        responses=RESPONSES,
+        separate_input_output_schemas=False,
+        generate_unique_id_function=lambda route: route.name,
+    )
+    app.state.client = client
+    app.state.settings = settings
+    app.state.gatherer = Gatherer()
+    app.state.health = health.State()
+    app.state.figures = Figures()
+    routers = [module.router for module in (points, uploads, hulls, questions, fences, health)]
+    for router in routers:
+        app.include_router(router)
+    app.state.routes = [route for router in routers for route in router.routes]
+    app.openapi = lambda: description(app)  # type: ignore[method-assign]
+    problems.install(app)
+    app.add_middleware(LimitedBodies, settings=settings)
+    if settings.origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.origins,
+            allow_methods=["GET", "POST", "PUT", "DELETE"],
+            allow_headers=SEEN_BY_PAGES,
+            expose_headers=["Location", "Link", "Retry-After"],
+        )
+    app.add_middleware(Measured, figures=app.state.figures)
+    app.add_middleware(PathsAsSent)
+    return app
+
+
+def description(app: FastAPI) -> dict[str, Any]:
+    """The OpenAPI document: of what the routes declare, and what holds for all of them."""
+    if app.openapi_schema is None:
+        made = FastAPI.openapi(app)
+        schemas = made["components"]["schemas"]
+        for model in (Problem, Batch):
+            own = model.model_json_schema(ref_template="#/components/schemas/{model}")
+            schemas |= {**own.pop("$defs", {}), model.__name__: own}
+        for path in made["paths"].values():
+            for operation in path.values():
+                operation["responses"].pop("422", None)  # the framework's own; ours are 400
+                if "security" in operation:
+                    operation["security"].append({})  # a server without tokens needs none
+        for unused in ("HTTPValidationError", "ValidationError"):
+            schemas.pop(unused, None)
+        app.openapi_schema = made
+    return app.openapi_schema

@@ -1,0 +1,102 @@
+"""Limits on the bodies of requests: how large they may be, and how slowly they may arrive."""
+
+import asyncio
+from collections.abc import Iterable
+from email.message import Message
+from http import HTTPStatus
+
+from starlette.requests import Request
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Message as Event
+
+from .problems import ProblemError, problem
+from .settings import Settings
+
+WHOLE = (b"", b"application/json", b"application/geo+json")
+
+
+def require_type(request: Request, types: Iterable[str]) -> str:
+    """The media type of a body; ProblemError if it is none of these, or not in UTF-8."""
+    given = request.headers.get("content-type", "")
+    message = Message()
+    message["content-type"] = given
+    if given.strip() and message.get_content_type() in types:
+        charset = message.get_content_charset("utf-8")
+        if charset in ("utf-8", "utf8", "us-ascii"):
+            return message.get_content_type()
+        detail = f"the body is {charset}: it must be UTF-8"
+    else:
+        detail = f"the body is {given or 'of no type'}: Content-Type must be {' or '.join(types)}"
+    raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, detail, "MEDIA_TYPE", field="Content-Type", value=given)
+
+
+class LimitedBodies:
+    """Refuses bodies that are too large, and gives up on those that do not arrive."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self._app = app
+        self._settings = settings
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, with a body that has limits."""
+        if scope["type"] != "http" or scope["method"] in ("GET", "HEAD", "OPTIONS"):
+            await self._app(scope, receive, send)
+            return
+        headers = dict(scope["headers"])
+        encoding = headers.get(b"content-encoding", b"identity").strip().lower()
+        if encoding != b"identity":
+            refused = problem(
+                HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+                "the body must not be compressed",
+                reason="CONTENT_ENCODING",
+                field="Content-Encoding",
+                value=encoding.decode("latin-1"),
+            )
+            await refused(scope, receive, send)
+            return
+        whole = headers.get(b"content-type", b"").partition(b";")[0].strip().lower() in WHOLE
+        limit = self._settings.max_body if whole else self._settings.max_upload
+        if int(headers.get(b"content-length", b"0")) > limit:
+            await _too_large(limit)(scope, receive, send)
+            return
+        body = _Body(receive, limit, self._settings.body_seconds, whole=whole)
+        await self._app(scope, body.receive, send)
+
+
+class _Body:
+    """A body on its way."""
+
+    def __init__(self, receive: Receive, limit: int, seconds: float, *, whole: bool) -> None:
+        self._receive = receive
+        self._left = limit
+        self._limit = limit
+        self._seconds = seconds
+        self._deadline = asyncio.get_running_loop().time() + seconds if whole else None
+        self._complete = False
+
+    async def receive(self) -> Event:
+        """The next part; ProblemError if it is too much or too late."""
+        if self._complete:  # what is awaited now is the end of the connection
+            return await self._receive()
+        now = asyncio.get_running_loop().time()
+        try:
+            async with asyncio.timeout_at(now + self._seconds if self._deadline is None else self._deadline):
+                message = await self._receive()
+        except TimeoutError:
+            detail = f"no more of the body within {self._seconds:g} s"
+            raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, detail, "BODY_TOO_SLOW") from None
+        self._complete = not message.get("more_body", False)
+        self._left -= len(message.get("body", b""))
+        if self._left < 0:
+            raise ProblemError(
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _detail(self._limit), "BODY_TOO_LARGE", value=str(self._limit)
+            )
+        return message
+
+
+def _detail(limit: int) -> str:
+    return f"the body is larger than {limit} bytes"
+
+
+def _too_large(limit: int) -> ASGIApp:
+    return problem(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _detail(limit), reason="BODY_TOO_LARGE", value=str(limit))

@@ -1,0 +1,44 @@
+"""Who calls: the token of a request is passed on to the server."""
+
+from http import HTTPStatus
+from typing import Annotated
+
+from fastapi import Depends, Request
+from fastapi.security import HTTPBearer
+
+from dynhull_client import AsyncHullClient
+
+from .problems import ProblemError
+
+SCHEME = "bearer "
+
+described = HTTPBearer(auto_error=False, description="A token of the server (`dynhull token`), passed on as it is.")
+
+
+def token_of(request: Request) -> str | None:
+    """The bearer token of a request; None without."""
+    given = request.headers.get("authorization")
+    if given is None:
+        return None
+    if given[: len(SCHEME)].lower() != SCHEME:
+        raise ProblemError(HTTPStatus.UNAUTHORIZED, "Authorization must be Bearer and a token", "UNAUTHENTICATED")
+    return given[len(SCHEME) :].strip()
+
+
+def client_of(request: Request) -> AsyncHullClient:
+    """The client that calls with the token of the request, or with the gateway's own if it has none."""
+    client: AsyncHullClient = request.app.state.client
+    token = token_of(request)
+    if token is None:
+        return client
+    try:
+        return client.with_token(token)
+    except ValueError as error:
+        raise ProblemError(HTTPStatus.UNAUTHORIZED, str(error), "UNAUTHENTICATED") from None
+
+
+async def _caller(request: Request, _: Annotated[object, Depends(described)]) -> AsyncHullClient:
+    return client_of(request)
+
+
+Caller = Annotated[AsyncHullClient, Depends(_caller)]

@@ -1,0 +1,92 @@
+"""`dynhull gateway`."""
+
+from typing import Annotated
+
+import typer
+
+from dynhull_cli.connected import Connect, connecting
+from dynhull_cli.durations import duration
+
+MIB = 2**20
+
+
+@connecting
+def gateway(
+    connect: Connect,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = 8080,
+    origin: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Origin such as https://HOST whose pages may use the gateway from browsers (CORS); * for all. May be "
+            "repeated. Without, no other origin may."
+        ),
+    ] = None,
+    root_path: Annotated[
+        str, typer.Option(help="Path below which a proxy shows the gateway to the world, such as /dynhull.")
+    ] = "",
+    forwarded_from: Annotated[
+        str,
+        typer.Option(
+            help="Addresses of proxies, with commas between, whose X-Forwarded-For and X-Forwarded-Proto are believed."
+        ),
+    ] = "127.0.0.1",
+    timeout: Annotated[str, typer.Option(help="How long the server may take to answer a request.")] = "30s",
+    max_body: Annotated[
+        int, typer.Option(min=1, help="Largest body of JSON or GeoJSON, in MiB. Bodies of rows are not held in memory.")
+    ] = 16,
+    max_upload: Annotated[int, typer.Option(min=1, help="Largest body of rows, in MiB.")] = 1024,
+    body_timeout: Annotated[str, typer.Option(help="How long a body may pause; 408 after that.")] = "30s",
+    keepalive: Annotated[
+        str, typer.Option(help="Pause after which a stream of events sends a comment, for the sake of proxies.")
+    ] = "15s",
+    max_streams: Annotated[int, typer.Option(min=0, help="Most streams of events at a time; 503 for more.")] = 10_000,
+    grace: Annotated[str, typer.Option(help="How long requests may still take after SIGTERM.")] = "10s",
+    metrics_port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port of the metrics page; 0 for a free one.")
+    ] = None,
+    metrics_host: Annotated[str, typer.Option(help="Address of the metrics page.")] = "127.0.0.1",
+) -> None:
+    """Serve hulls and fences over HTTP: JSON, server-sent events, and OGC API Features for maps.
+
+    The first line printed is "dynhull gateway on http://HOST:PORT". With it running:
+
+        curl http://127.0.0.1:8080/hulls -H 'Content-Type: application/json' -d '{"name": "fleet"}'
+        curl http://127.0.0.1:8080/hulls/fleet/points -H 'Content-Type: application/json' -d '[[0, 0], [4, 0], [2, 3]]'
+        curl http://127.0.0.1:8080/hulls/fleet
+        curl -N http://127.0.0.1:8080/hulls/fleet/events
+        ogrinfo OAPIF:http://127.0.0.1:8080
+
+    /openapi.json describes every call. Callers' tokens (Authorization: Bearer) are passed on to the server. A request
+    without one is made with the token of the gateway, --token, if it has one: anyone who can reach the gateway may then
+    do what that token may do.
+
+    Any number of gateways may serve the same server: they hold nothing. Behind a proxy, see --root-path and
+    --forwarded-from.
+    """
+    from dynhull_client import AsyncHullClient
+
+    from .serve import run
+    from .settings import Settings
+
+    settings = Settings(
+        origins=tuple(origin or ()),
+        max_body=max_body * MIB,
+        max_upload=max_upload * MIB,
+        body_seconds=_seconds(body_timeout, "--body-timeout"),
+        keepalive_seconds=_seconds(keepalive, "--keepalive"),
+        max_streams=max_streams,
+        grace_seconds=_seconds(grace, "--grace"),
+        root_path=root_path.rstrip("/"),
+        forwarded_from=forwarded_from,
+        metrics=None if metrics_port is None else (metrics_host, metrics_port),
+    )
+    limit = _seconds(timeout, "--timeout")
+    run(lambda: connect(AsyncHullClient, timeout=limit), host, port, settings)
+
+
+def _seconds(text: str, option: str) -> float:
+    span = duration(text, option)
+    if span is None or span.total_seconds() <= 0:
+        raise ValueError(f"{option} {text!r} must be more than 0")
+    return span.total_seconds()

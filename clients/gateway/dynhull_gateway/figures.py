@@ -1,0 +1,68 @@
+"""The metrics of a gateway, as a page for Prometheus."""
+
+from time import perf_counter
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, start_http_server
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+UNKNOWN = "unknown"
+
+
+class Figures:
+    """Counts of what the gateway has answered, and what it is doing."""
+
+    def __init__(self) -> None:
+        self._registry = registry = CollectorRegistry()
+        route = ["method", "route"]
+        self.requests = Counter(
+            "dynhull_gateway_requests", "Requests that were answered.", [*route, "status"], registry=registry
+        )
+        self.seconds = Histogram(
+            "dynhull_gateway_request_seconds",
+            "Time from a request to the end of its answer; streams of events are left out.",
+            route,
+            registry=registry,
+        )
+        self.rows = Counter("dynhull_gateway_rows", "Rows of bodies that were applied.", registry=registry)
+        self.streams = Gauge("dynhull_gateway_streams", "Streams of events that are open.", registry=registry)
+        self.events = Counter("dynhull_gateway_events", "Events that were sent.", registry=registry)
+        self.skipped = Counter(
+            "dynhull_gateway_snapshots_for_slow_readers",
+            "Snapshots sent in place of changes that a reader was too slow for.",
+            registry=registry,
+        )
+
+    def serve(self, host: str, port: int) -> int:
+        """Serve the page from another thread, and return its port."""
+        server, _ = start_http_server(port, host, self._registry)
+        return int(server.server_port)
+
+
+class Measured:
+    """Counts requests by route, method and status."""
+
+    def __init__(self, app: ASGIApp, figures: Figures) -> None:
+        self._app = app
+        self._figures = figures
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, and count its answer."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        begun, status, streamed = perf_counter(), 0, False
+
+        async def noting(message: Message) -> None:
+            nonlocal status, streamed
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                streamed = (b"content-type", b"text/event-stream; charset=utf-8") in message["headers"]
+            await send(message)
+
+        try:
+            await self._app(scope, receive, noting)
+        finally:
+            route = getattr(scope.get("route"), "path", UNKNOWN)
+            self._figures.requests.labels(scope["method"], route, status).inc()
+            if not streamed:
+                self._figures.seconds.labels(scope["method"], route).observe(perf_counter() - begun)

@@ -1,0 +1,134 @@
+"""Questions about a hull."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+
+from . import schemas
+from .callers import Caller
+from .schemas import HullPath, MinRevision, Name
+
+router = APIRouter(prefix="/hulls/{name}", tags=["questions"])
+Other = Annotated[Name, Query(description="The other hull.")]
+SampleSize = Annotated[int, Query(ge=1, le=100_000, description="The most points.")]
+WithKeys = Annotated[bool, Query(description="Whether to name the points, in a keyed hull.")]
+OtherRevision = Annotated[int, Query(ge=0, le=schemas.LARGEST, description="A revision of the other hull to wait for.")]
+
+
+def _about(question: schemas.AboutPointsOrKeys) -> dict[str, Any]:
+    about = question.arguments()
+    return {"xy": about.pop("points"), **about, "keys_of": question.keys_of or ""}
+
+
+@router.post("/locate")
+async def locate(
+    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, min_revision: MinRevision = 0
+) -> schemas.Located:
+    """The side of each point or key: inside, on the boundary or outside. Exact."""
+    answer = await client.locate(name, **_about(question), min_revision=min_revision)
+    return schemas.Located.model_validate(answer)
+
+
+@router.post("/distance")
+async def distance(
+    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, min_revision: MinRevision = 0
+) -> schemas.Distances:
+    """The distance of each point or key to the hull; of a geographic hull in metres."""
+    answer = await client.distance(name, **_about(question), min_revision=min_revision)
+    return schemas.Distances.model_validate(answer)
+
+
+@router.post("/count")
+async def count(
+    client: Caller, name: HullPath, question: schemas.AboutPoints, min_revision: MinRevision = 0
+) -> schemas.Counted:
+    """How often the hull holds each point."""
+    return schemas.Counted.model_validate(await client.count(name, question.points, min_revision=min_revision))
+
+
+@router.post("/support")
+async def support(
+    client: Caller, name: HullPath, question: schemas.Directions, min_revision: MinRevision = 0
+) -> schemas.Supported:
+    """The extreme vertex in each direction. Exact."""
+    answer = await client.support(name, question.directions, keys=question.keys, min_revision=min_revision)
+    return schemas.Supported.model_validate(answer)
+
+
+@router.post("/tangents")
+async def tangents(
+    client: Caller, name: HullPath, question: schemas.AboutPoints, min_revision: MinRevision = 0
+) -> schemas.Tangents:
+    """The tangent points seen from each point. Exact."""
+    return schemas.Tangents.model_validate(await client.tangents(name, question.points, min_revision=min_revision))
+
+
+@router.post("/intersect-lines")
+async def intersect_lines(
+    client: Caller, name: HullPath, question: schemas.Lines, min_revision: MinRevision = 0
+) -> schemas.Crossings:
+    """Where each line enters and leaves the hull."""
+    answer = await client.intersect_lines(name, question.origins, question.targets, min_revision=min_revision)
+    return schemas.Crossings.model_validate(answer)
+
+
+@router.post("/positions")
+async def positions(
+    client: Caller, name: HullPath, question: schemas.AboutKeys, min_revision: MinRevision = 0
+) -> schemas.Positions:
+    """The positions of keys."""
+    return schemas.Positions.model_validate(await client.positions(name, question.keys, min_revision=min_revision))
+
+
+@router.get("/entities")
+async def entities(client: Caller, name: HullPath, min_revision: MinRevision = 0) -> schemas.Entities:
+    """All keys of a keyed hull with their positions, at one revision."""
+    return schemas.Entities.model_validate(await client.entities(name, min_revision=min_revision))
+
+
+@router.get("/sample")
+async def sample_points(
+    client: Caller, name: HullPath, size: SampleSize = 1000, keys: WithKeys = False, min_revision: MinRevision = 0
+) -> schemas.Sampled:
+    """A sample of the points, for drawing."""
+    answer = await client.sample_points(name, size, keys=keys, min_revision=min_revision)
+    return schemas.Sampled.model_validate(answer)
+
+
+@router.get("/measures")
+async def get_measures(client: Caller, name: HullPath, min_revision: MinRevision = 0) -> schemas.AllMeasures:
+    """All measures: also diameter, width, smallest boxes and smallest circle."""
+    return schemas.AllMeasures.model_validate(await client.get_measures(name, min_revision=min_revision))
+
+
+@router.get("/verification")
+async def verify(client: Caller, name: HullPath, min_revision: MinRevision = 0) -> schemas.Verification:
+    """Compare the live hull with one that Chan's algorithm computes from the stored points."""
+    return schemas.Verification.model_validate(await client.verify(name, min_revision=min_revision))
+
+
+@router.get("/separation")
+async def separate(
+    client: Caller, name: HullPath, other: Other, min_revision: MinRevision = 0, other_min_revision: OtherRevision = 0
+) -> schemas.Separation:
+    """The distance of two hulls, or the depth of their overlap."""
+    answer = await client.separate(name, other, min_revision=min_revision, other_min_revision=other_min_revision)
+    return schemas.Separation.model_validate(answer)
+
+
+@router.post("/phase-diagram")
+async def phase_diagram(
+    client: Caller, name: HullPath, question: schemas.Entries, min_revision: MinRevision = 0
+) -> schemas.Phases:
+    """The hull as a binary phase diagram: its points are compositions from 0 to 1 and energies."""
+    answer = await client.phase_diagram(name, question.entries, min_revision=min_revision)
+    return schemas.Phases.model_validate(answer)
+
+
+@router.post("/frontier")
+async def frontier(
+    client: Caller, name: HullPath, question: schemas.FrontierQuestion, min_revision: MinRevision = 0
+) -> schemas.Efficient:
+    """The hull as an efficient frontier: its points are risks and returns."""
+    answer = await client.frontier(name, question.points, question.rates, min_revision=min_revision)
+    return schemas.Efficient.model_validate(answer)

@@ -1,0 +1,649 @@
+"""What requests and responses look like: these declarations validate, convert and document.
+
+Numbers are read as the nearest double, as in every JSON; there is no number where a double is infinite or not a number.
+"""
+
+from datetime import datetime, timedelta
+from typing import Annotated, Any, Literal
+from urllib.parse import unquote
+
+import numpy as np
+from fastapi import Header, Path, Query
+from pydantic import (
+    AwareDatetime,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictStr,
+    StringConstraints,
+    model_validator,
+)
+
+NAME = r"^[A-Za-z0-9._/-]{1,200}$"
+NAMES = "1 to 200 letters a to z and A to Z, digits and ._-/; a slash in a path is written %2F"
+LARGEST = 2**64 - 1
+
+
+def unquoted(value: Any) -> Any:
+    """A segment of a path, which is matched as it was sent."""
+    return unquote(value, errors="replace") if isinstance(value, str) else value
+
+
+def _rows(value: Any) -> Any:
+    """An array as lists; None for what is not finite."""
+    if not isinstance(value, np.ndarray):
+        return value
+    return value.tolist() if np.isfinite(value).all() else np.where(np.isfinite(value), value, np.array(None)).tolist()
+
+
+def _listed(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _times(value: Any) -> Any:
+    if not isinstance(value, np.ndarray):
+        return value
+    return [None if np.isnat(each) else f"{each}Z" for each in value]
+
+
+def _seconds(value: Any) -> Any:
+    return value.total_seconds() if isinstance(value, timedelta) else value
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _not_a_number(value: Any) -> Any:
+    if isinstance(value, int | float):
+        raise ValueError("must be a time such as 2026-01-31T12:00:00Z")  # pydantic reports ValueErrors
+    return value
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, ge=0, le=LARGEST)]
+Name = Annotated[str, Field(strict=True, pattern=NAME, description=NAMES, examples=["fleet"])]
+Key = (
+    Annotated[str, Field(strict=True, min_length=1, max_length=255)]
+    | Annotated[int, Field(strict=True, ge=0, le=LARGEST)]
+)
+Time = Annotated[AwareDatetime, BeforeValidator(_not_a_number)]
+Seconds = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
+# Pairs are lists of two: their JSON schema, unlike that of tuples, is the same in every draft.
+Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Points = list[Point]
+
+Finite = Annotated[float | None, BeforeValidator(_finite)]
+Place = Annotated[list[Finite], Field(min_length=2, max_length=2), BeforeValidator(_listed)]
+Rows = Annotated[list[Place], BeforeValidator(_rows)]
+Pairs = Annotated[list[Annotated[list[Place], Field(min_length=2, max_length=2)]], BeforeValidator(_rows)]
+Numbers = Annotated[list[float | None], BeforeValidator(_rows)]
+Integers = Annotated[list[int], BeforeValidator(_rows)]
+Booleans = Annotated[list[bool], BeforeValidator(_rows)]
+Keys = Annotated[list[str] | list[int], BeforeValidator(list)]
+Times = Annotated[list[str | None], BeforeValidator(_times)]
+Span = Annotated[float | None, BeforeValidator(_seconds)]
+
+Segment = Annotated[str, StringConstraints(pattern=NAME), BeforeValidator(unquoted)]
+HullPath = Annotated[Segment, Path(alias="name", description=f"The hull: {NAMES}.")]
+FencePath = Annotated[Segment, Path(alias="name", description=f"The fence: {NAMES}.")]
+ConsumerPath = Annotated[Segment, Path(alias="consumer", description=f"The durable consumer: {NAMES}.")]
+ProducerPath = Annotated[Segment, Path(alias="producer", description=f"The producer: {NAMES}.")]
+MinRevision = Annotated[
+    int, Query(ge=0, le=LARGEST, description="Wait, within the time limit, until the hull has reached this revision.")
+]
+Prefix = Annotated[str, Query(max_length=200, description="Only names that begin with this.")]
+After = Annotated[str, Query(max_length=200, description="Only names after this one: the last of the page before.")]
+Limit = Annotated[int, Query(ge=1, le=1000, description="The most that are returned.")]
+IDEMPOTENCY_KEY = r'^"?[A-Za-z0-9._/-]{1,200}:[1-9][0-9]{0,18}"?$'
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        pattern=IDEMPOTENCY_KEY,
+        description="PRODUCER:SEQUENCE makes the request safe to repeat: the hull applies each number of a producer "
+        "once. Of a body of rows, it is the number of the first row, and the rows are counted on from there.",
+        examples=["sensor-7:1"],
+    ),
+]
+MaySkip = Annotated[
+    bool, Query(description="Whether the numbers of the producer rise and may skip, as the offsets of a log do.")
+]
+
+
+class Request(BaseModel):
+    """A body: unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    def arguments(self) -> dict[str, Any]:
+        """The fields as arguments of the SDK."""
+        return {name: getattr(self, name) for name in type(self).model_fields}
+
+
+class Response(BaseModel):
+    """An answer: made of the SDK's values."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+
+# Hulls
+
+
+class NewHull(Request):
+    """The settings of a hull, fixed from its creation."""
+
+    name: Name
+    keyed: Literal["str", "int"] | None = Field(None, description="Kind of the keys; null for a hull without keys.")
+    max_age: Annotated[float, Field(strict=True, gt=0, le=1e9)] | None = Field(
+        None, description="Sliding window: seconds after which points leave."
+    )
+    max_points: Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)] | None = Field(
+        None, description="Sliding window: number of points beyond which the oldest leave."
+    )
+    clock: Literal["server", "data"] = Field("server", description="Clock of the window.")
+    max_skew: Seconds | None = Field(None, description="Seconds that event times may be ahead of the server's clock.")
+    ahead: Literal["refuse", "clamp"] = Field("refuse", description="What happens to times further ahead.")
+    ordering: Literal["arrival", "event_time"] = Field("arrival", description="Which position of a key is the later.")
+    point_limit: Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)] | None = Field(
+        None, description="Points beyond which batches are refused."
+    )
+    geographic: StrictBool = Field(False, description="Whether points are longitudes and latitudes in degrees.")
+    center: Point | None = Field(None, description="Longitude and latitude of the centre of a geographic hull.")
+    exist_ok: StrictBool = Field(False, description="Return an existing hull with these settings.")
+
+
+class Window(Response):
+    """A hull's sliding window."""
+
+    max_age: Span
+    max_points: int | None
+    clock: str
+    max_skew: Span
+    ahead: str
+
+
+class HullInfo(Response):
+    """A hull, its size and its settings."""
+
+    name: str
+    revision: int
+    points: int
+    distinct: int
+    created: datetime
+    uid: str
+    keyed: str | None
+    window: Window | None
+    ordering: str
+    point_limit: int | None
+    clock: datetime | None
+    geographic: bool
+    center: Place | None
+
+
+class HullPage(Response):
+    """Hulls by name. `next` is the `after` of the next page; null on the last."""
+
+    hulls: list[HullInfo]
+    next: str | None
+
+
+class Measures(Response):
+    """Measures of a hull; null where there is no number. Of a geographic hull in metres and square metres."""
+
+    area: Finite
+    perimeter: Finite
+    centroid: Place
+    bounds: Annotated[list[Finite], Field(min_length=4, max_length=4), BeforeValidator(_listed)]
+
+
+class Hull(Response):
+    """A hull at one revision. `vertices` are counter-clockwise; `vertex_keys` null without keys."""
+
+    info: HullInfo
+    vertices: Rows
+    vertex_keys: list[str] | list[int] | None
+    measures: Measures
+
+
+class Feature(Response):
+    """A GeoJSON Feature (RFC 7946)."""
+
+    type: Literal["Feature"]
+    id: str | int
+    geometry: dict[str, Any] | None
+    properties: dict[str, Any]
+
+
+class MinCircle(Response):
+    """The smallest circle around the points."""
+
+    center: Place
+    radius: Finite
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_pair(cls, value: Any) -> Any:
+        return {"center": value[0], "radius": value[1]} if isinstance(value, tuple) else value
+
+
+class AllMeasures(Measures):
+    """All measures of a hull."""
+
+    revision: int
+    diameter: Finite
+    width: Finite
+    min_box: Rows
+    min_perimeter_box: Rows
+    min_circle: MinCircle
+
+
+class Recenter(Request):
+    """The new centre; null for the mean direction of the points."""
+
+    center: Point | None = None
+
+
+class LastSequence(Response):
+    """The number of the last batch of a producer that was applied; 0 if there is none."""
+
+    last_sequence: int
+
+
+# Changes
+
+
+class Move(Request):
+    """Points and where they move, row by row."""
+
+    origins: Points
+    destinations: Points
+
+
+class Batch(Request):
+    """Changes that are applied together or not at all: points to insert, delete and move, or keys to put and remove."""
+
+    insert: Points | None = Field(None, description="Points to insert.", examples=[[[0, 0], [4, 0], [2, 3]]])
+    delete: Points | None = Field(None, description="Points to delete.")
+    move: Move | None = Field(None, description="Points to move.")
+    keys: list[Key] | None = Field(None, description="Keys to put, in a keyed hull,")
+    points: Points | None = Field(None, description="and their positions.")
+    times: list[Time] | None = Field(None, description="Event times of the points to insert or put.")
+    remove: list[Key] | None = Field(None, description="Keys to remove.")
+    only: Literal["absent", "present"] | None = Field(None, description="Put only new keys, or only known ones.")
+    ttl: Seconds | None = Field(None, description="Seconds after which the keys leave.")
+    expire_times: list[Time] | None = Field(None, description="Times at which the keys leave, instead of ttl.")
+    missing: Literal["raise", "count"] | None = Field(
+        None, description="Refuse the batch, or skip and count, where a point or key is not there."
+    )
+
+
+class Applied(Response):
+    """The effect of a batch. If `gathered` is more than 1, that of all the requests that were applied together."""
+
+    revision: int
+    inserted: int
+    deleted: int
+    missing: int
+    hull_changed: bool
+    points: int
+    duplicate: bool
+    moved: int
+    stale: int
+    late: int
+    skipped: int
+    clamped: int
+    evicted: int
+    clock: datetime | None
+    gathered: int = Field(1, description="Requests whose changes were applied together, as one revision.")
+
+
+class Transfer(Request):
+    """A batch for each of 2 to 16 hulls: all are applied or none."""
+
+    batches: dict[Name, Batch] = Field(
+        min_length=2,
+        max_length=16,
+        examples=[{"north": {"remove": ["LH400"]}, "south": {"keys": ["LH400"], "points": [[4, 1]]}}],
+    )
+
+
+class Transferred(Response):
+    """The effect on each hull."""
+
+    results: dict[str, Applied]
+
+
+class Uploaded(Response):
+    """The effect of a body of rows: the sums over its batches, and the hull after the last one."""
+
+    rows: int = Field(description="Rows of the body, all of them applied, now or by an earlier request.")
+    repeated: int = Field(description="Rows that an earlier request had applied.")
+    batches: int
+    revision: int | None = Field(description="Of the last batch; null if there was nothing to apply.")
+    points: int | None
+    inserted: int
+    deleted: int
+    missing: int
+    moved: int
+    stale: int
+    late: int
+    skipped: int
+    clamped: int
+    evicted: int
+    last_sequence: int | None = Field(description="With an Idempotency-Key, the number of the last row.")
+
+
+# Questions
+
+
+class AboutPoints(Request):
+    """Points to ask about."""
+
+    points: Points = Field(examples=[[[1, 1], [9, 9]]])
+
+
+class AboutPointsOrKeys(Request):
+    """Points to ask about, or keys whose positions are asked about."""
+
+    points: Points | None = Field(None, examples=[[[1, 1], [9, 9]]])
+    keys: list[Key] | None = None
+    keys_of: Name | None = Field(None, description="The hull that has the keys; null for the hull itself.")
+    keys_min_revision: Count = Field(0, description="A revision of that hull to wait for.")
+
+
+class Located(Response):
+    """Row by row: 1 inside, 0 on the boundary, -1 outside; -128 for a key that is not there."""
+
+    revision: int
+    sides: Integers
+    keys_revision: int | None
+
+
+class Distances(Response):
+    """Row by row; 0 inside. Null for a key that is not there, and if the hull has no points."""
+
+    revision: int
+    distances: Numbers
+    keys_revision: int | None
+
+
+class Counted(Response):
+    """The multiplicity of each point."""
+
+    revision: int
+    counts: Integers
+
+
+class Directions(Request):
+    """Vectors of any length but 0."""
+
+    directions: Points = Field(examples=[[[1, 0], [0, 1]]])
+    keys: StrictBool = Field(False, description="Whether to name the vertices, in a keyed hull.")
+
+
+class Supported(Response):
+    """The extreme vertex in each direction, and its key if requested."""
+
+    revision: int
+    vertices: Rows
+    keys: list[str] | list[int] | None
+
+
+class Tangents(Response):
+    """The left and right tangent point of each point; null for points not strictly outside."""
+
+    revision: int
+    tangents: Pairs
+
+
+class Lines(Request):
+    """Lines, each through an origin and a target."""
+
+    origins: Points = Field(examples=[[[-1, 1]]])
+    targets: Points = Field(examples=[[[9, 1]]])
+
+
+class Crossings(Response):
+    """Where each line enters and leaves the hull; null for lines that miss it."""
+
+    revision: int
+    crossings: Pairs
+
+
+class AboutKeys(Request):
+    """Keys to ask about."""
+
+    keys: list[Key] = Field(examples=[["LH400"]])
+
+
+class Positions(Response):
+    """The position of each key, null for one that is not there; times null for hulls without."""
+
+    revision: int
+    positions: Rows
+    present: Booleans
+    times: Times | None
+
+
+class Entities(Response):
+    """All keys of a hull at one revision, ascending, with their positions."""
+
+    revision: int
+    keys: Keys
+    points: Rows
+    times: Times | None
+
+
+class Sampled(Response):
+    """A sample of the points, and a key of each if requested."""
+
+    revision: int
+    points: Rows
+    keys: list[str] | list[int] | None
+
+
+class Separation(Response):
+    """The distance or overlap of two hulls, and the line between them."""
+
+    revision: int
+    other_revision: int
+    intersect: bool
+    distance: Finite
+    depth: Finite
+    normal: Place
+    offset: Finite
+    closest: Rows
+
+
+class Entries(Request):
+    """Entries of a phase diagram: composition and energy."""
+
+    entries: Points = []
+
+
+class Phases(Response):
+    """The hull as a binary phase diagram."""
+
+    revision: int
+    stable: Rows
+    energies_above_hull: Numbers
+    phases: Pairs
+    shares: Rows
+
+
+class FrontierQuestion(Request):
+    """Risks and returns to compare with the frontier, and risk-free rates."""
+
+    points: Points = []
+    rates: list[Number] = []
+
+
+class Efficient(Response):
+    """The hull as an efficient frontier."""
+
+    revision: int
+    efficient: Rows
+    turning_rates: Numbers
+    dominated: Booleans
+    tangencies: Rows
+    sharpe_ratios: Numbers
+
+
+class ChanRound(Response):
+    """One round of Chan's algorithm."""
+
+    guess: int
+    groups: int
+    steps: int
+    cost: Finite
+    closed: bool
+
+
+class Difference(Response):
+    """The first row in which two lists of vertices differ."""
+
+    row: int
+    live: Place | None
+    recomputed: Place | None
+
+
+class Verification(Response):
+    """The live hull compared with one computed anew."""
+
+    revision: int
+    equal: bool
+    points: int
+    vertices: int
+    rounds: list[ChanRound]
+    difference: Difference | None
+    keys_equal: bool
+
+
+# Fences
+
+
+class CircleArea(Request):
+    """A disk."""
+
+    center: Point
+    radius: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+
+
+class HullArea(Request):
+    """A hull, whose area moves as its points do."""
+
+    hull: Name
+
+
+class PolygonArea(Request):
+    """A simple polygon: the corners of its exterior, and of its holes."""
+
+    exterior: Points = Field(min_length=3, max_length=100_000)
+    holes: list[Points] = []
+
+
+class FenceSettings(Request):
+    """What a fence compares, and when it makes events."""
+
+    area: HullArea | CircleArea | PolygonArea | list[PolygonArea]
+    subjects: Name | None = Field(None, description="The keyed hull whose keys are compared,")
+    subject_prefix: Annotated[str, Field(strict=True, max_length=200)] | None = Field(
+        None, description="or a prefix of the names of several,"
+    )
+    other_hull: Name | None = Field(None, description="or a hull that is compared as a whole.")
+    boundary: Literal["closed", "open"] = "closed"
+    margin: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
+    crosses: StrictBool = False
+    dwell: Seconds | None = None
+    confirmations: Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)] = 0
+    min_dwell: Seconds | None = None
+    near: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
+    without_self: StrictBool = False
+    max_events: Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)] = 0
+    max_event_age: Seconds | None = None
+
+
+class NewFence(FenceSettings):
+    """A fence to create."""
+
+    name: Name
+    initial: Literal["snapshot", "events", "none"] = Field(
+        "snapshot", description="What it says about subjects that are inside at first."
+    )
+    exist_ok: StrictBool = Field(False, description="Return an existing fence with these settings.")
+
+
+class Consumer(Response):
+    """A durable reader of a fence."""
+
+    name: str
+    acknowledged: int
+    backlog: int
+    oldest: datetime | None
+    lost: int
+
+
+class Acknowledgement(Request):
+    """The last sequence that was processed."""
+
+    sequence: Count
+    uid: StrictStr = Field("", max_length=200, description="The uid of the fence, to notice that it was replaced.")
+
+
+class SubjectsInside(Response):
+    """Keys of one hull that are inside."""
+
+    hull: str
+    keys: list[str] | list[int]
+    revision: int
+
+
+class Inside(Response):
+    """The subjects inside a fence at one moment."""
+
+    sequence: int
+    subjects: list[SubjectsInside]
+
+
+class Fence(Response):
+    """A fence with its settings, its counts and its consumers."""
+
+    name: str
+    uid: str
+    area: HullArea | CircleArea | PolygonArea | list[PolygonArea]
+    subjects: str | None
+    subject_prefix: str | None
+    other_hull: str | None
+    boundary: str
+    margin: float
+    near: float
+    initial: str
+    crosses: bool
+    dwell: Span
+    confirmations: int
+    min_dwell: Span
+    without_self: bool
+    max_events: int
+    max_event_age: Span
+    created: datetime
+    last_sequence: int
+    first_sequence: int
+    inside: int
+    subject_count: int
+    consumers: list[Consumer]
+
+
+class FencePage(Response):
+    """Fences by name. `next` is the `after` of the next page; null on the last."""
+
+    fences: list[Fence]
+    next: str | None
+
+
+class Health(Response):
+    """Whether the gateway, and the server behind it, can answer."""
+
+    status: Literal["ok", "draining", "unavailable"]

@@ -1,0 +1,75 @@
+"""The gateway as a process: listen, serve, and end in order."""
+
+import asyncio
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import typer
+import uvicorn
+
+from dynhull_client import AsyncHullClient
+
+from .app import application
+from .settings import Settings
+
+BACKLOG = 2048
+LONGEST_HEAD = 65536
+
+
+class Server(uvicorn.Server):
+    """uvicorn, which ends when it is told to: its own handlers of signals would end the process with the signal."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals to the caller."""
+        yield
+
+
+def run(connect: Callable[[], AsyncHullClient], host: str, port: int, settings: Settings) -> None:
+    """Serve until SIGTERM or SIGINT; the first line printed has the address."""
+    config = uvicorn.Config("", log_config=None)  # for its choice of an event loop
+    with listener(host, port) as listening, asyncio.Runner(loop_factory=config.get_loop_factory()) as runner:
+        runner.run(serve(connect, listening, settings))
+
+
+async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket, settings: Settings) -> None:
+    """Serve on a listening socket."""
+    async with connect() as client:
+        app = application(client, settings)
+        config = uvicorn.Config(
+            app,
+            log_config=None,
+            access_log=False,
+            lifespan="off",
+            server_header=False,
+            root_path=settings.root_path,
+            ws="none",
+            forwarded_allow_ips=settings.forwarded_from,
+            timeout_graceful_shutdown=round(settings.grace_seconds),
+            h11_max_incomplete_event_size=LONGEST_HEAD,
+        )
+        if settings.metrics is not None:
+            app.state.figures.serve(*settings.metrics)
+        server = Server(config)
+
+        def stop() -> None:
+            app.state.health.drain()  # streams of events have no end of their own
+            server.should_exit = True
+
+        for number in (signal.SIGTERM, signal.SIGINT):
+            asyncio.get_running_loop().add_signal_handler(number, stop)
+        serving = asyncio.create_task(server.serve([listening]))
+        host, port = listening.getsockname()[:2]
+        place = f"[{host}]" if ":" in host else host
+        typer.echo(f"dynhull gateway on http://{place}:{port}{settings.root_path}")
+        await serving
+
+
+def listener(host: str, port: int) -> socket.socket:
+    """A listening socket; OSError if the port is in use."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.create_server((host, port), family=family, backlog=BACKLOG)
+    listening.setblocking(False)
+    return listening

@@ -1,0 +1,35 @@
+"""What `dynhull gateway` is told on its command line."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Limits, and what is allowed.
+
+    Attributes:
+        origins: the origins whose pages may read answers (CORS); "*" for all.
+        max_body: bytes of a body that is read as a whole: JSON and GeoJSON.
+        max_upload: bytes of a body of rows.
+        body_seconds: seconds within which more of a body must arrive, and within which a body that is read as a whole
+            must have arrived.
+        keepalive_seconds: seconds without an event after which a comment is sent on a stream of events.
+        max_streams: streams of events at a time.
+        send_seconds: seconds within which the reader of a stream must have taken what is sent.
+        grace_seconds: seconds that requests may still take after SIGTERM.
+        root_path: the path below which a proxy shows the gateway.
+        forwarded_from: the addresses of proxies whose forwarded headers are believed, with commas between.
+        metrics: host and port of the page for Prometheus; None for no such page.
+    """
+
+    origins: tuple[str, ...] = ()
+    max_body: int = 16 * 2**20
+    max_upload: int = 2**30
+    body_seconds: float = 30.0
+    keepalive_seconds: float = 15.0
+    max_streams: int = 10_000
+    send_seconds: float = 60.0
+    grace_seconds: float = 10.0
+    root_path: str = ""
+    forwarded_from: str = "127.0.0.1"
+    metrics: tuple[str, int] | None = None

@@ -1,0 +1,187 @@
+"""Bodies of rows: what is applied, once, and what a bad body is answered with."""
+
+import http.client
+import json
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from gateway_process import CSV, GEOJSON, NDJSON, Gateway, gateway_process
+from patience import wait_until
+from server_process import server_process
+
+SEQUENCE = "application/geo+json-seq"
+ROWS = 20_000
+
+
+def lines(start: int, stop: int) -> bytes:
+    return b"".join(b"[%d, %d]\n" % (number, number * number % 1009) for number in range(start, stop))
+
+
+def size(gateway: Gateway, name: str) -> int:
+    return gateway.get(f"/hulls/{name}").json["info"]["points"]
+
+
+@pytest.fixture
+def plane(gateway: Gateway, name: str) -> str:
+    gateway.post("/hulls", {"name": name})
+    return name
+
+
+@pytest.fixture
+def keyed(gateway: Gateway, name: str) -> str:
+    gateway.post("/hulls", {"name": name, "keyed": "str"})
+    return name
+
+
+FEATURE = '{"type": "Feature", "id": "a", "geometry": {"type": "Point", "coordinates": [1, 2, 3]}, "properties": {}}'
+LINES = (
+    b'{"key": "a", "x": 1, "y": 2, "time": "2026-01-01T00:00:00Z"}\r\n\r\n'
+    b'{"key": "b", "lon": 3, "lat": 4, "time": "2026-01-01T00:00:00+01:00"}'
+)
+BODIES = [
+    (NDJSON, LINES, {"a": [1, 2], "b": [3, 4]}),
+    (CSV, "\ufeffname,lat,key,lon\nA,2,a,1\nB,4,b,3\n".encode(), {"a": [1, 2], "b": [3, 4]}),
+    (SEQUENCE, f"\x1e{FEATURE}\n\x1e{FEATURE.replace('[1', '[9')}\n".encode(), {"a": [9, 2]}),
+]
+
+
+@pytest.mark.parametrize(("kind", "body", "expected"), BODIES)
+def test_rows_of_each_kind(gateway: Gateway, keyed: str, kind: str, body: bytes, expected: dict[str, object]) -> None:
+    done = gateway.post(f"/hulls/{keyed}/rows", body, kind)
+    assert (done.status, done.json["rows"]) == (200, 2), done.json
+    found = gateway.get(f"/hulls/{keyed}/entities").json
+    assert dict(zip(found["keys"], found["points"], strict=True)) == expected
+
+
+def test_a_collection_and_points_without_keys(gateway: Gateway, plane: str) -> None:
+    at = f"/hulls/{plane}/rows"
+    collection = f'{{"type": "FeatureCollection", "features": [{FEATURE}, {FEATURE}]}}'
+    assert gateway.post(f"{at}?keys=none", collection.encode(), GEOJSON).json["inserted"] == 2
+    several = b'{"type": "MultiPoint", "coordinates": [[0, 0], [1, 2]]}'
+    assert gateway.post(at, several, GEOJSON).json["inserted"] == 2
+    deleted = gateway.post(f"{at}?delete=true", b"[1, 2]\n[1, 2]\n[7, 7]", NDJSON).json
+    assert (deleted["deleted"], deleted["missing"]) == (2, 1)
+    assert size(gateway, plane) == 2
+
+
+def test_removing_and_coalescing_keys(gateway: Gateway, keyed: str) -> None:
+    at = f"/hulls/{keyed}/rows"
+    moves = "".join(json.dumps({"key": f"k{i % 3}", "x": i, "y": 0}) + "\n" for i in range(30)).encode()
+    assert gateway.post(at, moves, NDJSON).json["batches"] == 10
+    assert gateway.post(f"{at}?coalesce=true", moves, NDJSON).json["batches"] == 1
+    found = gateway.get(f"/hulls/{keyed}/entities").json
+    assert dict(zip(found["keys"], found["points"], strict=True)) == {"k0": [27, 0], "k1": [28, 0], "k2": [29, 0]}
+    assert gateway.post(f"{at}?delete=true", b'{"key": "k0"}\n{"key": "k9"}', NDJSON).json["deleted"] == 1
+    assert gateway.post(f"{at}?delete=true", b"key\nk1\n", CSV).json["deleted"] == 1
+
+
+BAD = [
+    (NDJSON, b'[1, 2]\n\n{"x": 1, "y": "2"}\n', 400, 1, "y", "'2'"),
+    (NDJSON, b"[1, 2]\n[1, 2, 3]\n", 400, 1, None, None),
+    (NDJSON, b"[1, 2]\n[1, 2\n", 400, 1, None, None),
+    (NDJSON, b"[1, NaN]\n", 400, 0, None, None),
+    (NDJSON, b"[1, 2]\n\xff\xfe\n", 400, 1, None, None),
+    (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n[1, 2]\n', 400, 1, "key", None),
+    (NDJSON, b"[" + b"1" * 2**21, 400, 0, None, None),
+    (CSV, b"x,y\n1,2\n1,inf\n", 400, 1, "y", "'inf'"),
+    (CSV, b"x,y\n1,2\n1\n", 400, 1, None, "['1']"),
+    (CSV, b"a,b\n1,2\n", 400, 0, "header", None),
+    (CSV, b'x,y\n1,"2\n', 400, 1, None, None),
+    (GEOJSON, b'{"type": "Polygon", "coordinates": []}', 400, 0, None, None),
+    (SEQUENCE, b'\x1e{"type": "Point", "coordinates": [1, 2]}\n\x1e{"type": "Poi', 400, 1, None, None),
+    ("text/csv; charset=utf-16", "x,y\n1,2\n".encode("utf-16"), 415, None, "Content-Type", None),
+    ("application/pdf", b"%PDF", 415, None, "Content-Type", "application/pdf"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "body", "status", "row", "field", "value"), BAD)
+def test_bad_bodies_name_the_row_and_change_nothing(
+    gateway: Gateway, plane: str, kind: str, body: bytes, status: int, row: int, field: str | None, value: str | None
+) -> None:
+    refused = gateway.post(f"/hulls/{plane}/rows", body, kind)
+    said = refused.json
+    assert (refused.status, said.get("row")) == (status, row), said
+    assert field is None or said["field"] == field
+    assert value is None or said["value"] == value
+    assert gateway.get(f"/hulls/{plane}").json["info"]["revision"] == 0
+
+
+def test_compressed_bodies_are_refused(gateway: Gateway, plane: str) -> None:
+    refused = gateway.post(f"/hulls/{plane}/rows", b"\x1f\x8b", NDJSON, Content_Encoding="gzip")
+    assert (refused.status, refused.json["field"]) == (415, "Content-Encoding")
+
+
+def test_a_slow_body_is_given_up(gateway: Gateway, plane: str) -> None:
+    """The gateway of the tests waits one second; what came before is not applied as a part of a batch."""
+    for path, kind in (("rows", NDJSON), ("points", "application/json"), ("locate", "application/json")):
+        connection = gateway.connection()
+        connection.putrequest("POST", f"/hulls/{plane}/{path}")
+        connection.putheader("Content-Type", kind)
+        connection.putheader("Content-Length", "100")
+        connection.endheaders(b"[1, 2]\n[3,")
+        assert connection.getresponse().status == 408
+        connection.close()
+    assert size(gateway, plane) == 0
+
+
+def test_of_half_a_body_whole_batches_are_applied_and_the_rest_can_follow(gateway: Gateway, plane: str) -> None:
+    body = lines(0, ROWS)
+    connection = gateway.connection()
+    connection.putrequest("POST", f"/hulls/{plane}/rows")
+    connection.putheader("Content-Type", NDJSON)
+    connection.putheader("Idempotency-Key", "half:1")
+    connection.putheader("Content-Length", str(len(body)))
+    connection.endheaders(body[: len(body) // 2])
+    wait_until(lambda: size(gateway, plane) == 8192)
+    connection.close()
+    done = gateway.post(f"/hulls/{plane}/rows", body, NDJSON, Idempotency_Key="half:1").json
+    assert (done["rows"], done["repeated"], done["last_sequence"]) == (ROWS, 8192, ROWS)
+    assert size(gateway, plane) == ROWS
+    rest = gateway.post(f"/hulls/{plane}/rows", b"[1, 1]\n", NDJSON, Idempotency_Key=f"half:{ROWS + 1}")
+    assert (rest.status, size(gateway, plane)) == (200, ROWS + 1)
+    gap = gateway.post(f"/hulls/{plane}/rows", b"[1, 1]\n", NDJSON, Idempotency_Key=f"half:{ROWS + 9}")
+    assert (gap.status, gap.json["expected"]) == (409, ROWS + 2)
+
+
+def test_an_error_late_in_a_body_says_how_many_rows_were_applied(gateway: Gateway, plane: str) -> None:
+    refused = gateway.post(f"/hulls/{plane}/rows", lines(0, 3 * ROWS) + b"[1, null]\n", NDJSON).json
+    assert refused["row"] == 3 * ROWS
+    assert size(gateway, plane) == refused["applied"] > 0
+
+
+def test_nothing_is_lost_or_doubled_when_the_server_is_killed(tmp_path) -> None:
+    """A body is sent again with its key until it is acknowledged, over kills of the server and of the gateway."""
+    body = lines(0, ROWS)
+    killed_at = iter([1, 2, 3])
+    port = "0"
+    attempts = 0
+    done = None
+    while done is None:
+        attempts += 1
+        kill = next(killed_at, None)
+        with (
+            server_process("--data", str(tmp_path), "--port", port, killed=kill is not None, torn=True) as server,
+            gateway_process(server.address) as gateway,
+        ):
+            gateway.post("/hulls", {"name": "h", "exist_ok": True})
+
+            def parts(kill: int | None = kill, server=server) -> Iterator[bytes]:
+                step = len(body) // 4
+                for number in range(4):
+                    if number == kill:
+                        server.process.kill()
+                    yield body[number * step : (number + 1) * step if number < 3 else None]
+
+            try:
+                answer = gateway.post("/hulls/h/rows", parts(), NDJSON, Idempotency_Key="killed:1")
+                done = answer.json if answer.status == 200 else None
+                assert answer.status in (200, 503), answer.json
+            except (http.client.HTTPException, OSError):
+                done = None
+            if done is not None:
+                with_client = gateway.get("/hulls/h").json["info"]
+                assert (with_client["points"], with_client["distinct"]) == (ROWS, ROWS)
+    assert attempts > 1
+    assert done["last_sequence"] == ROWS
+    assert np.isfinite(done["repeated"])

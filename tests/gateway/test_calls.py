@@ -1,0 +1,229 @@
+"""Every unary call over HTTP, and what errors say."""
+
+import json
+import threading
+
+import numpy as np
+import pytest
+from gateway_process import Gateway, gateway_process
+from server_process import server_process
+
+from dynhull_client import HullClient
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
+
+
+@pytest.fixture
+def square(gateway: Gateway, name: str) -> str:
+    assert gateway.post("/hulls", {"name": name}).status == 201
+    assert gateway.post(f"/hulls/{name}/points", SQUARE).json["revision"] == 1
+    return name
+
+
+def test_questions_have_the_answers_of_the_sdk(gateway: Gateway, address: str, square: str) -> None:
+    asked = [[1, 1], [4, 2], [9, 9]]
+    with HullClient(address) as client:
+        sides = client.locate(square, asked).sides.tolist()
+        distances = client.distance(square, asked).distances.tolist()
+        tangents = client.tangents(square, [[9, 9]]).tangents.tolist()
+        crossings = client.intersect_lines(square, [[-1, 1]], [[9, 1]]).crossings.tolist()
+        measures = client.get_measures(square)
+    points = {"points": asked}
+    at = f"/hulls/{square}"
+    assert gateway.post(f"{at}/locate", points).json == {"revision": 1, "sides": sides, "keys_revision": None}
+    assert gateway.post(f"{at}/distance", points).json["distances"] == distances
+    assert gateway.post(f"{at}/count", points).json["counts"] == [0, 0, 0]
+    assert gateway.post(f"{at}/support", {"directions": [[1, 1]]}).json["vertices"] == [[4, 4]]
+    inside_and_outside = gateway.post(f"{at}/tangents", {"points": [[1, 1], [9, 9]]}).json["tangents"]
+    assert inside_and_outside == [[[None, None], [None, None]], *tangents]
+    lines = {"origins": [[-1, 1]], "targets": [[9, 1]]}
+    assert gateway.post(f"{at}/intersect-lines", lines).json["crossings"] == crossings
+    shown = gateway.get(f"{at}/measures").json
+    assert (shown["diameter"], shown["min_circle"]["radius"]) == (measures.diameter, measures.min_circle[1])
+    assert gateway.get(f"{at}/sample?size=2").json["points"] == gateway.get(f"{at}/sample?size=2").json["points"]
+    assert gateway.get(f"{at}/verification").json["equal"] is True
+    assert gateway.get(f"{at}/separation?other={square}").json["intersect"] is True
+    hull = gateway.get(at).json
+    assert (hull["vertices"], hull["measures"]["area"], hull["info"]["points"]) == (SQUARE, 16, 4)
+    feature = gateway.get(f"{at}?f=geojson")
+    assert feature.headers["Content-Type"] == "application/geo+json"
+    assert feature.json["geometry"]["coordinates"] == [[*SQUARE, SQUARE[0]]]
+    assert gateway.get(f"/hulls?prefix={square}").json["hulls"] == [hull["info"]]
+    assert gateway.call("DELETE", at).status == 204
+    assert gateway.get(at).status == 404
+
+
+def test_a_hull_without_points_has_null_where_there_is_no_number(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name})
+    assert gateway.post(f"/hulls/{name}/distance", {"points": [[0, 0]]}).json["distances"] == [None]
+    assert gateway.get(f"/hulls/{name}").json["measures"]["centroid"] == [None, None]
+    assert gateway.get(f"/hulls/{name}?f=geojson").json["geometry"] is None
+
+
+def test_keys_and_transfers(gateway: Gateway, name: str) -> None:
+    north, south = f"{name}/north", f"{name}/south"
+    for each in (north, south):
+        assert gateway.post("/hulls", {"name": each, "keyed": "str"}).status == 201
+    at, other = (f"/hulls/{each.replace('/', '%2F')}" for each in (north, south))
+    put = {"keys": ["a", "b"], "points": [[0, 0], [1, 1]]}
+    assert gateway.post(f"{at}/points", put).json["inserted"] == 2
+    moved = {"batches": {north: {"remove": ["a"]}, south: {"keys": ["a"], "points": [[5, 5]]}}}
+    results = gateway.post("/transfers", moved, Idempotency_Key=f"{name}:1").json["results"]
+    assert (results[north]["deleted"], results[south]["inserted"]) == (1, 1)
+    again = gateway.post("/transfers", moved, Idempotency_Key=f"{name}:1").json["results"]
+    assert again[north]["duplicate"]
+    found = gateway.post(f"{at}/positions", {"keys": ["a", "b"]}).json
+    assert (found["present"], found["positions"]) == ([False, True], [[None, None], [1, 1]])
+    assert gateway.get(f"{other}/entities").json == {"revision": 1, "keys": ["a"], "points": [[5, 5]], "times": None}
+    assert gateway.post(f"{at}/locate", {"keys": ["a"], "keys_of": south}).json["sides"] == [-1]
+
+
+def test_fences(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str"})
+    fence = {"name": name, "area": {"exterior": SQUARE}, "subjects": name}
+    created = gateway.post("/fences", fence)
+    assert (created.status, created.json["area"]) == (201, [{"exterior": SQUARE, "holes": []}])
+    gateway.post(f"/hulls/{name}/points", {"keys": ["a"], "points": [[1, 1]]})
+    assert gateway.get(f"/fences/{name}/inside").json["subjects"] == [{"hull": name, "keys": ["a"], "revision": 1}]
+    circle = {"area": {"center": [9, 9], "radius": 1}, "subjects": name}
+    assert gateway.call("PUT", f"/fences/{name}", circle).json["area"] == circle["area"]
+    acknowledged = gateway.call("PUT", f"/fences/{name}/consumers/c", {"sequence": 1})
+    assert acknowledged.json["acknowledged"] == 1
+    assert [each["name"] for each in gateway.get(f"/fences/{name}").json["consumers"]] == ["c"]
+    assert gateway.call("DELETE", f"/fences/{name}/consumers/c").status == 204
+    assert gateway.get(f"/fences?prefix={name}").json["fences"][0]["name"] == name
+    assert gateway.call("DELETE", f"/fences/{name}").status == 204
+
+
+def test_lists_have_pages(gateway: Gateway, name: str) -> None:
+    names = [f"{name}-{number}" for number in range(5)]
+    for each in names:
+        gateway.post("/hulls", {"name": each})
+    found, after = [], ""
+    while after is not None:
+        page = gateway.get(f"/hulls?prefix={name}&limit=2&after={after}").json
+        found += [each["name"] for each in page["hulls"]]
+        after = page["next"]
+    assert found == names
+
+
+BAD = [
+    ("/points", {"insert": [[0, 0], [1, "2"]]}, ("insert", 1, "'2'", "/insert/1/1")),
+    ("/points", {"insert": [[0, 0], [1]]}, ("insert", 1, None, "/insert/1")),
+    ("/points", [[0, 0], [True, 1]], ("1", 1, "True", "/1/0")),
+    ("/points", {"inserts": []}, ("inserts", None, "[]", "/inserts")),
+    ("/locate", {"points": [[0, 0], [1, None]]}, ("points", 1, "None", "/points/1/1")),
+]
+
+
+@pytest.mark.parametrize(("path", "body", "cause"), BAD)
+def test_errors_name_field_row_and_value(
+    gateway: Gateway, square: str, path: str, body: object, cause: tuple[str, int | None, str | None, str]
+) -> None:
+    refused = gateway.post(f"/hulls/{square}{path}", body)
+    assert (refused.status, refused.headers["Content-Type"]) == (400, "application/problem+json")
+    said = refused.json
+    field, row, value, pointer = cause
+    assert (said["field"], said.get("row"), said["errors"][0]["pointer"]) == (field, row, pointer)
+    assert value is None or said["value"] == value
+    assert gateway.get(f"/hulls/{square}").json["info"]["revision"] == 1
+
+
+def test_refusals_of_the_server_have_their_status_and_reason(gateway: Gateway, square: str) -> None:
+    at = f"/hulls/{square}"
+    cases = [
+        (gateway.post("/hulls", {"name": square}), 409, "HULL_EXISTS"),
+        (gateway.get("/hulls/there-is-none"), 404, "HULL_NOT_FOUND"),
+        (gateway.post(f"{at}/points", {"delete": [[0, 0], [7, 7]]}), 409, "POINT_MISSING"),
+        (gateway.get(f"{at}/entities"), 409, "HULL_UNSUITABLE"),
+        (gateway.get(f"{at}?min_revision=99"), 409, "REVISION_NOT_REACHED"),
+        (gateway.post(f"{at}/points", SQUARE, Idempotency_Key=f"{square}:2"), 409, "SEQUENCE_GAP"),
+        (gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number"), 400, "INVALID_FIELD"),
+        (gateway.get(f"{at}?min_revision=-1"), 400, "INVALID_FIELD"),
+        (gateway.post(f"{at}/points", b"[[0, 0", "application/json"), 400, "INVALID_FIELD"),
+        (gateway.post(f"{at}/points", b"x", "text/plain"), 415, "MEDIA_TYPE"),
+        (gateway.post(f"{at}/locate", b" " * 2**20 + b"{}", "application/json"), 413, "BODY_TOO_LARGE"),
+        (gateway.get("/hulls/bad%20name"), 400, "INVALID_FIELD"),
+        (gateway.get("/nowhere"), 404, ""),
+    ]
+    for answer, status, reason in cases:
+        assert (answer.status, answer.json["status"], answer.json["reason"]) == (status, status, reason), answer.json
+    assert cases[2][0].json["row"] == 1
+    refused = gateway.call("PATCH", at)
+    assert (refused.status, refused.headers["Allow"]) == (405, "DELETE, GET")
+
+
+def test_a_numbered_batch_is_applied_once(gateway: Gateway, square: str) -> None:
+    posted = [gateway.post(f"/hulls/{square}/points", [[9, 9]], Idempotency_Key='"a/b:1"').json for _ in range(2)]
+    assert [each["duplicate"] for each in posted] == [False, True]
+    assert gateway.get(f"/hulls/{square}").json["info"]["points"] == 5
+    assert gateway.get(f"/hulls/{square}/producers/a%2Fb").json == {"last_sequence": 1}
+
+
+def test_many_small_requests_share_batches_and_each_has_its_own_error(gateway: Gateway, name: str) -> None:
+    """A geographic hull refuses places that are too far away: one bad request among many is refused alone."""
+    gateway.post("/hulls", {"name": name, "geographic": True, "center": [0, 0]})
+    answers: dict[int, int] = {}
+
+    def send(number: int) -> None:
+        connection = gateway.connection()
+        for i in range(20):
+            bad = (number, i) == (3, 10)
+            body = json.dumps([[170 if bad else number, i]])
+            connection.request("POST", f"/hulls/{name}/points", body, {"Content-Type": "application/json"})
+            response = connection.getresponse()
+            response.read()
+            answers[20 * number + i] = response.status
+        connection.close()
+
+    senders = [threading.Thread(target=send, args=[number]) for number in range(8)]
+    for each in senders:
+        each.start()
+    for each in senders:
+        each.join()
+    assert {number for number, status in answers.items() if status != 200} == {70}
+    assert answers[70] == 400
+    info = gateway.get(f"/hulls/{name}").json["info"]
+    assert info["points"] == 159
+    assert info["revision"] < 159
+
+
+def test_tokens_are_passed_on(tmp_path) -> None:
+    import hashlib
+
+    digest = hashlib.sha256(b"secret").hexdigest()
+    tokens = tmp_path / "tokens.toml"
+    tokens.write_text(f'[[token]]\nsha256 = "{digest}"\nread = ["a"]\nwrite = ["a"]\n')
+    with (
+        server_process("--tokens", str(tokens), "--log-level", "error") as server,
+        gateway_process(server.address) as gateway,
+    ):
+        anonymous = gateway.get("/hulls/a")
+        assert (anonymous.status, anonymous.headers["WWW-Authenticate"]) == (401, "Bearer")
+        assert gateway.get("/hulls/a", Authorization="Basic x").status == 401
+        assert gateway.get("/hulls/a", Authorization="Bearer wrong").status == 401
+        assert gateway.post("/hulls", {"name": "a"}, Authorization="Bearer secret").status == 201
+        assert gateway.post("/hulls/a/points", [[0, 0]], Authorization="Bearer secret").status == 200
+        assert gateway.post("/hulls/b/points", [[0, 0]], Authorization="Bearer secret").status == 403
+        assert gateway.post("/hulls/a/points", [[0, 0]], Authorization="Bearer wrong").status == 401
+        assert gateway.get("/readyz").status == 200
+
+
+def test_other_origins_only_if_allowed(gateway: Gateway, address: str) -> None:
+    asked = {"Origin": "https://pages.example", "Access_Control_Request_Method": "POST"}
+    assert "Access-Control-Allow-Origin" not in gateway.call("OPTIONS", "/hulls", **asked).headers
+    with gateway_process(address, "--origin", "https://pages.example") as open_gateway:
+        allowed = open_gateway.call("OPTIONS", "/hulls", **asked)
+        assert allowed.headers["Access-Control-Allow-Origin"] == "https://pages.example"
+        asked["Origin"] = "https://others.example"
+        assert "Access-Control-Allow-Origin" not in open_gateway.call("OPTIONS", "/hulls", **asked).headers
+
+
+def test_numbers_are_those_of_the_hull(gateway: Gateway, address: str, name: str) -> None:
+    """Each double arrives and comes back as it is."""
+    gateway.post("/hulls", {"name": name})
+    xy = np.random.default_rng(7).normal(size=(50, 2)) * 10.0 ** np.arange(-150, 150, 6)[:, None]
+    gateway.post(f"/hulls/{name}/points", xy.tolist())
+    with HullClient(address) as client:
+        assert client.count(name, xy).counts.all()
+        assert gateway.get(f"/hulls/{name}").json["vertices"] == client.get_hull(name).vertices.tolist()

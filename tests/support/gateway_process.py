@@ -1,0 +1,81 @@
+"""A real gateway in a process of its own, and plain HTTP calls to it."""
+
+import http.client
+import json
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlsplit
+
+from forked import COMMAND, Process
+from patience import PATIENCE
+
+NDJSON, CSV, GEOJSON = "application/x-ndjson", "text/csv", "application/geo+json"
+
+
+@dataclass(frozen=True)
+class Answer:
+    status: int
+    headers: Mapping[str, str]
+    body: bytes
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.body)
+
+
+class Gateway:
+    """A gateway at `url`."""
+
+    def __init__(self, url: str, process: subprocess.Popen[str] | None = None) -> None:
+        self.url = url
+        self.process = process
+        self.place = urlsplit(url).netloc
+
+    def connection(self) -> http.client.HTTPConnection:
+        return http.client.HTTPConnection(self.place, timeout=PATIENCE)
+
+    def call(self, method: str, path: str, body: Any = None, kind: str | None = None, **headers: str) -> Answer:
+        """One request; a body that is neither bytes nor an iterator of them is sent as JSON."""
+        if body is not None and not isinstance(body, bytes | Iterator):
+            body, kind = json.dumps(body).encode(), kind or "application/json"
+        if kind is not None:
+            headers = {"Content-Type": kind, **headers}
+        connection = self.connection()
+        try:
+            named = {name.replace("_", "-"): value for name, value in headers.items()}
+            connection.request(method, urlsplit(self.url).path + path, body, named)
+            response = connection.getresponse()
+            return Answer(response.status, response.headers, response.read())
+        finally:
+            connection.close()
+
+    def get(self, path: str, **headers: str) -> Answer:
+        return self.call("GET", path, **headers)
+
+    def post(self, path: str, body: Any, kind: str | None = None, **headers: str) -> Answer:
+        return self.call("POST", path, body, kind, **headers)
+
+
+@contextmanager
+def gateway_process(address: str, *options: str, complaints: str = "") -> Iterator[Gateway]:
+    """`dynhull gateway` on a free port, unless the options name one. It must exit with code 0 and log nothing else."""
+    command = [COMMAND, "gateway", "--port", "0", "--address", address, *options]
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        Process(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+    ):
+        try:
+            first_line = process.stdout.readline()
+            assert first_line.startswith("dynhull gateway on http://"), errors.seek(0) or errors.read()
+            yield Gateway(first_line.split()[-1], process)
+        finally:
+            process.terminate()
+            ended = process.wait(PATIENCE)
+            errors.seek(0)
+            said = errors.read()
+            assert ended == 0, said
+            assert complaints in said if complaints else not said, said
