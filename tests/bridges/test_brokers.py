@@ -2,19 +2,16 @@
 
 import asyncio
 import json
-import socket
-import subprocess
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import aiomqtt
 import nats
 import pytest
+from brokers import broker, free_port, mosquitto, nats_server
 from patience import PATIENCE, wait_until
-from peers import program
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 
 from dynhull_client import HullClient
@@ -31,26 +28,7 @@ def client(address: str, name: str) -> Iterator[HullClient]:
 
 @pytest.fixture
 def port() -> int:
-    """A port that a broker can have again after it was killed."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        return int(free.getsockname()[1])
-
-
-@contextmanager
-def broker(command: Sequence[object], port: int) -> Iterator[subprocess.Popen[bytes]]:
-    """A broker in a process of its own, once it listens."""
-    with subprocess.Popen([*map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        try:
-            wait_until(lambda: listens(port))
-            yield process
-        finally:
-            process.kill()
-            process.wait(PATIENCE)
-
-
-def listens(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
+    return free_port()
 
 
 class Subscriber:
@@ -75,9 +53,7 @@ class Subscriber:
 
 
 def test_mqtt(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
-    config = tmp_path / "mosquitto.conf"
-    config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
-    command = [program("mosquitto"), "-c", config]
+    command = mosquitto(tmp_path, port)
     to = ("--to", f"mqtt://127.0.0.1:{port}", "--timeout", "1s", *FAST)
     with relay_process(address, tmp_path, name, *to) as relay:
         pass_through(client, name, KEYS)
@@ -96,9 +72,7 @@ def test_mqtt(client: HullClient, address: str, name: str, tmp_path: Path, port:
 
 
 def test_mqtt_has_each_event(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
-    config = tmp_path / "mosquitto.conf"
-    config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
-    with broker([program("mosquitto"), "-c", config], port):
+    with broker(mosquitto(tmp_path, port), port):
         subscriber = Subscriber(port)
         with relay_process(address, tmp_path, name, "--to", f"mqtt://127.0.0.1:{port}/plant/{{type}}"):
             pass_through(client, name, KEYS)
@@ -109,7 +83,7 @@ def test_mqtt_has_each_event(client: HullClient, address: str, name: str, tmp_pa
 
 
 def test_nats(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
-    command = [program("nats-server"), "-js", "-a", "127.0.0.1", "-p", port, "-sd", tmp_path / "nats"]
+    command = nats_server(tmp_path, port)
     to = ("--to", f"nats://127.0.0.1:{port}/events.{{fence}}", "--timeout", "1s", *FAST)
     with relay_process(address, tmp_path, name, *to) as relay:
         pass_through(client, name, KEYS)

@@ -31,6 +31,7 @@ RUN_BY = {
     "serve": ["dynhull_server.process"],
     "gateway": ["dynhull_client", "dynhull_gateway.serve"],
     "dashboard": ["dynhull_client", "dynhull_dashboard.serve"],
+    "ingest": ["dynhull_client", "dynhull_bridges.ingest.ingest", "dynhull_bridges.ingest.jetstream"],
 }
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 

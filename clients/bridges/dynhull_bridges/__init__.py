@@ -1,1 +1,1 @@
-"""Bridges between dynhull and other systems: `dynhull relay` delivers the events of fences."""
+"""Bridges between dynhull and other systems: `dynhull relay` sends events out, `dynhull ingest` takes messages in."""

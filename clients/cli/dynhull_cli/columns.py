@@ -90,7 +90,7 @@ def is_number(text: str) -> bool:
     return True
 
 
-def plain(text: str, decimal: str) -> str:
+def plain(text: str, decimal: str = ".") -> str:
     """The text with a point as decimal mark, for `float`; ValueError for notation of Python, such as 1_000."""
     if "_" in text or (decimal == "," and "." in text):
         raise ValueError

@@ -1,0 +1,1 @@
+"""`dynhull ingest`: messages of a broker become points of hulls."""

@@ -1,0 +1,63 @@
+"""Messages that cannot be taken: counted, logged and kept aside."""
+
+import base64
+import json
+from pathlib import Path
+from typing import IO, Any
+
+import structlog
+
+from .feed import Message
+
+log = structlog.get_logger("dynhull_ingest")
+# So many are logged one by one; later ones are counted, and written to the file if there is one.
+LOGGED = 10
+
+
+class BadMessages:
+    """Keeps bad messages aside, each as a line of JSON with its topic, number, error and payload.
+
+    Args:
+        path: the file to append to; None to count them only.
+        most: the ingest ends if there are more than this; None for no limit.
+
+    Raises:
+        OSError: the file cannot be opened.
+    """
+
+    def __init__(self, path: Path | None, most: int | None) -> None:
+        self.count = 0
+        self._file: IO[str] | None = None if path is None else path.open("a", encoding="utf-8")
+        self._most = most
+
+    def add(self, message: Message, error: Exception) -> None:
+        """Keep a message aside. TooManyBadError if there are too many, OSError if it cannot be written."""
+        self.count += 1
+        if self._file is not None:
+            self._file.write(json.dumps(_line(message, error), ensure_ascii=False) + "\n")
+            self._file.flush()
+        if self.count <= LOGGED:
+            log.warning("bad message", topic=message.topic, number=message.number, error=str(error))
+        if self.count == LOGGED + 1:
+            log.warning("more bad messages are counted, not logged")
+        if self._most is not None and self.count > self._most:
+            raise TooManyBadError(f"more than {self._most} bad messages; the last one, of {message.topic}: {error}")
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+
+class TooManyBadError(Exception):
+    """There are more bad messages than `--max-bad` allows."""
+
+
+def _line(message: Message, error: Exception) -> dict[str, Any]:
+    line: dict[str, Any] = {"topic": message.topic, "number": message.number, "error": str(error)}
+    payload = message.payload or b""
+    try:
+        line["payload"] = payload.decode()
+    except UnicodeDecodeError:
+        line["payload_base64"] = base64.b64encode(payload).decode()
+    return line

@@ -1,0 +1,125 @@
+"""`dynhull ingest`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dynhull_cli.connected import Connect, connecting, fail
+from dynhull_cli.durations import duration
+from dynhull_cli.exits import Exit
+from dynhull_cli.times import TimeUnit
+
+from ..command import LogForm
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .feed import Feed
+
+
+def _mapping(text: str, *names: str) -> Any:
+    return typer.Option(*names, metavar="EXPRESSION", help=text, rich_help_panel="From messages to points")
+
+
+@connecting
+def ingest(
+    connect: Connect,
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="URL", help="mqtt(s)://HOST/FILTER, nats://HOST/STREAM[/SUBJECT] or kafka://HOST:PORT/TOPIC."
+        ),
+    ],
+    hull: Annotated[str, _mapping("Name of the hull.", "--hull")],
+    x: Annotated[str, _mapping("x, or the longitude.")] = "$.lon",
+    y: Annotated[str, _mapping("y, or the latitude.")] = "$.lat",
+    key: Annotated[str | None, _mapping("Key of the point. Default: points without keys.")] = None,
+    time: Annotated[
+        str | None, _mapping("Event time: ISO 8601 with a time zone, or a number since 1970. Default: none.")
+    ] = None,
+    time_unit: Annotated[
+        TimeUnit | None,
+        typer.Option(
+            help="Unit of times that are numbers. Default: by the size of the first one; logged.",
+            rich_help_panel="From messages to points",
+        ),
+    ] = None,
+    each: Annotated[
+        str | None, _mapping("Path to an array with a point in each element. Default: a message is one point.")
+    ] = None,
+    create: Annotated[bool, typer.Option(help="Create hulls that do not exist.")] = True,
+    geographic: Annotated[
+        bool | None,
+        typer.Option(
+            "--geographic/--plane",
+            help="Whether new hulls are on the globe, in degrees, or in the plane. Default: on the globe if the "
+            "coordinates are named lon and lat, or the like.",
+            show_default=False,
+        ),
+    ] = None,
+    producer: Annotated[
+        str | None,
+        typer.Option(help="Name under which hulls count the numbers of a log. Default: made from stream and subject."),
+    ] = None,
+    bad: Annotated[Path | None, typer.Option(help="File of JSON lines to add bad messages to.", dir_okay=False)] = None,
+    max_bad: Annotated[
+        int | None, typer.Option(min=0, help="End if there are more bad messages than this. Default: never.")
+    ] = None,
+    to_end: Annotated[bool, typer.Option("--to-end", help="End when no message is left, rather than wait.")] = False,
+    grace: Annotated[str, typer.Option(help="How long what is under way may take after SIGTERM.")] = "10s",
+    report: Annotated[str, typer.Option(help="Time between two lines about the progress in the log.")] = "10s",
+    metrics_port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port of the metrics page; 0 for a free one.")
+    ] = None,
+    metrics_host: Annotated[str, typer.Option(help="Address of the metrics page.")] = "127.0.0.1",
+    log_format: Annotated[LogForm, typer.Option(help="Form of the log on standard error.")] = LogForm.TEXT,
+) -> None:
+    """Turn the messages of a broker into points of hulls, until SIGTERM.
+
+        dynhull ingest 'mqtt://broker/fleet/+/position' --hull fleet --key '{1}'
+        dynhull ingest nats://broker/POSITIONS/fleet.*.position --hull 'fleet/{1}' --key '$.id' --time '$.ts'
+        dynhull ingest kafka://broker:9092/positions --hull fleet --key '$.vehicle.id' --x '$.pos[0]' --y '$.pos[1]'
+
+    Messages are JSON. An expression is a path into it, as $.position.lon, or a text in which {1}, {2}, ... are what the
+    wildcards of the topic stand for, {topic} is the topic, and {$.path} is taken from the message.
+
+    NATS JetStream and Kafka number their messages: each is applied exactly once, whatever is killed; the hull counts
+    the numbers (dynhull_client: last_sequence). MQTT does not: a message may be applied twice, which changes nothing
+    for a key; so --key is required there.
+
+    Bad messages are counted, logged and, with --bad, kept aside. Exit code 1 if there were more than --max-bad.
+    """
+    import asyncio
+
+    from dynhull_client import AsyncHullClient
+
+    from .. import logs
+    from .bad import BadMessages
+    from .ingest import IngestError, feeds_of, run
+    from .mapping import Mapping
+    from .pump import Settings
+
+    mapping = Mapping(hull, x, y, key, time, time_unit, each)
+    on_globe = mapping.degrees if geographic is None else geographic
+    settings = Settings(mapping, {"geographic": on_globe} if create else None, to_end)
+    seconds = {option: duration(text, option) for option, text in (("--grace", grace), ("--report", report))}
+    logs.configure(log_format.value)
+
+    async def serve() -> None:
+        feeds: Sequence[Feed] = await feeds_of(source, hull, producer, keyed=key is not None)
+        async with connect(AsyncHullClient) as client:
+            await run(
+                client,
+                feeds,
+                settings,
+                BadMessages(bad, max_bad),
+                metrics=None if metrics_port is None else (metrics_host, metrics_port),
+                grace=seconds["--grace"].total_seconds() if seconds["--grace"] else 0.0,
+                report=seconds["--report"].total_seconds() if seconds["--report"] else 10.0,
+            )
+
+    try:
+        asyncio.run(serve())
+    except IngestError as error:
+        fail(Exit.FAILED, str(error))

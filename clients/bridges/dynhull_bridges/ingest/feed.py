@@ -1,0 +1,84 @@
+"""What the ingest reads from: messages in order, and how far they have been taken."""
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+UNSAFE = re.compile(r"[^A-Za-z0-9._/-]")
+LONGEST_PRODUCER = 200
+
+
+class FeedError(Exception):
+    """The broker cannot be reached for now, or has lost the connection: the feed begins again."""
+
+
+@dataclass(slots=True, eq=False)
+class Message:
+    """One message of a broker.
+
+    Attributes:
+        topic: the topic or subject it was sent to.
+        captures: what the wildcards of the filter stand for in it.
+        payload: its contents; None for a message without any.
+        number: its place in the log, from 1, rising and perhaps with gaps; 0 where the broker has no log.
+        token: what the feed needs to acknowledge it.
+    """
+
+    topic: str
+    captures: tuple[str, ...]
+    payload: bytes | None
+    number: int = 0
+    token: int = 0
+
+
+class Feed(Protocol):
+    """Messages of one log, or of one subscription where the broker has no log.
+
+    Attributes:
+        name: what it reads, without secrets: for messages and metrics.
+        producer: the name under which the log's numbers are counted in a hull; None where the broker has no log.
+    """
+
+    name: str
+    producer: str | None
+
+    async def begin(self, known: int | None) -> int:
+        """Connect, and begin after the message with this number; returns the number it begins after.
+
+        None begins after the last message that was kept track of with `keep`, or at the oldest one.
+
+        Raises:
+            FeedError: the broker cannot be reached.
+            ValueError: what is to be read does not exist, or is not the log that `known` is about.
+        """
+
+    async def read(self) -> Sequence[Message]:
+        """The next messages in order, some thousand at most; none if none comes within about a second.
+
+        Raises:
+            FeedError: the connection is lost.
+        """
+
+    async def keep(self, messages: Sequence[Message]) -> None:
+        """Note at the broker that these messages, and all before them, have been taken."""
+
+    async def lag(self) -> int | None:
+        """The number of messages that are not read yet; None where the broker has no log."""
+
+    async def close(self) -> None:
+        """Disconnect."""
+
+
+def producer_name(*parts: str) -> str:
+    """A name for a producer that stands for these parts: letters, digits and ._-/, at most 200.
+
+    Parts with other characters, as wildcards are, get a digest, so that different logs have different names.
+    """
+    whole = "/".join(parts)
+    name = UNSAFE.sub("_", whole)
+    if name == whole and len(name) <= LONGEST_PRODUCER:
+        return name
+    digest = hashlib.sha256(whole.encode()).hexdigest()[:12]
+    return f"{name[: LONGEST_PRODUCER - len(digest) - 1]}-{digest}"

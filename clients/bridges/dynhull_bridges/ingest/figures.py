@@ -1,0 +1,29 @@
+"""The metrics of an ingest, as a page for Prometheus."""
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, start_http_server
+
+
+class Figures:
+    """Counts of what the ingest has done, and how far it is behind, by feed."""
+
+    def __init__(self) -> None:
+        self._registry = CollectorRegistry()
+
+        def counter(name: str, text: str) -> Counter:
+            return Counter(f"dynhull_ingest_{name}", text, ["feed"], registry=self._registry)
+
+        self.messages = counter("messages", "Messages read.")
+        self.points = counter("points", "Points acknowledged by the server.")
+        self.bad = counter("bad", "Messages that could not be taken.")
+        self.restarts = counter("restarts", "Times that the feed began again after an error of the broker.")
+        self.lag = Gauge("dynhull_ingest_lag", "Messages that are not taken.", ["feed"], registry=self._registry)
+
+    def add(self, feed: str) -> None:
+        """Show a feed from the start, not only after its first message."""
+        for each in (self.messages, self.points, self.bad, self.restarts):
+            each.labels(feed)
+
+    def serve(self, host: str, port: int) -> int:
+        """Serve the page from another thread, and return its port."""
+        server, _ = start_http_server(port, host, self._registry)
+        return int(server.server_port)

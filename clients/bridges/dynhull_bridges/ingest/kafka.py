@@ -1,0 +1,123 @@
+"""A partition of a Kafka topic as a log: the number of a message is its offset, plus one."""
+
+from collections.abc import Sequence
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from aiokafka import AIOKafkaConsumer, TopicPartition
+from aiokafka.errors import KafkaError
+
+from ..target import without_secrets
+from .feed import FeedError, Message, producer_name
+
+WAIT = 1000  # milliseconds that a read waits for messages
+MOST = 4096  # messages of one read
+GROUP = "dynhull-ingest"
+
+
+class Kafka:
+    """Reads one partition of kafka://HOST[:PORT][,HOST...]/TOPIC."""
+
+    def __init__(self, servers: str, topic: str, partition: int) -> None:
+        self.name = f"kafka/{topic}/{partition}"
+        self.producer: str | None = producer_name("kafka", topic, str(partition))
+        self._servers = servers
+        self.number = partition
+        self._partition = TopicPartition(topic, partition)
+        self._captures = (topic,)
+        self._consumer: AIOKafkaConsumer | None = None
+        self._next = 0
+        self._keeps = False
+
+    async def begin(self, known: int | None) -> int:
+        """Connect; see `Feed.begin`."""
+        consumer = AIOKafkaConsumer(
+            bootstrap_servers=self._servers,
+            group_id=GROUP,  # only keeps the offset: the partition is not shared with other members
+            enable_auto_commit=False,
+            auto_offset_reset="none",
+            isolation_level="read_committed",
+        )
+        self._consumer = consumer
+        partition = self._partition
+        try:
+            await consumer.start()
+            consumer.assign([partition])
+            self._keeps = known is None
+            after = (await consumer.committed(partition) or 0) if known is None else known
+            oldest = (await consumer.beginning_offsets([partition]))[partition]
+            end = (await consumer.end_offsets([partition]))[partition]
+        except (KafkaError, OSError) as error:
+            raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+        if after > end:
+            raise ValueError(
+                f"{self.name} ends at offset {end}, but {after} offsets of it have been taken: the topic was created "
+                "again. Give another --producer, or another hull"
+            )
+        self._next = max(after, oldest)
+        consumer.seek(partition, self._next)
+        return after
+
+    async def read(self) -> Sequence[Message]:
+        """The next messages; see `Feed.read`."""
+        try:
+            found = await self._connected.getmany(self._partition, timeout_ms=WAIT, max_records=MOST)
+        except (KafkaError, OSError) as error:
+            raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+        records = found.get(self._partition, ())
+        if records:
+            self._next = records[-1].offset + 1
+        return [Message(each.topic, self._captures, each.value, each.offset + 1) for each in records]
+
+    async def keep(self, messages: Sequence[Message]) -> None:
+        """Commit the offset after the last one, unless the hull keeps it."""
+        if not self._keeps:
+            return
+        try:
+            await self._connected.commit({self._partition: messages[-1].number})
+        except (KafkaError, OSError) as error:
+            raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+
+    async def lag(self) -> int | None:
+        """The number of messages that are not read yet."""
+        end = self._connected.highwater(self._partition)
+        return None if end is None else max(0, end - self._next)
+
+    async def close(self) -> None:
+        """Disconnect."""
+        consumer, self._consumer = self._consumer, None
+        if consumer is not None:
+            await consumer.stop()
+
+    @property
+    def _connected(self) -> AIOKafkaConsumer:
+        if self._consumer is None:
+            raise FeedError("Kafka: not connected")
+        return self._consumer
+
+
+async def partitions_of(url: str) -> list[Kafka]:
+    """The partitions that kafka://HOST[:PORT]/TOPIC[?partition=N&partition=M] stands for; all of them by default.
+
+    Raises:
+        ValueError: the URL names no topic, or one that does not exist.
+        FeedError: no broker answers.
+    """
+    parts = urlsplit(url)
+    topic = unquote(parts.path).strip("/")
+    if not parts.netloc or not topic or "/" in topic:
+        raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
+    consumer = AIOKafkaConsumer(bootstrap_servers=parts.netloc, group_id=None)
+    try:
+        await consumer.start()
+        await consumer.topics()
+        there = consumer.partitions_for_topic(topic)
+    except (KafkaError, OSError) as error:
+        raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+    finally:
+        await consumer.stop()
+    if not there:
+        raise ValueError(f"Kafka has no topic {topic!r}")
+    asked = [int(each) for each in parse_qs(parts.query).get("partition", ()) if each.isdecimal()] or sorted(there)
+    if missing := sorted(set(asked) - set(there)):
+        raise ValueError(f"the topic {topic!r} has no partition {missing[0]}: it has 0 to {max(there)}")
+    return [Kafka(parts.netloc, topic, each) for each in asked]

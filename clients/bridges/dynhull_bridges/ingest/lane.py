@@ -1,0 +1,250 @@
+"""One hull of an ingest: sends chunks as numbered batches, and sends again what is not acknowledged."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import structlog
+
+from dynhull_client import (
+    AsyncHullClient,
+    DeadlineError,
+    DynhullError,
+    HullExistsError,
+    HullNotFoundError,
+    HullUnsuitableError,
+    InvalidRequestError,
+    LimitExceededError,
+    ProducerInUseError,
+    SequenceGapError,
+    UnavailableError,
+)
+
+from .chunk import Chunk
+from .feed import Message
+
+if TYPE_CHECKING:
+    from dynhull_client import AsyncWriter
+
+log = structlog.get_logger("dynhull_ingest")
+IN_FLIGHT = 32  # batches that are not acknowledged
+WAITING = 4  # chunks beyond these, before the feed is read on
+PATIENCE = 10.0  # seconds without a server, after which the log says so
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
+
+
+class NotCreatedError(Exception):
+    """There is no such hull, and the ingest shall not create one, or it is of another kind."""
+
+
+class _RefusedError(Exception):
+    """A chunk was refused."""
+
+    def __init__(self, chunk: Chunk, error: Exception) -> None:
+        super().__init__(str(error))
+        self.chunk = chunk
+        self.error = error
+
+
+class Lane:
+    """Sends chunks to a hull, in order.
+
+    Args:
+        client: the client.
+        hull: the name of the hull.
+        producer: the name under which the hull counts the numbers of the messages; None without numbers.
+        keyed: whether rows have keys.
+        create: settings of the hull if there is none; None to create none.
+        bad: called with each message that is refused, and why.
+        settled: called when a chunk is settled, with the number of its rows that were applied.
+    """
+
+    def __init__(
+        self,
+        client: AsyncHullClient,
+        hull: str,
+        producer: str | None,
+        *,
+        keyed: bool,
+        create: dict[str, Any] | None,
+        bad: Callable[[Message, Exception], None],
+        settled: Callable[[int], None],
+    ) -> None:
+        self._client = client
+        self._hull = hull
+        self._producer = producer
+        self._keyed = keyed
+        self._create = create
+        self._bad = bad
+        self._settled = settled
+        self._kind: str | None = None
+        self._waiting: deque[Chunk] = deque()  # not given to the writer
+        self._flying: deque[Chunk] = deque()  # given to it, and not settled
+        self._failure: Exception | None = None
+        self._news = asyncio.Event()
+        self._room = asyncio.Event()
+
+    async def put(self, chunk: Chunk) -> None:
+        """Queue a chunk; waits while many wait already."""
+        while len(self._waiting) >= WAITING:
+            self._room.clear()
+            await self._room.wait()
+        self._waiting.append(chunk)
+        self._news.set()
+
+    async def run(self) -> None:
+        """Send chunks until cancelled.
+
+        Raises:
+            DynhullError: the server refuses the writer itself, for example its token.
+            NotCreatedError: there is no hull that can take the points.
+            OSError, TooManyBadError: bad messages cannot be kept aside.
+        """
+        pause = FIRST_PAUSE
+        while True:
+            before = self._progress()
+            try:
+                await self._write()
+            except _RefusedError as refused:
+                self._set_aside(refused.chunk, refused.error)
+                continue
+            except (SequenceGapError, ProducerInUseError) as error:
+                log.warning("another ingest of the same log writes to the hull", hull=self._hull, error=str(error))
+            except HullNotFoundError:
+                log.warning("the hull was deleted", hull=self._hull)
+            except (UnavailableError, DeadlineError, LimitExceededError) as error:
+                log.warning("waiting for the server", hull=self._hull, error=str(error))
+            pause = FIRST_PAUSE if self._progress() != before else min(2 * pause, LONGEST_PAUSE)
+            await asyncio.sleep(pause)
+
+    def _progress(self) -> int:
+        return len(self._flying) + len(self._waiting)
+
+    async def _write(self) -> None:
+        """Send chunks with one writer, until it fails."""
+        await self._require_hull()
+        self._waiting.extendleft(reversed(self._flying))
+        self._flying.clear()
+        self._failure = None
+        writer = self._client.writer(
+            self._hull,
+            producer=self._producer,
+            may_skip=self._producer is not None,
+            batch_points=1,
+            linger=0,
+            in_flight=IN_FLIGHT,
+            stop_on_error=True,
+            patience=PATIENCE,
+        )
+        async with writer:
+            known = writer.sequence if self._producer is not None else -1
+            while True:
+                while self._waiting and self._failure is None:
+                    await self._send(writer, known)
+                if self._failure is not None:
+                    self._raise(self._failure)
+                self._news.clear()
+                await self._news.wait()
+
+    async def _send(self, writer: "AsyncWriter", known: int) -> None:
+        """Give the writer the first chunk that waits."""
+        chunk = self._waiting.popleft()
+        self._room.set()
+        rest = chunk.after(known)
+        if rest is None:
+            self._settled(0)
+            return
+        self._flying.append(rest)
+        sequence = rest.number if self._producer is not None else None
+        times = rest.times if rest.times[0] is not None else None
+        try:
+            if self._keyed:
+                outcome = await writer.put(keys=self._keys(rest), points=rest.points, times=times, sequence=sequence)
+            else:
+                outcome = await writer.put(rest.points, times=times, sequence=sequence)
+        except DynhullError as error:
+            if len(self._flying) == 1:
+                self._raise(error)
+            # The batches before this one hear of the same error, after the last of them that was applied.
+            while self._failure is None:
+                self._news.clear()
+                await self._news.wait()
+        except (ValueError, TypeError) as error:
+            raise _RefusedError(rest, error) from None
+        else:
+            outcome.add_done_callback(partial(self._done, rest))
+
+    def _done(self, chunk: Chunk, outcome: asyncio.Future[Any]) -> None:
+        """The writer settles batches in order."""
+        if outcome.cancelled() or not self._flying:
+            return
+        error = outcome.exception()
+        if error is None and self._flying[0] is chunk:
+            self._flying.popleft()
+            chunk.settle()
+            self._settled(len(chunk.points))
+        elif self._failure is None and isinstance(error, Exception):
+            self._failure = error
+        self._news.set()
+
+    def _raise(self, error: Exception) -> None:
+        """Raise the error of the writer, as one of the first chunk that is not settled if that is at fault."""
+        refusal = isinstance(error, (InvalidRequestError, HullUnsuitableError))
+        if refusal and self._flying:
+            raise _RefusedError(self._flying[0], error)
+        raise error
+
+    def _keys(self, chunk: Chunk) -> list[Any]:
+        if self._kind == "str":
+            return [str(each) for each in chunk.keys]
+        if all(isinstance(each, int) for each in chunk.keys):
+            return chunk.keys
+        return [self._integer(each) for each in chunk.keys]
+
+    @staticmethod
+    def _integer(key: Any) -> int:
+        if isinstance(key, str) and not key.isdecimal():
+            raise ValueError(f"the key is {key!r}, and those of the hull are integers")
+        return int(key)
+
+    def _set_aside(self, chunk: Chunk, error: Exception) -> None:
+        """Keep aside the message at fault, or divide the chunk to find it."""
+        self._waiting.extendleft(reversed(self._flying))
+        self._flying.clear()
+        place = self._waiting.index(chunk)
+        if len(chunk.messages) == 1:
+            self._bad(chunk.messages[0][0], error)
+            del self._waiting[place]
+            chunk.settle()
+            self._settled(0)
+            return
+        row = error.row if isinstance(error, DynhullError) else None
+        parts = chunk.split(row)
+        del self._waiting[place]
+        for part in reversed(parts):
+            self._waiting.insert(place, part)
+
+    async def _require_hull(self) -> None:
+        """Create the hull if there is none, and learn the type of its keys."""
+        try:
+            info = (await self._client.get_hull(self._hull)).info
+        except HullNotFoundError as error:
+            if self._create is None:
+                raise NotCreatedError(f"{error}; `dynhull create` adds one, or leave out --no-create") from None
+            settings = dict(self._create)
+            if self._keyed:
+                settings["keyed"] = "int" if self._first_key_is_integer() else "str"
+            try:
+                info = await self._client.create_hull(self._hull, **settings)
+            except HullExistsError:
+                info = (await self._client.get_hull(self._hull)).info
+        if (info.keyed is not None) != self._keyed:
+            kind = "keys: give --key" if info.keyed is not None else "no keys: leave out --key"
+            raise NotCreatedError(f"the points of {self._hull!r} have {kind}, or write to another hull")
+        self._kind = info.keyed
+
+    def _first_key_is_integer(self) -> bool:
+        first = next((chunk.keys[0] for chunk in (*self._flying, *self._waiting) if chunk.keys), None)
+        return isinstance(first, int)

@@ -1,0 +1,120 @@
+"""From messages to rows: which hull, which key, where, when."""
+
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import orjson
+
+from dynhull_cli.columns import are_degrees, plain
+from dynhull_cli.times import TimeReader, TimeUnit
+
+from .expressions import MISSING, is_fixed, last_name, value_of
+from .feed import Message
+
+
+class Row(NamedTuple):
+    """A position; `time` is in microseconds since 1970."""
+
+    hull: str
+    key: Any
+    x: float
+    y: float
+    time: int | None
+
+
+class Mapping:
+    """Reads rows from messages of JSON.
+
+    Args:
+        hull: an expression for the name of the hull, see `expressions`.
+        x, y: expressions for the coordinates.
+        key: an expression for the key; None for points without keys.
+        time: an expression for the event time; None for none.
+        time_unit: the unit of times that are numbers; None for that which the first one seems to have.
+        each: a path to an array with a row in each element; None if a message is one row.
+
+    Attributes:
+        hull: the hull of all messages; None if it depends on the message.
+        keyed: whether rows have keys.
+        degrees: whether the coordinates have the names of longitudes and latitudes.
+
+    Raises:
+        ValueError: an expression is none.
+    """
+
+    def __init__(
+        self, hull: str, x: str, y: str, key: str | None, time: str | None, time_unit: TimeUnit | None, each: str | None
+    ) -> None:
+        self.hull = hull if is_fixed(hull) else None
+        self.keyed = key is not None
+        self.degrees = are_degrees(last_name(x), last_name(y))
+        self._hull = value_of(hull, "--hull")
+        self._x, self._y = value_of(x, "--x"), value_of(y, "--y")
+        for name, text in (("x", x), ("y", y)):
+            if is_fixed(text):
+                raise ValueError(f"--{name} {text!r} is the same for all messages: give a path, such as '$.{name}'")
+        self._key = None if key is None else value_of(key, "--key")
+        self._time = None if time is None else value_of(time, "--time")
+        self.times = TimeReader("time", time_unit)
+        if each is not None and not each.startswith("$"):
+            raise ValueError(f"--each {each!r} is no path: it begins with $")
+        self._each = None if each is None else value_of(each, "--each")
+
+    def rows(self, message: Message) -> list[Row]:
+        """The rows of a message; ValueError says what is wrong with it."""
+        return [self._row(message, document) for document in self._documents(message)]
+
+    def _documents(self, message: Message) -> Iterator[Any]:
+        if message.payload is None:
+            raise ValueError("the message is empty")
+        try:
+            document = orjson.loads(message.payload)
+        except orjson.JSONDecodeError as error:
+            raise ValueError(f"the message is no JSON: {error}") from None
+        if self._each is None:
+            yield document
+            return
+        elements = self._each(message, document)
+        if not isinstance(elements, list):
+            raise ValueError("--each finds no array in the message")
+        yield from elements
+
+    def _row(self, message: Message, document: Any) -> Row:
+        key, time = None, None
+        if self._key is not None:
+            key = self._key(message, document)
+            if not isinstance(key, (str, int)) or isinstance(key, bool):
+                raise ValueError(f"the key is {_shown(key)}, not a string or an integer")
+        if self._time is not None:
+            time = self.times.read(_present(self._time(message, document), "time"))
+        x = _number(self._x(message, document), "x")
+        y = _number(self._y(message, document), "y")
+        hull = self._hull(message, document)
+        if not isinstance(hull, str):
+            raise ValueError(f"the hull is {_shown(hull)}, not a string")
+        return Row(hull, key, x, y, time)
+
+
+def _number(value: Any, name: str) -> float:
+    number = value
+    if isinstance(value, str):
+        with suppress(ValueError):  # it is no number, which is said below
+            number = float(plain(value))
+    if not isinstance(number, (int, float)) or isinstance(number, bool):
+        raise ValueError(f"{name} is {_shown(value)}, not a number")
+    number = float(number)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {_shown(value)}, not finite")
+    return number + 0.0
+
+
+def _present(value: Any, name: str) -> Any:
+    if value is MISSING or value is None:
+        raise ValueError(f"{name} is missing")
+    return value
+
+
+def _shown(value: Any) -> str:
+    return "missing" if value is MISSING or value is None else repr(value)[:100]

@@ -1,0 +1,178 @@
+"""A subscription of MQTT: the broker resends a message until the server has its rows."""
+
+import asyncio
+import hashlib
+import socket
+import threading
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from paho.mqtt.client import Client, MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from ..target import without_secrets
+from .feed import FeedError, Message
+from .topics import captures_of
+
+PORT, TLS_PORT = 1883, 8883
+AT_LEAST_ONCE = 1
+WAIT = 1.0  # seconds that a read waits for messages
+TIMEOUT = 10.0  # seconds for a connection
+MOST = 4096  # messages of one read
+WAITING = 65_536  # messages that may wait to be read: with QoS 1 the broker sends no more
+KEPT = 7 * 24 * 3600  # seconds for which the broker keeps a session of MQTT 5
+VERSIONS = {"3": MQTTProtocolVersion.MQTTv311, "3.1.1": MQTTProtocolVersion.MQTTv311, "5": MQTTProtocolVersion.MQTTv5}
+SHARED = "$share/"
+
+
+class Mqtt:
+    """Reads mqtt://[USER:PASSWORD@]HOST[:PORT]/FILTER[?version=3.1.1&client_id=NAME], or mqtts:// for TLS.
+
+    The filter may have wildcards, and begin with $share/GROUP/ to share its messages with other subscribers. The broker
+    keeps the session of the client id while nobody is connected.
+    """
+
+    def __init__(self, url: str, hull: str) -> None:
+        parts = urlsplit(url, allow_fragments=False)
+        # A filter may have +, # and $, which need no escapes here.
+        query = parse_qs(parts.query)
+        self._filter = unquote(parts.path.removeprefix("/"))
+        if not parts.hostname or not self._filter:
+            raise ValueError(f"{without_secrets(url)}: give mqtt://HOST/FILTER")
+        version = query.get("version", ["5"])[0]
+        if version not in VERSIONS:
+            raise ValueError(f"{without_secrets(url)}: version is {version!r}, not 3.1.1 or 5")
+        encrypted = parts.scheme == "mqtts"
+        self.name = without_secrets(url)
+        self.producer: str | None = None
+        self._host, self._port = parts.hostname, parts.port or (TLS_PORT if encrypted else PORT)
+        plain = self._filter.split("/", 2)[2] if self._filter.startswith(SHARED) else self._filter
+        self._captures = captures_of(plain, "/", "+", "#")
+        digest = hashlib.sha256(f"{self._filter} {hull}".encode()).hexdigest()[:12]
+        name = query.get("client_id", [f"dynhull-{socket.gethostname()}-{digest}"])[0]
+        self._version = VERSIONS[version]
+        five = self._version == MQTTProtocolVersion.MQTTv5
+        self._client = Client(
+            CallbackAPIVersion.VERSION2,
+            name,
+            clean_session=None if five else False,
+            protocol=self._version,
+            manual_ack=True,
+        )
+        if parts.username:
+            self._client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
+        if encrypted:
+            self._client.tls_set()
+        self._client.on_connect = self._connected
+        self._client.on_subscribe = self._subscribed
+        self._client.on_disconnect = self._disconnected
+        self._client.on_message = self._arrive
+        self._connections = 0  # an acknowledgement is for the connection that its message came on
+        self._ready: asyncio.Future[None]
+        self._loop: asyncio.AbstractEventLoop
+        self._lock = threading.Condition()
+        self._arrived: deque[tuple[int, MQTTMessage]] = deque()
+        self._news = asyncio.Event()
+        self._lost: str | None = None
+        self._closed = False
+
+    async def begin(self, known: int | None) -> int:  # noqa: ARG002  # a subscription has no numbers
+        """Connect; see `Feed.begin`."""
+        self._loop = asyncio.get_running_loop()
+        self._ready = self._loop.create_future()
+        self._lost, self._closed = None, False
+        options: dict[str, Any] = {}
+        if self._version == MQTTProtocolVersion.MQTTv5:
+            properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+            properties.SessionExpiryInterval = KEPT
+            properties.ReceiveMaximum = 65_535
+            options = {"clean_start": False, "properties": properties}
+        try:
+            await asyncio.to_thread(self._client.connect, self._host, self._port, **options)
+            self._client.loop_start()
+            await asyncio.wait_for(self._ready, TIMEOUT)
+        except (OSError, TimeoutError) as error:
+            raise FeedError(f"MQTT: {type(error).__name__}: {error}") from None
+        return 0
+
+    async def read(self) -> Sequence[Message]:
+        """The next messages; see `Feed.read`."""
+        if not self._arrived:
+            self._news.clear()
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), WAIT)
+        if self._lost is not None and not self._arrived:
+            raise FeedError(f"MQTT: {self._lost}")
+        with self._lock:
+            found = [self._arrived.popleft() for _ in range(min(len(self._arrived), MOST))]
+            self._lock.notify()
+        messages = []
+        for connection, each in found:
+            token = connection << 32 | each.qos << 16 | each.mid
+            messages.append(Message(each.topic, self._captures(each.topic), bytes(each.payload) or None, token=token))
+        return messages
+
+    async def keep(self, messages: Sequence[Message]) -> None:
+        """Acknowledge the messages, unless they came on an earlier connection."""
+        for each in messages:
+            connection, qos, number = each.token >> 32, each.token >> 16 & 3, each.token & 0xFFFF
+            if connection == self._connections and qos:
+                self._client.ack(number, qos)
+
+    async def lag(self) -> int | None:
+        """None: a subscription has no end."""
+        return None
+
+    async def close(self) -> None:
+        """Disconnect."""
+        with self._lock:
+            self._closed = True
+            self._arrived.clear()
+            self._lock.notify()
+        self._client.disconnect()
+        await asyncio.to_thread(self._client.loop_stop)
+
+    # These run in the thread of the MQTT client.
+
+    def _connected(self, _client: Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any) -> None:
+        if reason.is_failure:
+            self._tell(ValueError(f"the broker refuses the connection: {reason}"))
+            return
+        with self._lock:
+            self._connections += 1
+            self._arrived.clear()  # what is not acknowledged comes again
+        self._client.subscribe(self._filter, AT_LEAST_ONCE)
+
+    def _subscribed(self, _client: Client, _data: Any, _number: int, reasons: list[ReasonCode], _props: Any) -> None:
+        if reasons[0].is_failure:
+            self._tell(ValueError(f"the broker refuses the filter {self._filter!r}: {reasons[0]}"))
+        else:
+            self._tell(None)
+
+    def _disconnected(self, _client: Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any) -> None:
+        self._lost = str(reason)
+        self._loop.call_soon_threadsafe(self._news.set)
+
+    def _arrive(self, _client: Client, _data: Any, message: MQTTMessage) -> None:
+        with self._lock:
+            self._lock.wait_for(lambda: len(self._arrived) < WAITING or self._closed)
+            self._arrived.append((self._connections, message))
+            first = len(self._arrived) == 1
+        if first:
+            self._loop.call_soon_threadsafe(self._news.set)
+
+    def _tell(self, error: Exception | None) -> None:
+        def settle() -> None:
+            if not self._ready.done():
+                if error is None:
+                    self._ready.set_result(None)
+                else:
+                    self._ready.set_exception(error)
+
+        self._loop.call_soon_threadsafe(settle)

@@ -1,0 +1,213 @@
+"""Moves the messages of one feed into hulls."""
+
+import asyncio
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import structlog
+
+from dynhull_client import AsyncHullClient, HullNotFoundError
+
+from .bad import BadMessages
+from .chunk import Taken, chunks_of
+from .feed import Feed, FeedError, Message
+from .figures import Figures
+from .lane import Lane
+from .mapping import Mapping, Row
+
+log = structlog.get_logger("dynhull_ingest")
+UNDER_WAY = 64  # reads that are not settled
+KEEP_EVERY = 1.0  # seconds between notes of the place in a log
+FIRST_PAUSE, LONGEST_PAUSE = 0.2, 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What an ingest does with messages.
+
+    Attributes:
+        mapping: reads rows from them.
+        create: settings of hulls that do not exist; None to create none.
+        to_end: whether to end once no message is left.
+    """
+
+    mapping: Mapping
+    create: dict[str, Any] | None
+    to_end: bool
+
+
+class Pump:
+    """Reads a feed, sends the rows to their hulls, and notes at the broker what the server has acknowledged.
+
+    A message is taken when all of its rows are acknowledged, or when it is kept aside as bad. Whatever is killed, the
+    next pump begins at the first message that may not be taken; hulls drop what they have already, by its number.
+    """
+
+    def __init__(
+        self, client: AsyncHullClient, feed: Feed, settings: Settings, bad: BadMessages, figures: Figures
+    ) -> None:
+        self.reached = 0  # the number of the last message read
+        self.points = 0  # acknowledged
+        self._client = client
+        self._feed = feed
+        self._settings = settings
+        self._figures = figures
+        self._bad = bad
+        self._lanes: dict[str, Lane] = {}
+        self._sending: list[asyncio.Task[None]] = []
+        self._under_way: deque[Taken] = deque()
+        self._news = asyncio.Event()
+        self._room = asyncio.Event()
+        self._noting = asyncio.Lock()
+        figures.add(feed.name)
+
+    async def run(self, stop: asyncio.Event) -> None:
+        """Read until `stop`, or until no message is left if that is asked for; then wait for what is under way.
+
+        Raises:
+            ExceptionGroup: messages cannot be sent, or the feed is not what it was.
+        """
+        try:
+            async with asyncio.TaskGroup() as group:
+                self._group = group
+                keeping = group.create_task(self._keeping())
+                await self._read(stop)
+                keeping.cancel()
+                for each in self._sending:
+                    each.cancel()
+        finally:
+            await self._feed.close()
+
+    async def _read(self, stop: asyncio.Event) -> None:
+        """One connection to the broker after another."""
+        pause = FIRST_PAUSE
+        while not stop.is_set():
+            reached = self.reached
+            try:
+                await self._connection(stop)
+            except FeedError as error:
+                self._figures.restarts.labels(self._feed.name).inc()
+                log.warning("the broker does not answer, trying again", feed=self._feed.name, error=str(error))
+            else:
+                return
+            await self._feed.close()
+            pause = FIRST_PAUSE if self.reached > reached else min(2 * pause, LONGEST_PAUSE)
+            try:
+                await asyncio.wait_for(stop.wait(), pause)
+            except TimeoutError:
+                continue
+
+    async def _connection(self, stop: asyncio.Event) -> None:
+        feed = self._feed
+        begun = await feed.begin(self.reached or await self._known())
+        self.reached = max(self.reached, begun)
+        log.info("reading", feed=feed.name, after=begun)
+        while not stop.is_set():
+            messages = await feed.read()
+            if messages:
+                await self._take(messages)
+            elif self._settings.to_end and await feed.lag() == 0:
+                break
+            while len(self._under_way) >= UNDER_WAY:
+                self._room.clear()
+                await self._room.wait()
+        while self._under_way:
+            self._room.clear()
+            await self._room.wait()
+        await self._keep()
+
+    async def _known(self) -> int | None:
+        """The number of the last message that the hull has, if all messages are for one hull."""
+        hull = self._settings.mapping.hull
+        if hull is None or self._feed.producer is None:
+            return None
+        try:
+            return await self._client.last_sequence(hull, self._feed.producer)
+        except HullNotFoundError:
+            return 0
+
+    async def _take(self, messages: Sequence[Message]) -> None:
+        """Hand the rows of some messages to the lanes of their hulls."""
+        self._figures.messages.labels(self._feed.name).inc(len(messages))
+        taken = Taken(messages)
+        self._under_way.append(taken)
+        for hull, chunk in chunks_of(taken, self._rows(messages)):
+            lane = self._lanes.get(hull)
+            if lane is None:
+                lane = self._lanes[hull] = self._lane(hull)
+            await lane.put(chunk)
+        taken.whole = True
+        self._news.set()
+        self.reached = max(self.reached, messages[-1].number)
+
+    def _rows(self, messages: Sequence[Message]) -> Iterator[tuple[Message, list[Row]]]:
+        rows = self._settings.mapping.rows
+        for message in messages:
+            try:
+                found = rows(message)
+                _require_keys_once(found)
+            except ValueError as error:
+                self._set_aside(message, error)
+                continue
+            yield message, found
+
+    def _set_aside(self, message: Message, error: Exception) -> None:
+        self._figures.bad.labels(self._feed.name).inc()
+        self._bad.add(message, error)
+
+    def _lane(self, hull: str) -> Lane:
+        settings = self._settings
+        lane = Lane(
+            self._client,
+            hull,
+            self._feed.producer,
+            keyed=settings.mapping.keyed,
+            create=settings.create,
+            bad=self._set_aside,
+            settled=self._settled,
+        )
+        self._sending.append(self._group.create_task(lane.run(), name=f"ingest into {hull}"))
+        return lane
+
+    def _settled(self, rows: int) -> None:
+        self.points += rows
+        self._figures.points.labels(self._feed.name).inc(rows)
+        self._news.set()
+
+    async def _keeping(self) -> None:
+        """Note at the broker what has been taken, at once where it resends the rest, else now and then."""
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            await self._keep()
+            if self._feed.producer is not None:
+                await asyncio.sleep(KEEP_EVERY)
+
+    async def _keep(self) -> None:
+        async with self._noting:
+            messages: list[Message] = []
+            while self._under_way and self._under_way[0].settled:
+                messages.extend(self._under_way.popleft().messages)
+            self._room.set()
+            try:
+                if messages:
+                    await self._feed.keep(messages)
+                lag = await self._feed.lag()
+            except FeedError as error:  # reading fails too, and begins again
+                log.debug("the place in the log was not kept", feed=self._feed.name, error=str(error))
+                return
+            if lag is not None:
+                lag += sum(len(each.messages) for each in self._under_way)
+                self._figures.lag.labels(self._feed.name).set(lag)
+
+
+def _require_keys_once(rows: Sequence[Row]) -> None:
+    if len(rows) < 2 or rows[0].key is None:
+        return
+    keys = set()
+    for row in rows:
+        if (row.hull, row.key) in keys:
+            raise ValueError(f"the key {row.key!r} is in the message twice")
+        keys.add((row.hull, row.key))

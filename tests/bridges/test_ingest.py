@@ -1,0 +1,257 @@
+"""Messages of real brokers become points, each exactly once, whatever is killed."""
+
+import asyncio
+import json
+import random
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import nats
+import pytest
+from brokers import broker, free_port, mosquitto, nats_server
+from command_line import dynhull
+from ingest_process import ingest_process, ingested
+from paho.mqtt.client import Client
+from paho.mqtt.enums import CallbackAPIVersion
+from patience import PATIENCE, wait_until
+from server_process import server_process
+
+from dynhull_client import HullClient, HullNotFoundError
+
+
+@pytest.fixture(scope="module")
+def nats_port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """A NATS server that tests share; each has a stream of its own."""
+    port = free_port()
+    with broker(nats_server(tmp_path_factory.mktemp("broker"), port), port):
+        yield port
+
+
+@pytest.fixture
+def client(address: str) -> Iterator[HullClient]:
+    with HullClient(address) as client:
+        yield client
+
+
+def publish(port: int, stream: str, messages: Sequence[tuple[str, Any]], *, anew: bool = False) -> None:
+    """Publish to subjects below the stream's name; each message is stored when this returns."""
+
+    async def run() -> None:
+        async with await nats.connect(f"nats://127.0.0.1:{port}") as connection:
+            context = connection.jetstream()
+            if anew:
+                await context.delete_stream(stream)
+            await context.add_stream(name=stream, subjects=[f"{stream}.>"])
+            for subject, message in messages:
+                payload = message if isinstance(message, bytes) else json.dumps(message).encode()
+                await context.publish(f"{stream}.{subject}", payload)
+
+    asyncio.run(run())
+
+
+def positions(client: HullClient, hull: str, keys: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    found = client.positions(hull, keys)
+    return {key: tuple(place) for key, place in zip(keys, found.positions.tolist(), strict=True)}
+
+
+def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, name: str, nats_port: int) -> None:
+    moves = [(f"v{i % 3}.position", {"lon": i % 7, "lat": i % 5, "ts": 1_700_000_000 + i}) for i in range(50)]
+    publish(nats_port, name, moves)
+    url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*.position"
+    said = ingested(address, url, "--hull", name, "--key", "{1}", "--time", "$.ts")
+    assert said[-1] == {**said[-1], "event": "stopped", "points": 50, "bad": 0}
+    last = {move[0].partition(".")[0]: move[1] for move in moves}
+    assert positions(client, name, list(last)) == {key: (at["lon"], at["lat"]) for key, at in last.items()}
+    info = client.get_hull(name).info
+    assert (info.keyed, info.geographic) == ("str", True)
+    publish(nats_port, name, [("v0.position", {"lon": 1, "lat": 1, "ts": 1_700_000_100}), ("v0.other", {})])
+    said = ingested(address, url, "--hull", name, "--key", "{1}", "--time", "$.ts")
+    assert [line["after"] for line in said if line["event"] == "reading"] == [50]
+    assert said[-1]["points"] == 1
+
+
+def test_hulls_by_subject_and_several_points_a_message(
+    client: HullClient, address: str, name: str, nats_port: int
+) -> None:
+    batch = {"fixes": [{"n": i, "p": [i, i * i]} for i in range(10)]}
+    publish(nats_port, name, [("a", batch), ("b", batch), ("a", {"fixes": [{"n": 3, "p": [-1, -1]}]})])
+    url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
+    options = ("--hull", f"{name}/{{1}}", "--each", "$.fixes", "--key", "$.n", "--x", "$.p[0]", "--y", "$.p[1]")
+    ingested(address, url, *options)
+    assert client.get_hull(f"{name}/a").info.keyed == "int"
+    assert client.positions(f"{name}/a", [3, 4]).positions.tolist() == [[-1, -1], [4, 16]]
+    assert client.positions(f"{name}/b", [3]).positions.tolist() == [[3, 9]]
+    assert client.get_hull(f"{name}/a").info.geographic is False
+    said = ingested(address, url, *options)  # the place is kept by the broker, for there are several hulls
+    assert [line["after"] for line in said if line["event"] == "reading"] == [3]
+
+
+BAD = {
+    b"{": "the message is no JSON",
+    b"": "the message is empty",
+    b"[1, 2]": "the key is missing",
+    b'{"id": 1.5, "x": 1, "y": 1}': "the key is 1.5, not a string or an integer",
+    b'{"id": "a", "x": 1}': "y is missing, not a number",
+    b'{"id": "a", "x": "east", "y": 1}': "x is 'east', not a number",
+    b'{"id": "a", "x": "inf", "y": 1}': "x is 'inf', not finite",
+    b'{"id": "", "x": 1, "y": 1}': "",
+    b'{"id": "' + b"k" * 5000 + b'", "x": 1, "y": 1}': "",
+}
+
+
+def test_bad_messages_are_kept_aside(
+    client: HullClient, address: str, name: str, nats_port: int, tmp_path: Path
+) -> None:
+    """Those that only the server refuses too, one by one; the good ones around them arrive."""
+    client.create_hull(name, keyed="str")
+    messages: list[tuple[str, Any]] = []
+    for index, bad in enumerate(BAD):
+        messages += [("p", {"id": f"good{index}", "x": index, "y": "-2.5"}), ("p", bad)]
+    publish(nats_port, name, messages)
+    url = f"nats://127.0.0.1:{nats_port}/{name}"
+    options = ("--hull", name, "--key", "$.id", "--x", "$.x", "--y", "$.y")
+    said = ingested(address, url, *options, "--bad", tmp_path / "bad.ndjson", "--metrics-port", "0")
+    assert (said[-1]["points"], said[-1]["bad"]) == (len(BAD), len(BAD))
+    kept = [json.loads(line) for line in (tmp_path / "bad.ndjson").read_text().splitlines()]
+    assert sorted(line["number"] for line in kept) == list(range(2, 2 * len(BAD) + 1, 2))
+    for line in kept:
+        bad = line["payload"].encode()
+        assert line["topic"] == f"{name}.p"
+        assert line["error"].startswith(BAD[bad]), line
+    keys = [f"good{index}" for index in range(len(BAD))]
+    assert positions(client, name, keys) == {key: (index, -2.5) for index, key in enumerate(keys)}
+    client.create_hull(f"{name}-2", keyed="str")
+    with ingest_process(address, url, *options[2:], "--hull", f"{name}-2", "--max-bad", "1", code=1) as ingest:
+        ingest.process.wait(PATIENCE)
+        assert "more than 1 bad messages" in ingest.lines()[-1]
+
+
+def test_whatever_is_killed_each_message_is_applied_once(name: str, tmp_path: Path) -> None:
+    """Points without keys: one that came twice would be counted twice."""
+    port = free_port()
+    folder = ("--data", str(tmp_path / "data"))
+    rng = random.Random(5)
+    with server_process(*folder, killed=True) as server:
+        address = server.address
+        options = (f"nats://127.0.0.1:{port}/{name}", "--hull", name, "--x", "$[0]", "--y", "$[1]", "--plane")
+        with broker(nats_server(tmp_path, port), port):
+            publish(port, name, [("p", [i, i * i]) for i in range(1000)])
+            with ingest_process(address, *options, killed=True) as ingest:
+                ingest.wait_for("reading")
+                publish(port, name, [("p", [i, i * i]) for i in range(1000, 1000 + rng.randrange(500))])
+                ingest.process.kill()
+            with ingest_process(address, *options, killed=True) as ingest:
+                ingest.wait_for("reading")
+                server.process.kill()
+                server.process.wait()
+                publish(port, name, [("p", [i, i * i]) for i in range(2000, 2500)])
+                ingest.process.kill()
+    listening = ("--port", address.rpartition(":")[2])
+    with server_process(*folder, *listening) as server, HullClient(server.address) as client:
+        with ingest_process(server.address, *options) as first, ingest_process(server.address, *options) as second:
+            first.wait_for("the broker does not answer, trying again")
+            with broker(nats_server(tmp_path, port), port):
+                publish(port, name, [("p", [i, i * i]) for i in range(3000, 3500)])
+                total = stored(port, name)
+                second.wait_for("reading")
+                wait_until(lambda: last_sequence(client, name, f"nats/{name}") == total)
+        with broker(nats_server(tmp_path, port), port):
+            ingested(server.address, *options)
+        info = client.get_hull(name).info
+        assert (info.points, info.distinct) == (total, total)
+
+
+def last_sequence(client: HullClient, hull: str, producer: str) -> int:
+    try:
+        return client.last_sequence(hull, producer)
+    except HullNotFoundError:
+        return 0
+
+
+def stored(port: int, stream: str) -> int:
+    async def run() -> int:
+        async with await nats.connect(f"nats://127.0.0.1:{port}") as connection:
+            return (await connection.jetstream().stream_info(stream)).state.messages
+
+    return asyncio.run(run())
+
+
+def test_a_stream_that_was_created_again_is_refused(address: str, name: str, nats_port: int) -> None:
+    options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--x", "$.x", "--y", "$.y")
+    publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 3)
+    ingested(address, *options)
+    publish(nats_port, name, [("p", {"x": 1, "y": 1})], anew=True)
+    with ingest_process(address, *options, code=2) as ingest:
+        ingest.process.wait(PATIENCE)
+        assert "was created again. Give another --producer" in ingest.lines()[-1]
+    said = ingested(address, *options, "--producer", "again")
+    assert said[-1]["points"] == 1
+
+
+@pytest.mark.parametrize(("version", "share"), [("3.1.1", ""), ("5", "$share/g/")])
+def test_mqtt(client: HullClient, address: str, name: str, version: str, share: str, tmp_path: Path) -> None:
+    """An ingest is killed, and the broker restarted: what was sent in the meantime arrives."""
+    port = free_port()
+    command = mosquitto(tmp_path, port, "persistence true", f"persistence_location {tmp_path}/", "autosave_interval 1")
+    moves = [(f"v{i % 10}", [i, -i]) for i in range(150)] + [(f"w{i % 10}", [i, -i]) for i in range(50)]
+    url = f"mqtt://127.0.0.1:{port}/{share}fleet/+/position?version={version}"
+    options = (url, "--hull", name, "--key", "{1}", "--x", "$[0]", "--y", "$[1]")
+    with broker(command, port) as process:
+        with ingest_process(address, *options, killed=True) as ingest:
+            ingest.wait_for("reading")
+            send(port, moves[:100])
+            wait_until(lambda: known(client, name))
+            ingest.process.kill()
+        send(port, moves[100:150])
+        process.terminate()  # saves its sessions
+        process.wait(PATIENCE)
+    with ingest_process(address, *options) as ingest:
+        ingest.wait_for("the broker does not answer, trying again")
+        with broker(command, port):
+            ingest.wait_for("reading")
+            send(port, moves[150:])
+            last = dict(moves)
+            wait_until(lambda: positions(client, name, list(last)) == {key: tuple(at) for key, at in last.items()})
+
+
+def known(client: HullClient, hull: str) -> bool:
+    try:
+        return client.get_hull(hull).info.points == 10
+    except HullNotFoundError:
+        return False
+
+
+def send(port: int, moves: Sequence[tuple[str, Sequence[float]]]) -> None:
+    """Publish positions; the broker has them when this returns."""
+    publisher = Client(CallbackAPIVersion.VERSION2)
+    publisher.connect("127.0.0.1", port)
+    publisher.loop_start()
+    for key, at in moves:
+        sent = publisher.publish(f"fleet/{key}/position", json.dumps(at), qos=1)
+    sent.wait_for_publish(PATIENCE)
+    assert sent.is_published()
+    publisher.disconnect()
+    publisher.loop_stop()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["mqtt://b/t", "--hull", "h"], "Give --key"),
+        (["mqtt://b/t?version=4", "--hull", "h", "--key", "{1}"], "version is '4', not 3.1.1 or 5"),
+        (["mqtt://b", "--hull", "h", "--key", "{1}"], "give mqtt://HOST/FILTER"),
+        (["nats://b", "--hull", "h"], "give nats://HOST/STREAM"),
+        (["kafka://b", "--hull", "h"], "give kafka://HOST:PORT/TOPIC"),
+        (["amqp://b/q", "--hull", "h"], "must be mqtt, mqtts, nats, tls or kafka"),
+        (["nats://b/s", "--hull", "h", "--x", "$.a b"], "' b' at position 4 is no .name, [index] or ['name']"),
+        (["nats://b/s", "--hull", "h", "--x", "lon"], "--x 'lon' is the same for all messages"),
+        (["nats://b/s", "--hull", "h/{0}"], "--hull: {0} is not {topic}"),
+        (["nats://b/s", "--hull", "h", "--each", "points"], "--each 'points' is no path"),
+        (["nats://b/s", "--hull", "h", "--report", "soon"], "--report"),
+    ],
+)
+def test_odd_arguments(arguments: Sequence[str], words: str) -> None:
+    ran = dynhull("ingest", *arguments)
+    assert ran.exit_code == 2
+    assert words in ran.stderr
