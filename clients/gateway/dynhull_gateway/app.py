@@ -10,6 +10,8 @@ from dynhull_client import AsyncHullClient
 
 from . import fences, health, hulls, points, problems, questions, uploads
 from .bodies import LimitedBodies
+from .events import routes
+from .events.feeds import Feeds
 from .figures import Figures, Measured
 from .gathering import Gatherer
 from .paths import PathsAsSent
@@ -40,9 +42,10 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.client = client
     app.state.settings = settings
     app.state.gatherer = Gatherer()
+    app.state.feeds = Feeds()
     app.state.health = health.State()
     app.state.figures = Figures()
-    routers = [module.router for module in (points, uploads, hulls, questions, fences, health)]
+    routers = [module.router for module in (points, uploads, hulls, questions, fences, routes, health)]
     for router in routers:
         app.include_router(router)
     app.state.routes = [route for router in routers for route in router.routes]

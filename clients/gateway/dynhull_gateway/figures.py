@@ -24,7 +24,9 @@ class Figures:
             registry=registry,
         )
         self.rows = Counter("dynhull_gateway_rows", "Rows of bodies that were applied.", registry=registry)
-        self.streams = Gauge("dynhull_gateway_streams", "Streams of events that are open.", registry=registry)
+        self.open_streams = 0
+        streams = Gauge("dynhull_gateway_streams", "Streams of events that are open.", registry=registry)
+        streams.set_function(lambda: self.open_streams)
         self.events = Counter("dynhull_gateway_events", "Events that were sent.", registry=registry)
         self.skipped = Counter(
             "dynhull_gateway_snapshots_for_slow_readers",

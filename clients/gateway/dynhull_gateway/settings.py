@@ -15,7 +15,6 @@ class Settings:
             must have arrived.
         keepalive_seconds: seconds without an event after which a comment is sent on a stream of events.
         max_streams: streams of events at a time.
-        send_seconds: seconds within which the reader of a stream must have taken what is sent.
         grace_seconds: seconds that requests may still take after SIGTERM.
         root_path: the path below which a proxy shows the gateway.
         forwarded_from: the addresses of proxies whose forwarded headers are believed, with commas between.
@@ -28,7 +27,6 @@ class Settings:
     body_seconds: float = 30.0
     keepalive_seconds: float = 15.0
     max_streams: int = 10_000
-    send_seconds: float = 60.0
     grace_seconds: float = 10.0
     root_path: str = ""
     forwarded_from: str = "127.0.0.1"

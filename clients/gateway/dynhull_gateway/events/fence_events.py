@@ -1,0 +1,93 @@
+"""The events of a fence, each once and in order."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import grpc
+
+from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, FenceReplacedError
+
+from .feeds import RETRY_SECONDS, of_failure
+from .messages import COMMENT, message, place
+
+
+@dataclass(slots=True)
+class Reading:
+    """What is read, and how far.
+
+    Attributes:
+        name: the fence.
+        consumer: a durable consumer that knows its place; None for `uid` and `after`.
+        uid: the uid of the fence; empty if it is not known yet.
+        after: the sequence of the last event that the reader has; None for new events only.
+        conflate: whether to leave out events that cancel each other.
+    """
+
+    name: str
+    consumer: str | None
+    uid: str
+    after: int | None
+    conflate: bool
+
+
+async def events(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:
+    """The events as text, over restarts of the server; a comment when there is none for long."""
+    while True:
+        try:
+            async for text in _watched(client, reading, keepalive):
+                yield text
+        except FenceReplacedError:
+            reading.uid, reading.after = "", 0
+            yield message("replaced", "", {"fence": reading.name})
+        except DynhullError as error:
+            if error.code != grpc.StatusCode.UNAVAILABLE:
+                yield message("problem", "", of_failure(error))
+                return
+            yield COMMENT
+            await asyncio.sleep(RETRY_SECONDS)
+        else:
+            return  # the fence was deleted
+
+
+async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:
+    """One watch, which continues over lost connections itself once it has begun."""
+    if reading.consumer is None and not (reading.uid and reading.after is not None):
+        fence = await client.get_fence(reading.name)
+        reading.uid = fence.uid
+        reading.after = fence.last_sequence if reading.after is None else reading.after
+        yield place(f"{reading.uid}:{reading.after}")  # a reader that is cut off before the first event misses none
+    watch = client.watch_fence(
+        reading.name,
+        consumer=reading.consumer,
+        after=None if reading.consumer else reading.after,
+        uid=reading.uid,
+        conflate=reading.conflate,
+    )
+    async with watch:
+        coming = asyncio.ensure_future(anext(watch))
+        try:
+            while True:
+                done, _ = await asyncio.wait([coming], timeout=keepalive)
+                if not done:
+                    yield COMMENT
+                    continue
+                try:
+                    event = coming.result()
+                except StopAsyncIteration:
+                    return
+                yield message(event.type, f"{event.uid}:{event.sequence}", shown(event))
+                reading.uid, reading.after = event.uid, event.sequence
+                coming = asyncio.ensure_future(anext(watch))
+        finally:
+            coming.cancel()
+            await asyncio.gather(coming, return_exceptions=True)
+
+
+def shown(event: FenceEvent) -> dict[str, Any]:
+    """An event as JSON has it, without what is not there."""
+    named = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__}
+    named["cause"] = sorted(event.cause)
+    named["inside"] = [{"hull": each.hull, "keys": each.keys, "revision": each.revision} for each in event.inside]
+    return {name: value for name, value in named.items() if value not in (None, "", [], 0) or name == "sequence"}

@@ -1,0 +1,26 @@
+"""Events as text for EventSource."""
+
+from typing import Any
+
+from pydantic_core import to_json
+
+RETRY_MILLISECONDS = 1000
+FIRST = f"retry: {RETRY_MILLISECONDS}\n\n".encode()
+COMMENT = b": \n\n"
+
+
+def message(kind: str, ident: str, data: Any) -> bytes:
+    """An event with a name, an id to resume after, and data as JSON; null where a number is not finite."""
+    lines = f"event: {kind}\n" + (f"id: {ident}\n" if ident else "") + "data: "
+    return lines.encode() + to_json(data, inf_nan_mode="null") + b"\n\n"
+
+
+def place(ident: str) -> bytes:
+    """An id alone, which a browser notes without an event."""
+    return f"id: {ident}\n\n".encode()
+
+
+def resumed(ident: str | None) -> tuple[str, int] | None:
+    """The uid and the number in a Last-Event-ID; None if there is none, or none of ours."""
+    uid, _, number = (ident or "").rpartition(":")
+    return (uid, int(number)) if uid and number.isdecimal() and len(number) <= 20 else None

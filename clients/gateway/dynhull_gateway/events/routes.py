@@ -1,0 +1,112 @@
+"""Where events are read."""
+
+from contextlib import suppress
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Header, Query, Request, Response
+
+from dynhull_client import AsyncHullClient, UnavailableError
+
+from ..callers import Caller, token_of
+from ..problems import ProblemError
+from ..schemas import LARGEST, NAME, FencePath, HullPath
+from .feeds import Form, View
+from .fence_events import Reading
+from .fence_events import events as fence_events
+from .messages import resumed
+from .stream import EventStream
+
+router = APIRouter(tags=["events"])
+
+LastEventId = Annotated[
+    str | None, Header(alias="Last-Event-ID", max_length=300, description="The id of the last event that was received.")
+]
+Rate = Annotated[float, Query(gt=0, le=100, description="The most events a second, each with all changes before it.")]
+FormOf = Annotated[
+    Form,
+    Query(
+        description="changes: a snapshot, then what differs; vertices: the whole hull in each event; geojson: the "
+        "whole hull as a Feature."
+    ),
+]
+WithKeys = Annotated[bool, Query(description="Whether to name the vertices, in a keyed hull.")]
+WithMeasures = Annotated[bool, Query(description="Whether events include measures.")]
+Consumer = Annotated[
+    str | None,
+    Query(pattern=NAME, description="A durable consumer, which knows its place: events after the acknowledged one."),
+]
+AfterSequence = Annotated[
+    int | None, Query(ge=0, le=LARGEST, description="Begin after this sequence; 0 for all that is kept.")
+]
+Conflate = Annotated[bool, Query(description="Leave out events that cancel each other.")]
+
+EVENTS: dict[int | str, dict[str, Any]] = {
+    200: {"description": "Events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
+}
+
+
+@router.get("/hulls/{name}/events", response_class=EventStream, responses=EVENTS)
+async def hull_events(
+    request: Request,
+    client: Caller,
+    name: HullPath,
+    form: FormOf = "changes",
+    rate: Rate = 10.0,
+    keys: WithKeys = False,
+    measures: WithMeasures = False,
+    last_event_id: LastEventId = None,
+) -> Response:
+    """Follow a hull: events "snapshot", "change", "progress" and "deleted", with ids UID:REVISION.
+
+    A reader that connects again with the id of its last event continues from there, with the changes since then or with
+    a snapshot; so does one that is too slow. A hull that is created again begins with a snapshot. What ends the stream
+    is an event "problem".
+    """
+    _admit(request)
+    with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
+        await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
+    view = View(token_of(request), name, form, rate, keys, measures)
+    state = request.app.state
+    texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
+    return EventStream(texts, state.health, state.figures)
+
+
+@router.get("/fences/{name}/events", response_class=EventStream, responses=EVENTS)
+async def follow_fence(
+    request: Request,
+    client: Caller,
+    name: FencePath,
+    consumer: Consumer = None,
+    after: AfterSequence = None,
+    conflate: Conflate = False,
+    last_event_id: LastEventId = None,
+) -> Response:
+    """Follow a fence: each event once and in order, named by its type, with ids UID:SEQUENCE.
+
+    It begins with the next event unless Last-Event-ID, a sequence or a consumer says where; a consumer acknowledges
+    with PUT, and is sent what it has not acknowledged.
+    """
+    if consumer is not None and (after is not None or conflate):
+        raise ValueError("give either consumer, which knows its place, or after and conflate")
+    _admit(request)
+    resume = resumed(last_event_id)
+    uid, place = ("", after) if resume is None or consumer is not None else resume
+    await _require_fence(client, name)
+    state = request.app.state
+    texts = fence_events(client, Reading(name, consumer, uid, place, conflate), state.settings.keepalive_seconds)
+    return EventStream(texts, state.health, state.figures)
+
+
+async def _require_fence(client: AsyncHullClient, name: str) -> None:
+    """Refuse a fence that is not there. While the server is away the stream waits for it."""
+    with suppress(UnavailableError):
+        await client.get_fence(name)
+
+
+def _admit(request: Request) -> None:
+    state = request.app.state
+    if state.health.draining.is_set():
+        raise ProblemError(503, "the gateway stops", "DRAINING")
+    if state.figures.open_streams >= state.settings.max_streams:
+        raise ProblemError(503, "too many streams of events", "STREAM_LIMIT", value=str(state.settings.max_streams))

@@ -1,0 +1,63 @@
+"""A response that lasts: events while there are any, until the reader leaves or the gateway ends."""
+
+import asyncio
+from collections.abc import AsyncIterator
+
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from ..figures import Figures
+from ..health import State
+from .messages import FIRST
+
+HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}  # nginx passes on what it does not buffer
+
+
+class EventStream(Response):
+    """Sends texts as they come. A reader that does not read holds back its own stream alone.
+
+    Args:
+        texts: events as text; closed with the stream.
+        health: says when the gateway ends. Browsers then connect again, to the next gateway, and resume.
+        figures: counts streams and events.
+    """
+
+    media_type = "text/event-stream"
+
+    def __init__(self, texts: AsyncIterator[bytes], health: State, figures: Figures) -> None:
+        super().__init__(headers=HEADERS)
+        del self.headers["content-length"]
+        self._texts = texts
+        self._health = health
+        self._figures = figures
+
+    async def __call__(self, _: Scope, receive: Receive, send: Send) -> None:
+        """Send until the first of: no more events, the reader has left, the gateway ends."""
+        sending = asyncio.create_task(self._send(send))
+        ends = [sending, asyncio.create_task(_left(receive)), asyncio.create_task(self._health.draining.wait())]
+        self._figures.open_streams += 1
+        try:
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._figures.open_streams -= 1
+            finished = sending.done()
+            for each in ends:
+                each.cancel()
+            await asyncio.gather(*ends, return_exceptions=True)
+            await self._texts.aclose()  # type: ignore[attr-defined]  # an async generator
+        if finished:
+            await sending
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    async def _send(self, send: Send) -> None:
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        await send({"type": "http.response.body", "body": FIRST, "more_body": True})
+        async for text in self._texts:
+            await send({"type": "http.response.body", "body": text, "more_body": True})
+            self._figures.events.inc()
+
+
+async def _left(receive: Receive) -> None:
+    """Return when the reader has closed the connection."""
+    while (await receive())["type"] != "http.disconnect":
+        pass

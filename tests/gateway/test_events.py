@@ -1,0 +1,240 @@
+"""Server-sent events: read by a real browser, over restarts of everything."""
+
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from gateway_process import Gateway, gateway_process
+from patience import PATIENCE, wait_until
+from peers import program
+from playwright.sync_api import Browser, Page, sync_playwright
+from server_process import server_process
+
+from dynhull_client import HullClient
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
+
+# Keeps what arrives, and the hull as the events of a watch make it.
+FOLLOW = """url => {
+    const seen = {ids: [], types: [], vertices: [], failed: false}
+    const source = new EventSource(url)
+    const note = event => { seen.ids.push(event.lastEventId); seen.types.push(event.type) }
+    source.onerror = () => { seen.failed = source.readyState == EventSource.CLOSED }
+    for (const type of ["enter", "exit", "progress", "deleted", "problem"]) source.addEventListener(type, note)
+    source.addEventListener("snapshot", event => { note(event); seen.vertices = JSON.parse(event.data).vertices })
+    source.addEventListener("change", event => {
+        note(event)
+        const {removed_rows, rotation, added, added_rows} = JSON.parse(event.data)
+        const kept = seen.vertices.filter((_, row) => !removed_rows.includes(row))
+        kept.push(...kept.splice(0, rotation))
+        added_rows.forEach((row, i) => kept.splice(row, 0, added[i]))
+        seen.vertices = kept
+    })
+    window.seen = {...window.seen, [url]: seen}
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+def seen(page: Page, url: str) -> dict[str, Any]:
+    return page.evaluate("url => window.seen[url]", url)
+
+
+def free_port() -> str:
+    """A port that was free a moment ago; processes that start again need the same one."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        return str(listening.getsockname()[1])
+
+
+def test_a_browser_misses_nothing_over_restarts(browser: Browser, tmp_path: Path) -> None:
+    """The server is restarted, then the gateway, while points and keys come: every event once, and the exact hull."""
+    served = ["--data", str(tmp_path), "--port", free_port()]
+    own = ["--port", free_port()]
+    hull, fence = "/hulls/a%2Fb/events?rate=100", "/fences/yard/events"
+    moves = 0
+
+    def move(client: HullClient) -> None:
+        """A hull that grows, and a key that enters and leaves."""
+        nonlocal moves
+        moves += 1
+        client.apply("a/b", insert=[[moves, moves * moves], [-moves, moves * moves]])
+        client.put("fleet", ["van"], [[1, 1]] if moves % 2 else [[9, 9]])
+
+    def arrived() -> bool:
+        events = seen(page, fence)["ids"]
+        return len(events) == moves and seen(page, hull)["vertices"] == vertices()
+
+    def vertices() -> list[list[float]]:
+        return client.get_hull("a/b").vertices.tolist()
+
+    with browser.new_context() as context:
+        page = context.new_page()
+        with gateway_process("127.0.0.1:" + served[-1], *own) as gateway:
+            with server_process(*served) as server, HullClient(server.address) as client:
+                client.create_hull("a/b")
+                client.create_hull("fleet", keyed="str")
+                client.create_fence("yard", area=SQUARE, subjects="fleet", initial="none")
+                page.goto(f"{gateway.url}/livez")
+                for each in (hull, fence):
+                    page.evaluate(FOLLOW, each)
+                page.wait_for_function("url => window.seen[url].ids.length", arg=hull)
+                for _ in range(3):
+                    move(client)
+                wait_until(arrived)
+            with server_process(*served) as server, HullClient(server.address) as client:
+                for _ in range(3):
+                    move(client)
+                wait_until(arrived)
+                gateway.process.terminate()
+                gateway.process.wait(PATIENCE)
+                for _ in range(3):
+                    move(client)
+                with gateway_process(server.address, *own):
+                    wait_until(arrived)
+                    move(client)
+                    wait_until(arrived)
+                    of_fence, of_hull = seen(page, fence), seen(page, hull)
+                    page.goto("about:blank")
+    assert [int(each.rpartition(":")[2]) for each in of_fence["ids"]] == list(range(1, moves + 1))
+    assert of_fence["types"] == ["enter", "exit"] * (moves // 2)
+    revisions = [int(each.rpartition(":")[2]) for each in of_hull["ids"]]
+    assert revisions == sorted(set(revisions))
+    assert not of_hull["failed"]
+
+
+class Events:
+    """The events of a stream, read without a browser."""
+
+    def __init__(self, gateway: Gateway, path: str, **headers: str) -> None:
+        self._connection = gateway.connection()
+        self._connection.request("GET", path, headers={name.replace("_", "-"): each for name, each in headers.items()})
+        self.response = self._connection.getresponse()
+
+    def __iter__(self) -> Iterator[dict[str, str]]:
+        event: dict[str, str] = {}
+        while line := self.response.readline().decode():
+            name, _, value = line.rstrip("\n").partition(": ")
+            if name:
+                event[name] = value
+            else:
+                if {"event", "id"} & event.keys():
+                    yield event
+                event = {}
+
+    def next(self) -> tuple[str, Any]:
+        """The name and the data of the next event; those of an id alone are the id and None."""
+        event = next(iter(self))
+        return event.get("event", event.get("id")), json.loads(event["data"]) if "data" in event else None
+
+    def close(self) -> None:
+        self.response.close()
+        self._connection.close()
+
+
+def test_a_reader_continues_where_it_was(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name})
+    gateway.post(f"/hulls/{name}/points", SQUARE)
+    events = Events(gateway, f"/hulls/{name}/events?rate=100&measures=true")
+    first = next(iter(events))
+    gateway.post(f"/hulls/{name}/points", [[9, 9]])
+    second = next(iter(events))
+    assert (first["event"], second["event"]) == ("snapshot", "change")
+    assert json.loads(second["data"])["measures"]["area"] == 36
+    again = Events(gateway, f"/hulls/{name}/events?rate=100&measures=true", Last_Event_ID=first["id"])
+    assert next(iter(again)) == second
+    current = Events(gateway, f"/hulls/{name}/events?rate=100&measures=true", Last_Event_ID=second["id"])
+    gateway.post(f"/hulls/{name}/points", [[11, 9]])
+    assert current.next()[1]["revision"] == 3
+    unknown = Events(gateway, f"/hulls/{name}/events?form=geojson", Last_Event_ID="other:3")
+    kind, feature = unknown.next()
+    assert (kind, feature["geometry"]["type"]) == ("snapshot", "Polygon")
+    gateway.call("DELETE", f"/hulls/{name}")
+    assert current.next()[0] == "deleted"
+    gateway.post("/hulls", {"name": name})
+    assert current.next()[0] == "snapshot"
+    for each in (events, again, current, unknown):
+        each.close()
+
+
+def test_what_is_not_there_is_not_found(gateway: Gateway, name: str) -> None:
+    for path in (f"/hulls/{name}/events", f"/fences/{name}/events"):
+        assert gateway.get(path).status == 404
+
+
+def test_a_fence_from_any_place(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str"})
+    gateway.post("/fences", {"name": name, "area": {"exterior": SQUARE}, "subjects": name, "initial": "none"})
+    for x in (1, 9, 2):
+        gateway.post(f"/hulls/{name}/points", {"keys": ["van"], "points": [[x, x]]})
+    path = f"/fences/{quote(name)}/events"
+    everything = Events(gateway, f"{path}?after=0")
+    place = everything.next()
+    assert place[1] is None
+    assert [everything.next()[1]["type"] for _ in range(3)] == ["enter", "exit", "enter"]
+    uid = place[0].partition(":")[0]
+    rest = Events(gateway, path, Last_Event_ID=f"{uid}:2")
+    assert rest.next() == ("enter", {**rest_of(gateway, path), "sequence": 3})
+    consumer = Events(gateway, f"{path}?consumer=c")
+    assert consumer.next()[1]["sequence"] == 1
+    gateway.call("PUT", f"/fences/{name}/consumers/c", {"sequence": 2})
+    later = Events(gateway, f"{path}?consumer=c")
+    assert later.next()[1]["sequence"] == 3
+    replaced = Events(gateway, path, Last_Event_ID="another:9")
+    assert replaced.next()[0] == "replaced"
+    gateway.call("DELETE", f"/fences/{name}")
+    assert rest.next()[0] == "closed"
+    for each in (everything, rest, consumer, later, replaced):
+        each.close()
+
+
+def rest_of(gateway: Gateway, path: str) -> dict[str, Any]:
+    events = Events(gateway, f"{path}?after=2")
+    events.next()
+    try:
+        return events.next()[1]
+    finally:
+        events.close()
+
+
+def test_a_reader_that_does_not_read_gets_a_snapshot_later(address: str, name: str) -> None:
+    """While it does not read, what waits for it stays small; then it gets the whole hull, and what follows."""
+    with HullClient(address) as client, gateway_process(address, "--metrics-port", "0") as gateway:
+        client.create_hull(name)
+        xy = [[i, i * i] for i in range(4000)]
+        client.apply(name, insert=xy)
+        slow = Events(gateway, f"/hulls/{name}/events?rate=100&form=vertices")
+        other = Events(gateway, f"/hulls/{name}/events?rate=100&form=vertices")
+        revision = 1
+        for i in range(4000, 4120):
+            revision = client.apply(name, insert=[[i, i * i]]).revision
+            while other.next()[1]["revision"] < revision:
+                pass
+        received = []
+        while not received or received[-1] < revision:
+            received.append(slow.next()[1]["revision"])
+        assert len(received) < 120
+        slow.close()
+        other.close()
+
+
+def test_streams_end_with_the_gateway(address: str, name: str) -> None:
+    with HullClient(address) as client, gateway_process(address, "--max-streams", "1") as gateway:
+        client.create_hull(name)
+        events = Events(gateway, f"/hulls/{name}/events")
+        assert events.next()[0] == "snapshot"
+        refused = gateway.get(f"/hulls/{name}/events")
+        assert (refused.status, refused.json["reason"]) == (503, "STREAM_LIMIT")
+        gateway.process.terminate()
+        assert list(events) == []
+        events.close()
