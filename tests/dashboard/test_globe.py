@@ -4,9 +4,12 @@ import asyncio
 import json
 from collections.abc import Callable
 
+import numpy as np
 import pytest
+import shapely
 from patience import PATIENCE
 
+from dynhull import GeoHull
 from dynhull_client import AsyncHullClient, Circle, HullClient
 from dynhull_dashboard.cards import table
 from dynhull_dashboard.describe import describe
@@ -58,6 +61,42 @@ def test_a_hull_across_180_degrees_is_drawn_in_one_piece(address: str, fiji: str
                 plane.hide(fiji)
                 plane.update()
                 assert (plane.plot.xaxis.axis_label, plane.plot.yaxis.axis_label) == ("x", "y")
+            finally:
+                await feed.close()
+
+    asyncio.run(shown())
+
+
+@pytest.mark.parametrize(
+    ("center", "places", "pole", "bounds"),
+    [
+        ((0, -90), [(-170, -70), (-60, -65), (40, -72), (150, -68)], "south", (-180, -90, 180, -65)),
+        ((100, 80), [(-170, 70), (-60, 65), (40, 72), (150, 68)], "north", (-80, 65, 280, 90)),
+        ((0, 60), [(170, 80), (-170, 80), (180, 70)], None, (-180, 70, 180, 80.15)),  # half a turn from the centre
+    ],
+)
+def test_a_hull_with_a_pole_reaches_the_border_of_the_map(
+    address: str, name: str, center, places, pole, bounds
+) -> None:
+    with HullClient(address) as client:
+        client.create_hull(name, geographic=True, center=center)
+        client.apply(name, insert=places)
+        hull = client.get_hull(name)
+        expected = GeoHull(places, center)
+        assert sorted(hull.vertices.tolist()) == sorted(map(list, places))
+
+    async def shown() -> None:
+        async with AsyncHullClient(address) as client:
+            feed = HullFeed(client, name)
+            try:
+                await until(lambda: feed.vertices == len(places))
+                assert feed.bounds == pytest.approx(bounds, abs=0.01)
+                rings = json.loads(feed.drawings()[0].message)["rings"]
+                filled = shapely.union_all([shapely.Polygon(np.transpose(ring)) for ring in rings])
+                lon, lat = (each.ravel() for each in np.meshgrid(np.arange(-178.5, 180, 7), np.arange(-89, 90, 2.25)))
+                inside = shapely.contains_xy(filled, lon - 360 * np.round((lon - center[0]) / 360), lat)
+                assert inside.tolist() == expected.contains(np.column_stack([lon, lat])).tolist()
+                assert (f"with the {pole} pole inside" in describe([feed])) == (pole is not None)
             finally:
                 await feed.close()
 

@@ -4,6 +4,7 @@ from math import cos, radians
 
 import numpy as np
 
+from dynhull.globe import geojson
 from dynhull_client import Circle
 
 from .drawing import Points
@@ -14,6 +15,9 @@ FULL_TURN = 360.0
 METRES_A_DEGREE = 111_195.0  # of latitude, on a globe with the mean radius
 SQUARE_KILOMETRE = 1e6
 CORNERS_OF_CIRCLE = 180
+# Neighbours in an outline are at most this far apart, in metres, so that great circles are drawn as they are.
+SEGMENT = 100_000.0
+POLE = 90.0
 
 
 def shown(places: Points, center: Center | None) -> Points:
@@ -31,6 +35,26 @@ def shown_place(x: float, y: float, center: Center | None) -> tuple[float, float
     """The same for one place."""
     ((x, y),) = shown(np.array([[x, y]]), center).tolist()
     return x, y
+
+
+def outline(vertices: Points, center: Center | None) -> list[Points]:
+    """The rings that a hull fills in the picture; of a segment, its line.
+
+    On the globe the edges are great circles. A hull that reaches half a turn from the centre is cut there, and with a
+    pole inside it reaches the border of the map.
+    """
+    if center is None or len(vertices) < 2:
+        return [shown(vertices, center)]
+    east = np.array([center[0], 0.0])
+    shape = geojson(shown(vertices, center) - east, SEGMENT)
+    parts = shape["coordinates"] if shape["type"].startswith("Multi") else (shape["coordinates"],)
+    return [np.array(part[0][:-1] if shape["type"].endswith("Polygon") else part) + east for part in parts]
+
+
+def poles(rings: list[Points]) -> list[str]:
+    """The poles in an outline."""
+    lat = np.concatenate([ring[:, 1] for ring in rings])
+    return [name for name, pole in (("north", POLE), ("south", -POLE)) if (lat == pole).any()]
 
 
 def circle(area: Circle) -> Points:

@@ -36,8 +36,9 @@ def _sentence(feed: HullFeed) -> str:
     left, bottom, right, top = feed.bounds
     shape = SHAPES.get(feed.vertices, f"a convex polygon with {feed.vertices:,} vertices")
     x, y = ("x", "y") if feed.center is None else ("longitude", "latitude")
+    pole = "".join(f" with the {pole} pole inside" for pole in feed.poles)
     return (
-        f"{feed.name}: {shape} around {feed.points:,} points, {x} from {left:.6g} to {right:.6g}, "
+        f"{feed.name}: {shape}{pole} around {feed.points:,} points, {x} from {left:.6g} to {right:.6g}, "
         f"{y} from {bottom:.6g} to {top:.6g}, at revision {feed.revision:,}."
     )
 

@@ -20,7 +20,7 @@ from dynhull_client import (
     Verification,
 )
 
-from .degrees import Center, shown
+from .degrees import Center, outline, poles, shown
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
 from .outline import Box, apart, box_around, drawn
@@ -60,6 +60,7 @@ class HullFeed:
         area: its area, of a geographic hull in square metres; NaN before it is known.
         bounds: the smallest box around it; None while it is empty or unknown.
         center: the centre of a geographic hull; None for a plane, or while there is none.
+        poles: the poles in it, such as "south".
         verified: the last verification; None before the first.
         rate: batches per second, over the last second.
         history: one row per second.
@@ -87,6 +88,7 @@ class HullFeed:
         self.area = math.nan
         self.bounds: Box | None = None
         self.center: Center | None = None
+        self.poles: list[str] = []
         self._outline = Drawing(vertices_of(self.name), 0, NO_POINTS)
         self._inner = Drawing(points_of(self.name), 0, NO_POINTS)
         self.verified: Verified | None = None
@@ -158,13 +160,16 @@ class HullFeed:
         self.vertices = len(copy.vertices)
         self.area = event.measures.area
         self.center = copy.center
-        corners = shown(copy.vertices, self.center)
-        self.bounds = None
-        if self.vertices:
-            self.bounds = event.measures.bounds if self.center is None else box_around(corners)
         rows = drawn(self.vertices)
+        corners = shown(copy.vertices[rows], self.center)
+        self.bounds, self.poles, rings = None, [], None
+        if self.vertices and self.center is None:
+            self.bounds = event.measures.bounds
+        elif self.vertices:
+            rings = outline(copy.vertices[rows], self.center)
+            self.bounds, self.poles = box_around(np.concatenate(rings)), poles(rings)
         keys = None if copy.vertex_keys is None else copy.vertex_keys[rows]
-        self._outline = Drawing(vertices_of(self.name), event.revision, corners[rows], keys)
+        self._outline = Drawing(vertices_of(self.name), event.revision, corners, keys, rings)
 
     async def _count(self) -> None:
         """Add a row to the history every second."""

@@ -23,7 +23,7 @@ class Fences {
     for (const [name, inside] of this.inside) this.draw_inside(name, inside, places)
   }
   draw_area(name, {hulls, margin, xs, ys, margin_xs, margin_ys}) {
-    const outlines = hulls.map(hull => this.source(`vertices of ${hull}`)?.data).filter(each => each?.x.length)
+    const outlines = hulls.flatMap(hull => parts(this.source(`outline of ${hull}`)?.data ?? {x: [], y: []}))
     const around = margin ? outlines.slice(0, 1).map(({x, y}) => offset_outline(x, y, margin)) : []
     const rings = (more, outer, axis) => [...more, ...outer.map(each => [[Array.from(each[axis])]])]
     replace(this.source(`area of ${name}`), {xs: rings(xs, outlines, "x"), ys: rings(ys, outlines, "y")})
@@ -89,6 +89,15 @@ function replace(source, data, kept = []) {
   if (compared(source.data) != compared(data)) source.data = data
 }
 // The outline at a distance from a convex polygon whose vertices are counterclockwise.
+// The rings of an outline: they are separated by NaN. None of an empty hull.
+function parts({x, y}) {
+  const rings = [{x: [], y: []}]
+  for (let row = 0; row < x.length; row++) {
+    if (Number.isNaN(x[row])) rings.push({x: [], y: []})
+    else for (const [axis, value] of [["x", x[row]], ["y", y[row]]]) rings.at(-1)[axis].push(value)
+  }
+  return rings.filter(ring => ring.x.length)
+}
 function offset_outline(x, y, distance) {
   const outline = {x: [], y: []}
   let at = x.indexOf(Math.max(...x))

@@ -23,13 +23,19 @@ function end(old) {
   if (old.readyState == WebSocket.CONNECTING) old.onopen = () => old.close()
   else old.close()
 }
-function draw_hull(labels, {source, revision, x, y, keys}) {
+function draw_hull(labels, {source, revision, x, y, keys, rings}) {
   const drawn = labels.source(source)
   const each = value => x.map(() => value)
   const key = keys ?? each("")
   const title = key.map(name => name && `${name}: `)
   const hull = each(source.replace(/^(vertices|points) of /, ""))
   if (drawn) drawn.data = {x, y, revision: each(revision), title, key, hull, label: each(""), side: each("left")}
+  const outline = labels.source(source.replace(/^vertices of /, "outline of "))
+  if (outline && outline != drawn) outline.data = rings ? {x: joined(rings, 0), y: joined(rings, 1)} : {x, y}
+}
+// One column of several rings: Bokeh ends a ring at NaN.
+function joined(rings, axis) {
+  return rings.flatMap((ring, i) => i ? [NaN, ...ring[axis]] : ring[axis])
 }
 function chip([name, key], remove) {
   const item = document.createElement("li"), line = document.createElement("span")

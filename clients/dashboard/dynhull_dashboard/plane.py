@@ -14,7 +14,7 @@ from bokeh.models import (
 )
 from bokeh.plotting import figure
 
-from .drawing import points_of, vertices_of
+from .drawing import outline_of, points_of, vertices_of
 from .feed import HullFeed
 from .fence_feed import FenceFeed
 from .fence_plane import DrawnFence, add_fence_names
@@ -41,8 +41,9 @@ class DrawnHull:
         self.feed = feed
         name, colour = feed.name, look.colour
         vertices, points = _source(vertices_of(name)), _source(points_of(name))
+        outline = ColumnDataSource({"x": [], "y": []}, name=outline_of(name), syncable=False)
         surface = plot.patch(
-            source=vertices,
+            source=outline,
             fill_color=colour,
             fill_alpha=FILL_ALPHA,
             line_color=colour,
