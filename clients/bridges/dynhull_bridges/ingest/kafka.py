@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from aiokafka import AIOKafkaConsumer, TopicPartition
+from aiokafka.admin import AIOKafkaAdminClient
 from aiokafka.errors import KafkaError
 
 from ..target import without_secrets
@@ -106,15 +107,15 @@ async def partitions_of(url: str) -> list[Kafka]:
     topic = unquote(parts.path).strip("/")
     if not parts.netloc or not topic or "/" in topic:
         raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
-    consumer = AIOKafkaConsumer(bootstrap_servers=parts.netloc, group_id=None)
+    admin = AIOKafkaAdminClient(bootstrap_servers=parts.netloc)
     try:
-        await consumer.start()
-        await consumer.topics()
-        there = consumer.partitions_for_topic(topic)
+        await admin.start()
+        (described,) = await admin.describe_topics([topic])
     except (KafkaError, OSError) as error:
         raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
     finally:
-        await consumer.stop()
+        await admin.close()
+    there = [each["partition"] for each in described["partitions"]]
     if not there:
         raise ValueError(f"Kafka has no topic {topic!r}")
     asked = [int(each) for each in parse_qs(parts.query).get("partition", ()) if each.isdecimal()] or sorted(there)

@@ -8,7 +8,7 @@ from typing import Any
 
 import structlog
 
-from dynhull_client import AsyncHullClient, HullNotFoundError
+from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
 
 from .bad import BadMessages
 from .chunk import Taken, chunks_of
@@ -90,6 +90,8 @@ class Pump:
             except FeedError as error:
                 self._figures.restarts.labels(self._feed.name).inc()
                 log.warning("the broker does not answer, trying again", feed=self._feed.name, error=str(error))
+            except (UnavailableError, DeadlineError) as error:
+                log.warning("waiting for the server", feed=self._feed.name, error=str(error))
             else:
                 return
             await self._feed.close()
