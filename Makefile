@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server robustness simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server properties robustness simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -50,6 +50,9 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
 	$(BIN)/python tests/support/lives.py --operations $(OPERATIONS)
+
+properties: .venv/.test  ## other and many more random examples for the tests of properties
+	$(BIN)/pytest $(WORKERS) -m hypothesis --hypothesis-profile properties --timeout 0 tests
 
 coverage: .venv/.test .venv/.peers  ## run all tests and print the share of lines that they run, server processes included
 	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(WORKERS) --cov --cov-report=term

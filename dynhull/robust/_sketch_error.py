@@ -38,6 +38,7 @@ def few_vertices(vertices: Points, count: int) -> tuple[Points, float]:
         distances = _distances(vertices, vertices[chosen])
         if len(chosen) == min(count, len(vertices)):
             break
+        distances[chosen] = -1.0  # others may be so near that theirs round to 0
         chosen = sorted([*chosen, int(distances.argmax())])
     corners = as_tuples(vertices[chosen])
     farthest = vertices[distances >= distances.max() - SLACK]

@@ -41,7 +41,7 @@ def build(make, rows, how):
 @both
 @pytest.mark.parametrize("how", ["bulk", "one by one", "twice, half deleted"])
 @given(rows=points(40))
-@settings(max_examples=60)
+@settings(max_examples=30)
 @example(rows=[])
 @example(rows=[(1.0, 1.0)] * 3)
 @example(rows=CIRCLE)
@@ -63,7 +63,6 @@ def test_vertices(make, how, rows):
 
 @both
 @given(rows=points(30), queries=st.lists(point, max_size=10))
-@settings(max_examples=100)
 def test_locate(make, rows, queries):
     hull = make(rows)
     queries = queries + rows[:5]
@@ -76,7 +75,6 @@ def test_locate(make, rows, queries):
 
 @both
 @given(rows=points(30).filter(bool), directions=st.lists(point.filter(any), max_size=10))
-@settings(max_examples=100)
 def test_support(make, rows, directions):
     hull = make(rows)
     corners = oracle.hull(rows)
@@ -87,7 +85,6 @@ def test_support(make, rows, directions):
 
 @both
 @given(rows=points(30).filter(bool), queries=st.lists(point, max_size=10))
-@settings(max_examples=100)
 def test_tangents(make, rows, queries):
     hull = make(rows)
     corners = oracle.hull(rows)
@@ -112,7 +109,6 @@ def farthest(q, candidates):
 
 @both
 @given(rows=points(60), seed=st.randoms(use_true_random=False))
-@settings(max_examples=100)
 def test_changed_is_exact(make, rows, seed):
     hull, live, changes = make(), [], 0
     for p in rows + rows:
@@ -129,7 +125,7 @@ def test_changed_is_exact(make, rows, seed):
 
 @both
 @given(rows=points(30), batch=st.lists(st.tuples(st.sampled_from([1, -1]), point), max_size=30), more=points(10))
-@settings(max_examples=150)
+@settings(max_examples=75)
 def test_a_batch_is_a_set(make, rows, batch, more):
     batch = batch + [(-1, p) for p in rows[:8]] + [(op, p) for p in more for op in (1, -1)]
     ops = np.array([op for op, _ in batch], np.int8)

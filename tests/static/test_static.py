@@ -21,7 +21,7 @@ def tuples(array):
 
 @every
 @given(rows=points(40))
-@settings(max_examples=200)
+@settings(max_examples=100)
 @example(rows=CIRCLE)
 @example(rows=[])
 @example(rows=[(1.0, 2.0)] * 2)
