@@ -3,8 +3,9 @@ from collections import Counter
 from collections.abc import Iterator
 
 import pytest
+import server_process as servers
 from hypothesis import Phase, settings
-from server_process import server_process
+from server_process import SHAPES, server_process
 
 collect_ignore = ["data/make_phases.py", "mutants/run.py"]  # need packages that the tests do not
 
@@ -23,6 +24,14 @@ settings.register_profile(
 settings.load_profile("dynhull")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--shape", choices=SHAPES, default="process", help="how the servers of the tests run")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    servers.shape = config.getoption("--shape")
+
+
 @pytest.fixture(scope="session")
 def address() -> Iterator[str]:
     """A server that tests share; each test uses hulls of its own. It starts and ends as it does for users."""
@@ -32,13 +41,17 @@ def address() -> Iterator[str]:
 
 @pytest.fixture
 def name(request: pytest.FixtureRequest) -> str:
-    """A hull name of the test's own."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:]
+    """A hull name of the test's own. Names that begin with it have a worker in common."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:] + ("/h" if servers.shape == "workers" else "")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the long tests: at the end, all workers should have something to do."""
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
+    if servers.shape != "process":
+        for each in items:
+            if each.get_closest_marker("one_process"):
+                each.add_marker(pytest.mark.skip(reason="about a server of one process"))
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)  # after pytest's own summary

@@ -1,7 +1,8 @@
 """`python -m dynhull_server`, the same as `dynhull serve`."""
 
+from importlib.metadata import entry_points
+
 import typer
 
-from .serve import serve
-
-typer.run(serve)
+(command,) = entry_points(group="dynhull.commands", name="serve")
+typer.run(command.load())

@@ -2,18 +2,14 @@
 
 import asyncio
 import logging
-import math
 import os
-import ssl
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
-import grpc
 from grpc_health.v1 import health_pb2
+from prometheus_client import CollectorRegistry
 
-from .certificates import server_context
 from .engine.engine import Engine
 from .engine.fence_verification import FenceVerification
 from .engine.fences import LiveFence
@@ -22,10 +18,11 @@ from .engine.scrub import Scrub
 from .engine.supervisor import Supervisor
 from .engine.threads import Machine
 from .engine.verification import Verification
+from .entrance import Entrance, PublicEntrance, grpc_server, tls_context
 from .failure import text_of
-from .listening import listening_error, why_not
-from .rpc.access import ANONYMOUS, LOOK_SECONDS, Caller, TokenFile
-from .rpc.calls import Calls, Context
+from .listening import listening_error
+from .rpc.access import LOOK_SECONDS, TokenFile
+from .rpc.calls import Calls
 from .rpc.fence_service import FenceService
 from .rpc.health import Health
 from .rpc.hull_service import HullService
@@ -48,6 +45,7 @@ from .storage.durability import Durability
 from .storage.memory import MemoryStorage
 from .storage.port import Storage
 from .storage.sqlite.storage import SQLiteStorage
+from .storage.worker_folders import require_one_process
 
 SERVICES = DESCRIPTOR.full_name, FENCES.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm, or a fence that differs from a recomputation.
@@ -60,16 +58,6 @@ NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 LAST_STATUSES = 1.0
 # Of the faults that the scrub finds in a fence, those that are logged.
 LOGGED_FAULTS = 10
-# Milliseconds between pings on an idle connection, and until a connection that does not answer them is closed.
-KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
-# Bytes of each call that a client may send before the server reads them.
-LOOKAHEAD = 2**20
-# Milliseconds that a new connection has for the HTTP/2 handshake.
-HANDSHAKE_TIMEOUT = 10_000
-
-# Messages up to this many bytes beyond the limit are read, so that the refusal can have details.
-REFUSED_BYTES = 64 * 2**20
-
 # Seconds between syncs with `--durability interval`. With the duration of a sync this stays below the tenth of a second
 # after which an acknowledged batch survives a power failure.
 SYNC_SECONDS = 0.05
@@ -77,18 +65,28 @@ SYNC_SECONDS = 0.05
 log = logging.getLogger(__name__)
 
 
+def _unseen(_done: int, _total: int) -> None:
+    """Show no progress."""
+
+
 class Server:
     """Serves from `start` until `drain` has returned.
+
+    Args:
+        settings: the settings.
+        entrance: how callers reach it; by default, as the settings say.
 
     Attributes:
         address: the host:port it listens on, once started.
         metrics_url: the URL of the metrics page; empty for none.
+        registry: its metrics; other threads may read them once it has started.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, entrance: Entrance | None = None) -> None:
         self._settings = settings
+        self._entrance = PublicEntrance(settings) if entrance is None else entrance
         self._machine = machine = Machine()
-        self._supervisor = Supervisor(machine.clock, self._set_health, _end_process)
+        self._supervisor = Supervisor(machine.clock, self._set_health, end_process)
         limits = Limits(
             max_hulls=settings.max_hulls,
             max_points=settings.max_points,
@@ -105,36 +103,21 @@ class Server:
         )
         self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
         self._metrics = Metrics()
-        self._tls = _tls(settings)
-        self._tokens = None if settings.tokens is None else _token_file(settings.tokens)
-        authenticate = _anonymous if self._tokens is None else _bearer(self._tokens)
+        self.registry = self._metrics.registry
+        self._tokens = token_file(settings)
+        authenticate = self._entrance.authenticator(self._tokens)
         streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
         self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams)
         self._health = Health(
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )
-        self._server = grpc.aio.server(
-            options=[
-                # gRPC's own refusal of a large message has no details, so its limit is higher than ours.
-                ("grpc.max_receive_message_length", settings.max_message_bytes + REFUSED_BYTES),
-                ("grpc.max_send_message_length", -1),
-                # Otherwise a second server could start on the same port, and receive half of the calls.
-                ("grpc.so_reuseport", 0),
-                ("grpc.keepalive_time_ms", KEEPALIVE),
-                ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
-                ("grpc.http2.bdp_probe", 0),
-                ("grpc.http2.lookahead_bytes", LOOKAHEAD),
-                ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
-                ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
-                ("grpc.max_allowed_incoming_connections", settings.max_connections),
-            ]
-        )
+        self._server = grpc_server(settings)
         self._stop_metrics: Callable[[], None] = lambda: None
         self._serving = False
         self.address = ""
         self.metrics_url = ""
 
-    async def start(self, progress: Callable[[int, int], None]) -> None:
+    async def start(self, progress: Callable[[int, int], None] = _unseen) -> None:
         """Listen, load the stored hulls, then serve. Until then calls get UNAVAILABLE, and health is NOT_SERVING.
 
         Args:
@@ -156,17 +139,15 @@ class Server:
             max_corners=self._settings.max_fence_corners,
             max_watch_lag=self._settings.max_watch_lag,
         )
-        self._server.add_generic_rpc_handlers(
-            (
-                hull_handlers(service, self._calls),
-                fence_handlers(fences, self._calls),
-                health_handlers(self._health, self._calls),
-                reflection_handlers(self._calls),
-                UnknownMethods(self._calls),
-            )
+        handlers = (
+            hull_handlers(service, self._calls),
+            fence_handlers(fences, self._calls),
+            health_handlers(self._health, self._calls),
+            reflection_handlers(self._calls),
+            UnknownMethods(self._calls),
         )
-        port = self._listen()
-        self.address = f"{self._settings.host}:{port}"
+        self._server.add_generic_rpc_handlers(handlers)
+        self.address = await self._entrance.listen(self._server, handlers)
         self._serve_metrics()
         self._health.set(NOT_SERVING, "", *SERVICES)
         await self._server.start()
@@ -195,6 +176,7 @@ class Server:
         await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_STATUSES)
+        await self._entrance.close()
         self._stop_metrics()
         await self._engine.close()
         log.info("stopped")
@@ -208,36 +190,12 @@ class Server:
         if self._serving:
             self._health.set(SERVING if reason is None else NOT_SERVING, "", *SERVICES)
 
-    def _listen(self) -> int:
-        settings = self._settings
-        address = f"{settings.host}:{settings.port}"
-        if reason := why_not(settings.host, settings.port):  # gRPC does not give the operating system's reason
-            raise OSError(f"cannot listen on {address}: {reason}")
-        if settings.tls_cert is None or settings.tls_key is None:
-            return self._server.add_insecure_port(address)
-        client_ca = None if settings.tls_client_ca is None else settings.tls_client_ca.read_bytes()
-        credentials = grpc.ssl_server_credentials(
-            [(settings.tls_key.read_bytes(), settings.tls_cert.read_bytes())],
-            client_ca,
-            require_client_auth=client_ca is not None,
-        )
-        return self._server.add_secure_port(address, credentials)
-
     def _serve_metrics(self) -> None:
-        if self._settings.metrics_port is None:
-            return
-        registry = self._metrics.registry
+        registry = self.registry
         registry.register(StateCollector(self._engine, self._metrics, self._supervisor, asyncio.get_running_loop()))
-        host, port = self._settings.metrics_host, self._settings.metrics_port
-        open_to_others = not is_loopback(host)
-        tls = self._tls if open_to_others else None
-        bearer = self._tokens.bearer if open_to_others and self._tokens is not None else None
-        try:
-            page = MetricsPage(host, port, registry, bearer, tls, self._calls.refused_elsewhere())
-        except OSError as error:
-            raise OSError(f"cannot listen on {host}:{port} for metrics: {listening_error(error)}") from None
-        self.metrics_url = f"{'http' if tls is None else 'https'}://{host}:{page.port}/metrics"
-        self._stop_metrics = page.close
+        page = metrics_page(self._settings, registry, self._tokens, self._calls.refused_elsewhere())
+        if page is not None:
+            self.metrics_url, self._stop_metrics = page.url, page.close
 
     def _compared(self, hull: LiveHull, outcome: Verification) -> None:
         self._metrics.verified("scrub", outcome.equal, outcome.seconds)
@@ -260,34 +218,44 @@ class Server:
             self._health.set(NOT_SERVING, SCRUB)
 
 
-def _tls(settings: Settings) -> ssl.SSLContext | None:
-    if settings.tls_cert is None or settings.tls_key is None:
+def metrics_page(
+    settings: Settings, registry: CollectorRegistry, tokens: TokenFile | None, refused: Callable[[str, str, str], None]
+) -> MetricsPage | None:
+    """The page for Prometheus that the settings ask for, with tokens and TLS if other machines can reach it.
+
+    Raises:
+        OSError: it cannot listen there.
+    """
+    if settings.metrics_port is None:
         return None
-    return server_context(settings.tls_cert, settings.tls_key, settings.tls_client_ca)
-
-
-def _token_file(path: Path) -> TokenFile:
+    host, port = settings.metrics_host, settings.metrics_port
+    open_to_others = not is_loopback(host)
+    tls = tls_context(settings) if open_to_others else None
+    bearer = tokens.bearer if open_to_others and tokens is not None else None
     try:
-        return TokenFile(path)
+        return MetricsPage(host, port, registry, bearer, tls, refused)
+    except OSError as error:
+        raise OSError(f"cannot listen on {host}:{port} for metrics: {listening_error(error)}") from None
+
+
+def token_file(settings: Settings) -> TokenFile | None:
+    """The tokens of the settings; None without. Raises ValueError if they cannot be read."""
+    if settings.tokens is None:
+        return None
+    try:
+        return TokenFile(settings.tokens)
     except (OSError, ValueError) as error:
         raise ValueError(f"--tokens {text_of(error)}") from None
 
 
-def _storage(settings: Settings) -> Storage:
-    if settings.in_memory:
-        return MemoryStorage(keeps=False)
-    return SQLiteStorage(settings.data, settings.durability)
-
-
-def _end_process(reason: str) -> None:
+def end_process(reason: str) -> None:
     """End the process at once, because its state is not reliable. All acknowledged batches are stored."""
     print(f"the server stops: {reason}", file=sys.stderr, flush=True)  # noqa: T201  # logging itself may have failed
     os._exit(os.EX_SOFTWARE)
 
 
-def _anonymous(_: Context) -> Caller:
-    return ANONYMOUS
-
-
-def _bearer(tokens: TokenFile) -> Callable[[Context], Caller]:
-    return lambda context: tokens.authenticate(context.invocation_metadata() or ())
+def _storage(settings: Settings) -> Storage:
+    if settings.in_memory:
+        return MemoryStorage(keeps=False)
+    require_one_process(settings.data)
+    return SQLiteStorage(settings.data, settings.durability)

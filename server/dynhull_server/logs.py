@@ -7,8 +7,18 @@ from typing import Any
 import structlog
 
 
-def configure(level: str, form: str) -> None:
-    """Log from `level` on, as "text" or "json". Each key of `extra` becomes a field of the line."""
+def configure(level: str, form: str, process: str = "") -> None:
+    """Log from `level` on, as "text" or "json". Each key of `extra` becomes a field of the line.
+
+    Args:
+        level: the least level to log.
+        form: the format.
+        process: the name of the process, a field of every line; empty where there is only one.
+    """
+
+    def name_process(_: Any, __: str, event: structlog.typing.EventDict) -> structlog.typing.EventDict:
+        return {**event, "process": process} if process else event
+
     render: Any
     if form == "json":
         render = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
@@ -23,6 +33,7 @@ def configure(level: str, form: str) -> None:
                 structlog.stdlib.add_log_level,
                 structlog.stdlib.add_logger_name,
                 structlog.stdlib.ExtraAdder(),
+                name_process,
                 structlog.processors.TimeStamper(fmt="iso", utc=True),
             ],
             processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *render],

@@ -26,14 +26,14 @@ def run(settings: Settings) -> None:
     """Serve, then return; an error of the settings, the storage or the operating system ends the process."""
     logs.configure(settings.log_level, settings.log_format)
     return_large_blocks()
-    _allow_connections(settings.max_connections)
+    allow_connections(settings.max_connections)
     try:
         asyncio.run(_serve(settings))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 
 
-def _allow_connections(most: int) -> None:
+def allow_connections(most: int) -> None:
     """Raise the limit on open files as far as the system permits, and warn if the connections can exceed it."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if hard != resource.RLIM_INFINITY and hard <= most:
@@ -43,7 +43,7 @@ def _allow_connections(most: int) -> None:
 
 
 async def _serve(settings: Settings) -> None:
-    with _stop_signal() as stop:
+    with stop_signal() as stop:
         server = Server(settings)
         try:
             with progress_bar("hulls read") as progress:
@@ -59,8 +59,10 @@ async def _serve(settings: Settings) -> None:
 
 
 @contextmanager
-def _stop_signal() -> Iterator[asyncio.Event]:
+def stop_signal(again: asyncio.Event | None = None) -> Iterator[asyncio.Event]:
     """An event set by SIGTERM and SIGINT, which are ignored from the end of the block to the end of the process.
+
+    With `again`, SIGHUP sets that event.
 
     The signal arrives as a byte through a socket. A handler alone could run too late, if the event loop has just gone
     to sleep or another thread was interrupted. The handlers of the event loop do the same, but only until it is closed;
@@ -72,19 +74,23 @@ def _stop_signal() -> Iterator[asyncio.Event]:
     with wake, signalled:
 
         def received() -> None:
-            wake.recv(64)
-            stop.set()
+            numbers = wake.recv(64)
+            if any(number in numbers for number in SIGNALS):
+                stop.set()
+            if again is not None and signal.SIGHUP in numbers:
+                again.set()
 
         for end in (wake, signalled):
             end.setblocking(False)
         loop.add_reader(wake, received)
         signal.set_wakeup_fd(signalled.fileno())
-        for number in SIGNALS:
+        handled = SIGNALS if again is None else (*SIGNALS, signal.SIGHUP)
+        for number in handled:
             signal.signal(number, lambda *_: None)
         try:
             yield stop
         finally:
-            for number in SIGNALS:
+            for number in handled:
                 signal.signal(number, signal.SIG_IGN)
             signal.set_wakeup_fd(-1)
             loop.remove_reader(wake)

@@ -26,6 +26,16 @@ class Settings(BaseModel):
         "failure. interval: a power failure a tenth of a second later. none: one after the operating system has "
         "written it, usually within half a minute.",
     )
+    workers: int | None = Field(
+        None,
+        ge=1,
+        le=1024,
+        description="Number of processes that hold the hulls, each a part of them; without it, one process does "
+        "everything. Limits apply to each process.",
+    )
+    gateways: int | None = Field(
+        None, ge=1, le=256, description="Number of processes that take the calls for the workers; by default 1."
+    )
     create_on_write: bool = Field(False, description="Create a missing hull with its first batch.")
     snapshot_points: int = Field(
         250_000,
@@ -99,6 +109,8 @@ class Settings(BaseModel):
             raise ValueError("--tls-cert and --tls-key must be given together")
         if self.tls_client_ca and not self.tls_cert:
             raise ValueError("--tls-client-ca needs --tls-cert and --tls-key")
+        if self.gateways is not None and self.workers is None:
+            raise ValueError("--gateways needs --workers")
         protected = self.tls_cert and self.tokens
         for host in (self.host, *([] if self.metrics_port is None else [self.metrics_host])):
             if not is_loopback(host) and not protected and not self.insecure:

@@ -39,7 +39,7 @@ for command in {commands!r}:
     found.append((output.getvalue(), [*{{module.partition(".")[0] for module in sys.modules}}]))
 print(json.dumps(found))
 """
-OURS = {"dynhull_bridges", "dynhull_gateway", "dynhull_cli", "dynhull_dashboard", "dynhull_server"}
+OURS = {"dynhull_bridges", "dynhull_gateway", "dynhull_cli", "dynhull_cluster", "dynhull_dashboard", "dynhull_server"}
 MODELS = {
     "annotated_types",
     "pydantic",

@@ -11,6 +11,10 @@ from subprocess import PIPE
 from forked import COMMAND, Process
 from patience import PATIENCE
 
+# How the servers of the tests run: as one process, or as several, set by `pytest --shape`.
+SHAPES = {"process": (), "workers": ("--workers", "2", "--gateways", "2")}
+shape = "process"
+
 UNFINISHED = "is incomplete or damaged and was dropped, with at most 1 of the newest commits"
 
 
@@ -36,7 +40,7 @@ def server_process(
     wrote: it may say that it dropped the commit that was under way.
     """
     memory = [] if "--data" in options else ["--in-memory"]
-    command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *memory, *options]
+    command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *SHAPES[shape], *memory, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
         Process(command, stdout=PIPE, stderr=errors, text=True) as process,

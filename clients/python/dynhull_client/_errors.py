@@ -173,6 +173,7 @@ BY_REASON: Mapping[str, type[DynhullError]] = {
     "HULL_NOT_FOUND": HullNotFoundError,
     "HULL_REPLACED": HullReplacedError,
     "HULL_UNSUITABLE": HullUnsuitableError,
+    "HULLS_APART": HullUnsuitableError,
     "INVALID_FIELD": InvalidRequestError,
     "KEY_MISSING": KeyMissingError,
     "KEY_REPEATED": DuplicateKeyError,

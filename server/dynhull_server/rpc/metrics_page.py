@@ -31,7 +31,7 @@ class MetricsPage:
         refused: called in another thread with the reason, the status and the peer of each refused request.
 
     Attributes:
-        port: the port it listens on.
+        url: its address.
 
     Raises:
         OSError: it cannot listen there.
@@ -56,7 +56,7 @@ class MetricsPage:
         self._server = _Server(host, port, Page, tls)
         self._thread = threading.Thread(target=self._server.serve_forever, name="metrics")
         self._thread.start()
-        self.port = self._server.server_port
+        self.url = f"{'http' if tls is None else 'https'}://{host}:{self._server.server_port}/metrics"
 
     def close(self) -> None:
         """Stop serving."""

@@ -28,6 +28,7 @@ METHODS = {kind: request.name.removesuffix("Request") for kind, request in KINDS
 WAITS = {
     kind: [each for each in REVISIONS.items() if each[0] in request.fields_by_name] for kind, request in KINDS.items()
 }
+UNKNOWN_KIND = "must be a read of a kind that this server knows"
 # The name of reads of unknown kinds in the counts.
 UNKNOWN_READ = "unknown"
 
@@ -88,7 +89,7 @@ class Answers:
         answer = response.answers.add()
         try:
             if kind is None:
-                raise InvalidFieldError(f"reads[{index}]", "", "must be a read of a kind that this server knows")
+                raise InvalidFieldError(f"reads[{index}]", "", UNKNOWN_KIND)
             request = getattr(read, kind)
             if self._waits(request, kind):
                 await self._send()

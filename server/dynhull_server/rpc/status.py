@@ -56,6 +56,45 @@ class DrainingError(Exception):
 class StartingError(Exception):
     """The server is starting."""
 
+    def __init__(self, words: str = "the server is reading its data") -> None:
+        super().__init__(words)
+
+
+class WorkerAwayError(StartingError):
+    """The worker that has the hull is starting; the request has not reached it."""
+
+    def __init__(self, worker: int) -> None:
+        super().__init__(f"worker {worker}, which has this name, is starting")
+
+
+class HullsApartError(RefusedError):
+    """Two names that a request needs together belong to different workers.
+
+    Attributes:
+        field: the field of the second name.
+        name: the second name.
+    """
+
+    def __init__(self, field: str, name: str, other: str) -> None:
+        super().__init__(
+            f"{field} is {name!r}: another worker has {other!r}; give both names the same part before the first "
+            '"/", so that one worker has them'
+        )
+        self.field = field
+        self.name = name
+
+
+class RelayedError(Exception):
+    """Another process of the server has refused the request.
+
+    Attributes:
+        status: its answer, which the caller gets as it is.
+    """
+
+    def __init__(self, status: Status) -> None:
+        super().__init__(status.message)
+        self.status = status
+
 
 class ServiceUnknownError(RefusedError):
     """Health was requested of an unknown service."""
@@ -93,6 +132,7 @@ ANSWERED = (
     DrainingError,
     OutcomeUnknownError,
     PartRefusedError,
+    RelayedError,
     StartingError,
     StoppingError,
 )
@@ -134,6 +174,11 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case HullNotFoundError():
             resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
             return _status(code.NOT_FOUND, str(error), "HULL_NOT_FOUND", {"value": error.name, **where}, resource)
+        case HullsApartError():
+            failure = PreconditionFailure()
+            failure.violations.add(type="HULLS_APART", subject=error.name, description=str(error))
+            metadata = {"field": error.field, "value": error.name}
+            return _status(code.FAILED_PRECONDITION, str(error), "HULLS_APART", metadata, failure)
         case HullExistsError():
             resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
             return _status(code.ALREADY_EXISTS, str(error), "HULL_EXISTS", {"value": error.name}, resource)
@@ -211,7 +256,9 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case OutcomeUnknownError():
             return _status(code.UNKNOWN, str(error), "OUTCOME_UNKNOWN", where)
         case StartingError():
-            return _status(code.UNAVAILABLE, "the server is reading its data", "STARTING", where)
+            return _status(code.UNAVAILABLE, str(error), "STARTING", where)
+        case RelayedError():
+            return error.status
         case DrainingError() | StoppingError():
             return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
     raise error

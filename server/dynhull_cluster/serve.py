@@ -1,7 +1,7 @@
 """The command `dynhull serve`."""
 
-from .flags import with_settings
-from .settings import Settings
+from dynhull_server.flags import with_settings
+from dynhull_server.settings import Settings
 
 
 @with_settings
@@ -11,8 +11,14 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     The first line printed is "dynhull serving on HOST:PORT". SIGTERM stops the server: calls in progress finish, and
     all others get UNAVAILABLE.
 
+    With --workers, several processes share the hulls by the first part of their names, up to the first "/". SIGHUP then
+    restarts them, one at a time.
+
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
-    from .process import run
+    if settings.workers is None:
+        from dynhull_server.process import run
+    else:
+        from .process import run
 
     run(settings)

@@ -1,0 +1,30 @@
+"""Who calls: what a gateway, which has authenticated a caller, says of it to a worker.
+
+Only the gateways can reach a worker, because its sockets are in a folder of the server's own user. The worker reads the
+token file itself, so permissions that change apply there as in a server of one process.
+"""
+
+from collections.abc import Callable
+
+from dynhull_server.rpc.access import EVERYTHING, Caller, TokenFile
+from dynhull_server.rpc.calls import Call, Context
+
+OWNER, KEY = "dynhull-owner", "dynhull-token-hash"
+
+
+def metadata_of(call: Call) -> tuple[tuple[str, str], ...]:
+    """The metadata that name the caller."""
+    return ((OWNER, call.owner), (KEY, call.caller.key))
+
+
+def authenticator(tokens: TokenFile | None) -> Callable[[Context], Caller]:
+    """What returns the caller of a call from a gateway, or raises UnauthenticatedError if its token is gone."""
+
+    def authenticate(context: Context) -> Caller:
+        said = dict(context.invocation_metadata() or ())
+        if tokens is None:
+            return Caller(str(said[OWNER]), EVERYTHING)
+        tokens.look()
+        return tokens.known(str(said[KEY]))
+
+    return authenticate

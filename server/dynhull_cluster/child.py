@@ -1,0 +1,64 @@
+"""What a worker or a gateway runs, in the process that the supervisor has started for it."""
+
+import asyncio
+import gc
+import os
+import socket
+from pathlib import Path
+
+from prometheus_client import generate_latest
+
+from dynhull_server import logs
+from dynhull_server.app import Server
+from dynhull_server.failure import code_of, fail, text_of
+from dynhull_server.malloc import return_large_blocks
+from dynhull_server.process import allow_connections, stop_signal
+from dynhull_server.settings import Settings
+from dynhull_server.storage.port import StorageError
+
+from .gateway import Gateway
+from .line import Line
+from .sockets import Sockets
+from .worker import worker_server
+
+
+def main(end: socket.socket) -> None:
+    """Serve until SIGTERM, or until the supervisor at the other end of the line has ended."""
+    os.setpgid(0, 0)  # the signals of a terminal are for the supervisor
+    try:
+        asyncio.run(_run(end))
+    except (OSError, RuntimeError, ValueError, StorageError) as error:
+        fail(f"cannot serve: {text_of(error)}", code_of(error))
+
+
+async def _run(end: socket.socket) -> None:
+    line = await Line.on(end)
+    begin = await line.receive()
+    if begin is None:
+        return
+    settings = Settings.model_validate(begin["settings"])
+    logs.configure(settings.log_level, settings.log_format, begin["process"])
+    return_large_blocks()
+    allow_connections(settings.max_connections)
+    role, _, number = begin["process"].partition("-")
+    sockets = Sockets(Path(begin["sockets"]))
+    server = Gateway(settings, sockets) if role == "gateway" else worker_server(settings, int(number), sockets)
+    with stop_signal() as stop:
+        listening = asyncio.create_task(_listen(line, server))
+        try:
+            await server.start()
+            gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
+            line.send({"serving": server.address})
+            await stop.wait()
+        finally:
+            await server.drain()
+            listening.cancel()
+    gc.unfreeze()
+
+
+async def _listen(line: Line, server: Server | Gateway) -> None:
+    """Answer the supervisor, and end with it: all acknowledged batches are stored."""
+    while (asked := await line.receive()) is not None:
+        page = await asyncio.to_thread(generate_latest, server.registry)
+        line.send({"metrics": asked["metrics"], "page": page.decode()})
+    os._exit(os.EX_UNAVAILABLE)

@@ -1,0 +1,178 @@
+"""The calls that concern names of several workers: composed from the answers of each, or refused.
+
+Composed: the lists of hulls and of fences, `Separate`, and the reads of a `Query` call. Refused, with what to do: what
+has to be of one commit or one moment, as batches over several hulls, fences, and keys of another hull.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from typing import Any
+
+from dynhull_proto.v1 import fence_service_pb2, hull_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_server.rpc import answers, decode
+from dynhull_server.rpc.calls import Call, Work
+from dynhull_server.rpc.decode_fence import decode_fence, decode_fence_name
+from dynhull_server.rpc.methods import DESCRIPTOR, FENCES
+from dynhull_server.rpc.status import HullsApartError
+from dynhull_server.state.errors import HullEmptyError, HullUnsuitableError
+from dynhull_server.state.hull_state import Counts
+
+from .merged_query import MergedQuery
+from .relay import Relay
+from .worker_link import WorkerLink
+
+HULLS, FENCE_CALLS = f"/{DESCRIPTOR.full_name}", f"/{FENCES.full_name}"
+# The fields of a request that name hulls or fences, and the names.
+Names = Callable[[Any], Iterable[tuple[str, str]]]
+
+
+class Composed:
+    """The methods for which a gateway of several workers does more than it does for one.
+
+    Args:
+        relay: the workers.
+        max_corners: the largest number of corners of the area of a fence.
+
+    Attributes:
+        works: what such a method does, by its path.
+        routes: for others, what finds the worker of a request, by the path of the method.
+    """
+
+    def __init__(self, relay: Relay, max_corners: int) -> None:
+        self._relay = relay
+        fence_names = partial(_names_of_fence, max_corners)
+        self.works: dict[str, Work] = {
+            f"{HULLS}/ListHulls": partial(self._list, pb.ListHullsRequest, pb.ListHullsResponse, "hulls"),
+            f"{FENCE_CALLS}/ListFences": partial(
+                self._list, fence_service_pb2.ListFencesRequest, fence_service_pb2.ListFencesResponse, "fences"
+            ),
+            f"{HULLS}/Separate": self._separate,
+            f"{HULLS}/Query": self._query,
+        }
+        self.routes: dict[str, Callable[[bytes], WorkerLink]] = {
+            f"{HULLS}/ApplyTogether": partial(self._common_link, pb.ApplyTogetherRequest, _names_of_batches),
+            f"{HULLS}/Locate": partial(self._common_link, pb.LocateRequest, names_with_keys),
+            f"{HULLS}/Distance": partial(self._common_link, pb.DistanceRequest, names_with_keys),
+            f"{FENCE_CALLS}/CreateFence": partial(self._common_link, fence_service_pb2.CreateFenceRequest, fence_names),
+            f"{FENCE_CALLS}/ReplaceFence": partial(
+                self._common_link, fence_service_pb2.ReplaceFenceRequest, fence_names
+            ),
+        }
+
+    def _common_link(self, kind: Any, names: Names, message: bytes) -> WorkerLink:
+        return common_link(self._relay, names(kind.FromString(message)))
+
+    async def _list(self, request: Any, response: Any, field: str, call: Call) -> bytes:
+        """One page of all workers, by name."""
+        method = f"{HULLS}/ListHulls" if field == "hulls" else f"{FENCE_CALLS}/ListFences"
+        with call.cutoff():
+            message = await call.receive()
+        _, _, size = decode.decode_page(request.FromString(message))
+        with call.short():
+            pages = await _together(link.ask(method, call, message) for link in self._relay.links)
+        parsed = [response.FromString(page) for page in pages]
+        found = sorted((each for page in parsed for each in getattr(page, field)), key=lambda each: each.name)
+        more = len(found) > size or any(page.next_page_token for page in parsed)
+        merged = response(next_page_token=found[:size][-1].name if more else "")
+        getattr(merged, field).extend(found[:size])
+        return call.serialize(merged)
+
+    async def _separate(self, call: Call) -> bytes:
+        with call.cutoff():
+            message = await call.receive()
+            return await self.separate(call, message)
+
+    async def separate(self, call: Call, message: bytes) -> bytes:
+        """The answer to a request for the separation of two hulls.
+
+        No batch is in hulls of two workers, so hulls read one after the other are as they were at one moment.
+        """
+        request = pb.SeparateRequest.FromString(message)
+        link, other_link = self._relay.link(request.name), self._relay.link(request.other_name)
+        if link is other_link:
+            return await link.ask(f"{HULLS}/Separate", call, message)
+        decode.decode_name(request.name)
+        decode.decode_name(request.other_name, "other_name")
+        encoding = decode.decode_encoding(request.encoding)
+        wanted = (
+            (link, pb.GetHullRequest(name=request.name, min_revision=request.min_revision)),
+            (other_link, pb.GetHullRequest(name=request.other_name, min_revision=request.other_min_revision)),
+        )
+        read = await _together(
+            each.ask(f"{HULLS}/GetHull", call, question.SerializeToString()) for each, question in wanted
+        )
+        hull, other = map(pb.GetHullResponse.FromString, read)
+        geographic = [each.hull.config.frame == hull_pb2.FRAME_GEOGRAPHIC for each in (hull, other)]
+        if geographic[0] != geographic[1]:
+            kinds = [("geographic" if each else "a plane") for each in geographic]
+            problem = f"is {kinds[1]}, and {request.name!r} is {kinds[0]}"
+            raise HullUnsuitableError(request.other_name, problem, field="other_name")
+        for each in (hull, other):
+            if not each.hull.point_count:
+                raise HullEmptyError(each.hull.name)
+        separation = answers.separation_on_globe if geographic[0] else answers.separation
+        vertices, other_vertices = (decode.decode_points(each.vertices, "vertices") for each in (hull, other))
+        response = await asyncio.to_thread(
+            separation, _counts(hull.hull), vertices, _counts(other.hull), other_vertices, encoding
+        )
+        return call.serialize(response)
+
+    async def _query(self, call: Call) -> None:
+        with call.stream():
+            merged = MergedQuery(call, self._relay, self.separate)
+            try:
+                async for message in call.messages():
+                    with call.cutoff():
+                        await merged.answer(pb.QueryRequest.FromString(message).reads)
+            finally:
+                merged.close()
+
+
+def common_link(relay: Relay, names: Iterable[tuple[str, str]]) -> WorkerLink:
+    """The worker that has all of the names, each given with its field. Raises HullsApartError if there is none."""
+    (_, first), *others = names
+    link = relay.link(first)
+    for field, name in others:
+        if relay.link(name) is not link:
+            raise HullsApartError(field, name, first)
+    return link
+
+
+def names_with_keys(request: Any) -> Iterable[tuple[str, str]]:
+    """The names in a request about points, or about keys of this hull or another one."""
+    yield "name", request.name
+    if request.keys_of:
+        yield "keys_of", decode.decode_name(request.keys_of, "keys_of")
+
+
+def _names_of_batches(request: pb.ApplyTogetherRequest) -> Iterable[tuple[str, str]]:
+    return [(f"batches[{index}].name", name) for index, name in enumerate(decode.decode_parts(request))]
+
+
+def _names_of_fence(max_corners: int, request: Any) -> Iterable[tuple[str, str]]:
+    """The names of a fence and of its hulls. A prefix has to have a whole first part."""
+    config = decode_fence(request, max_corners)
+    yield "name", decode_fence_name(request.name)
+    field = request.config.WhichOneof("subjects")
+    if config.kind == "prefix" and "/" not in config.subjects:
+        problem = 'with several workers, a prefix has a "/": names have a worker in common if they agree before it'
+        raise decode.InvalidFieldError("config.subject_prefix", config.subjects, problem)
+    yield f"config.{field}", config.subjects
+    if config.area_hull is not None:
+        yield "config.hull_area.name", config.area_hull
+
+
+def _counts(hull: hull_pb2.Hull) -> Counts:
+    center = (hull.center.longitude, hull.center.latitude) if hull.HasField("center") else None
+    return Counts(hull.revision, hull.point_count, hull.distinct_point_count, center=center)
+
+
+async def _together(asked: Iterable[Awaitable[bytes]]) -> list[bytes]:
+    """The answers of several workers. The first refusal in their order is raised, after all have answered."""
+    found = await asyncio.gather(*asked, return_exceptions=True)
+    for each in found:
+        if isinstance(each, BaseException):
+            raise each
+    return [each for each in found if isinstance(each, bytes)]

@@ -1,0 +1,170 @@
+"""A gateway: it takes the calls of the public address, and passes them to the workers."""
+
+import logging
+from functools import partial
+from typing import Any
+
+import grpc
+from google.protobuf.descriptor import MethodDescriptor, ServiceDescriptor
+from grpc_health.v1 import health_pb2
+
+from dynhull_server.app import LAST_STATUSES, SCRUB, SERVICES, end_process, token_file
+from dynhull_server.engine.supervisor import Supervisor
+from dynhull_server.engine.threads import Clock
+from dynhull_server.entrance import PublicEntrance, grpc_server
+from dynhull_server.rpc.access import LOOK_SECONDS
+from dynhull_server.rpc.calls import Calls, Work
+from dynhull_server.rpc.health import Health
+from dynhull_server.rpc.methods import (
+    DESCRIPTOR,
+    FENCES,
+    FINISHED,
+    UnknownMethods,
+    health_handlers,
+    reflection_handlers,
+)
+from dynhull_server.rpc.metrics import Metrics
+from dynhull_server.rpc.places import Places
+from dynhull_server.settings import Settings
+
+from . import worker_link
+from .composed import Composed
+from .relay import Relay, Route, within
+from .sockets import Sockets
+from .worker_link import WorkerLink
+
+# The health of one worker is that of the service with this name and its number.
+WORKER = "dynhull.v1.worker"
+# Seconds that a worker may be away, as when it is restarted, before the health of the whole says so.
+AWAY_SECONDS = 30.0
+WHOLE = ""
+
+SERVING = health_pb2.HealthCheckResponse.SERVING
+NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
+
+log = logging.getLogger(__name__)
+
+
+class Gateway:
+    """Serves from `start` until `drain` has returned.
+
+    Args:
+        settings: the settings; the port is one that gateways share.
+        sockets: where the workers listen.
+
+    Attributes:
+        address: the host:port it listens on, once started.
+        registry: its metrics.
+    """
+
+    def __init__(self, settings: Settings, sockets: Sockets) -> None:
+        assert settings.workers is not None
+        self._settings = settings
+        self._clock = Clock()
+        self._supervisor = Supervisor(self._clock, lambda _: self._update_health(), end_process)
+        self._tokens = token_file(settings)
+        self._entrance = PublicEntrance(settings, shared_port=True)
+        metrics = Metrics()
+        self.registry = metrics.registry
+        streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
+        self._calls = Calls(self._entrance.authenticator(self._tokens), metrics, settings.max_message_bytes, streams)
+        self._health = Health(
+            Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
+        )
+        watched = (WHOLE, SCRUB)
+        self._links = [WorkerLink(i, sockets, watched, self._update_health) for i in range(settings.workers)]
+        self._away_since: dict[int, float | None] = dict.fromkeys(range(settings.workers))
+        self._relay = Relay(self._links, settings.max_watch_lag)
+        self._composed = Composed(self._relay, settings.max_fence_corners)
+        self._server = grpc_server(settings, shared_port=True)
+        self._serving = False
+        self.address = ""
+
+    async def start(self) -> None:
+        """Listen, and look for the workers. Calls to a worker that is away get UNAVAILABLE.
+
+        Raises:
+            OSError: it cannot listen.
+        """
+        handlers = (
+            self._handlers(DESCRIPTOR),
+            self._handlers(FENCES),
+            health_handlers(self._health, self._calls),
+            reflection_handlers(self._calls),
+            UnknownMethods(self._calls),
+        )
+        self._server.add_generic_rpc_handlers(handlers)
+        self.address = await self._entrance.listen(self._server, handlers)
+        self._health.set(NOT_SERVING, WHOLE, *SERVICES, SCRUB)
+        self._calls.ready()
+        self._serving = True
+        for link in self._links:
+            self._supervisor.every(worker_link.LOOK_SECONDS, f"worker-{link.number}", link.run)
+        self._supervisor.every(1.0, "health", self._look)
+        if self._tokens is not None:
+            self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
+            self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
+        await self._server.start()
+        log.info("serving", extra={"address": self.address})
+
+    async def drain(self) -> None:
+        """Refuse new calls, end waiting ones, and give the others the configured grace period to finish."""
+        log.info("draining")
+        self._health.stop()
+        self._serving = False
+        await self._calls.drain(self._settings.grace)
+        await self._server.stop(LAST_STATUSES)
+        await self._supervisor.stop()
+        for link in self._links:
+            await link.close()
+        log.info("stopped")
+
+    def _handlers(self, service: ServiceDescriptor) -> grpc.GenericRpcHandler:
+        handlers = {}
+        for method in service.methods:
+            make: Any = grpc.stream_unary_rpc_method_handler
+            if method.client_streaming or method.server_streaming:  # the relay writes what the worker answers
+                make = grpc.stream_stream_rpc_method_handler
+            handlers[method.name] = make(
+                partial(self._calls.serve, method.name, self._calls.admit, self._work(service, method)),
+                request_deserializer=within(self._settings.max_message_bytes),
+            )
+        return grpc.method_handlers_generic_handler(service.full_name, handlers)
+
+    def _work(self, service: ServiceDescriptor, method: MethodDescriptor) -> Work:
+        path = f"/{service.full_name}/{method.name}"
+        if path in self._composed.works and len(self._links) > 1:
+            return self._composed.works[path]
+        if method.client_streaming:
+            return partial(self._relay.write, path)
+        if method.server_streaming:
+            return partial(self._relay.read, path)
+        route: Route = self._relay.route
+        if len(self._links) > 1:
+            route = self._composed.routes.get(path, route)
+        return partial(self._relay.ask, path, method.name in FINISHED, route)
+
+    async def _look(self) -> None:
+        """Notice that a worker has been away for too long."""
+        self._update_health()
+
+    def _update_health(self) -> None:
+        if not self._serving:
+            return
+        well = self._supervisor.reason is None
+        scrubbed = True
+        for link in self._links:
+            self._health.set(link.health[WHOLE] or NOT_SERVING, f"{WORKER}/{link.number}")
+            well &= self._well(link)
+            scrubbed &= link.health[SCRUB] != NOT_SERVING
+        self._health.set(SERVING if well else NOT_SERVING, WHOLE, *SERVICES)
+        self._health.set(SERVING if scrubbed else NOT_SERVING, SCRUB)
+
+    def _well(self, link: WorkerLink) -> bool:
+        """Whether a worker serves, or did so half a minute ago and is away since."""
+        now = self._clock.monotonic()
+        if link.health[WHOLE] == SERVING:
+            self._away_since[link.number] = now
+            return True
+        served = self._away_since[link.number]
+        return not link.present and served is not None and now - served < AWAY_SECONDS

@@ -1,0 +1,24 @@
+"""Which worker has which names.
+
+A name belongs to one of 1,024 partitions, by a hash of its first part, up to the first "/"; a worker has every n-th
+partition. So names with a common first part are on one worker: fences, and batches over several hulls, need that.
+"""
+
+import zlib
+
+PARTITIONS = 1024
+
+
+def first_part(name: str) -> str:
+    """The part of a name that decides where it belongs."""
+    return name.partition("/")[0]
+
+
+def partition_of(name: str) -> int:
+    """The partition of a name. Part of the format of data folders: it must not change."""
+    return zlib.crc32(first_part(name).encode()) % PARTITIONS
+
+
+def worker_of(name: str, workers: int) -> int:
+    """The number of the worker that has a name, of so many workers."""
+    return partition_of(name) % workers

@@ -1,0 +1,191 @@
+"""The process of the supervisor: it starts gateways and workers, keeps them alive, and stops them."""
+
+import asyncio
+import logging
+import shutil
+import socket
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from dynhull_server import logs
+from dynhull_server.app import metrics_page, token_file
+from dynhull_server.entrance import tls_context
+from dynhull_server.failure import code_of, fail, text_of
+from dynhull_server.listening import listening_error, why_not
+from dynhull_server.process import stop_signal
+from dynhull_server.settings import Settings
+from dynhull_server.storage.port import LockedError, StorageError
+from dynhull_server.storage.sqlite.disk import Disk
+from dynhull_server.storage.sqlite.folder import Folder
+from dynhull_server.storage.worker_folders import divide, worker_folder
+
+from .child_process import ChildProcess, StartFailedError
+from .metrics import registry_of
+from .sockets import socket_folder
+
+# Seconds in which the processes of a supervisor that was killed have ended, too.
+LOCK_SECONDS = 5.0
+# The name of the task that restarts all processes.
+RESTART = "restart"
+
+log = logging.getLogger(__name__)
+
+
+def run(settings: Settings) -> None:
+    """Serve with several processes, then return; what prevents that ends the process."""
+    logs.configure(settings.log_level, settings.log_format, "supervisor")
+    try:
+        asyncio.run(_serve(settings))
+    except StartFailedError as error:  # that process has said why
+        raise SystemExit(error.code) from None
+    except (OSError, RuntimeError, ValueError, StorageError) as error:
+        fail(f"cannot serve: {text_of(error)}", code_of(error))
+
+
+async def _serve(settings: Settings) -> None:
+    again = asyncio.Event()
+    with ExitStack() as opened, stop_signal(again) as stop:
+        tokens = token_file(settings)
+        tls_context(settings)
+        port = opened.enter_context(_reserved_port(settings.host, settings.port))
+        workers, gateways = settings.workers or 1, settings.gateways or 1
+        if not settings.in_memory:
+            divide(settings.data, workers)
+            opened.enter_context(_locked(settings.data))
+            for number in range(workers):
+                with _locked(worker_folder(settings.data, number)):
+                    pass
+        sockets = socket_folder(None if settings.in_memory else settings.data)
+        opened.callback(shutil.rmtree, sockets, ignore_errors=True)
+        own = settings.model_copy(update={"port": port})
+        begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets)}
+        processes = Processes(
+            [ChildProcess(f"worker-{i}", begin, settings.grace) for i in range(workers)],
+            [ChildProcess(f"gateway-{i}", begin, settings.grace) for i in range(gateways)],
+        )
+        registry = registry_of(processes.all, asyncio.get_running_loop())
+        page = metrics_page(settings, registry, tokens, _log_refusal)
+        if page is not None:
+            opened.callback(page.close)
+        try:
+            if await processes.start(stop):
+                print(f"dynhull serving on {processes.address}", flush=True)  # noqa: T201  # output of the command
+                if page is not None:
+                    print(f"metrics on {page.url}", flush=True)  # noqa: T201  # likewise
+                await processes.keep(stop, again)
+        finally:
+            await processes.stop()
+
+
+class Processes:
+    """The workers and the gateways, from `start` until `stop`."""
+
+    def __init__(self, workers: Sequence[ChildProcess], gateways: Sequence[ChildProcess]) -> None:
+        self._workers = workers
+        self._gateways = gateways
+        self.all = [*workers, *gateways]
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._one_restart = asyncio.Lock()
+
+    @property
+    def address(self) -> str:
+        """The address of the gateways."""
+        return self._gateways[0].address
+
+    async def start(self, stop: asyncio.Event) -> bool:
+        """Start all, and wait until they serve; False if `stop` was set before.
+
+        Raises:
+            StartFailedError: one of them has ended before it served.
+        """
+        self._tasks = {asyncio.create_task(each.run(), name=each.name) for each in self.all}
+        return await self._wait(stop, *(each.serving for each in self.all))
+
+    async def keep(self, stop: asyncio.Event, again: asyncio.Event) -> None:
+        """Keep them alive until `stop`, and restart them, one at a time, whenever `again` is set."""
+        while await self._wait(stop, again):
+            again.clear()
+            self._tasks.add(asyncio.create_task(self._restart(), name=RESTART))
+
+    async def stop(self) -> None:
+        """Stop the gateways, which end their calls, and then the workers."""
+        for group in (self._gateways, self._workers):
+            await asyncio.gather(*(each.stop() for each in group))
+        for task in self._tasks:
+            if task.get_name() == RESTART:
+                task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _restart(self) -> None:
+        async with self._one_restart:
+            for each in self.all:
+                log.info("a process is restarted", extra={"restarted": each.name})
+                await each.restart()
+        log.info("all processes are restarted")
+
+    async def _wait(self, stop: asyncio.Event, *events: asyncio.Event) -> bool:
+        """Wait for all of the events, or for `stop`; returns False for that.
+
+        Raises the error of a process or of a restart that has failed.
+        """
+        waits = [asyncio.create_task(_all(events)), asyncio.create_task(stop.wait())]
+        try:
+            await asyncio.wait([*waits, *self._tasks], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for each in waits:
+                each.cancel()
+        for task in [each for each in self._tasks if each.done()]:
+            task.result()
+            self._tasks.remove(task)
+        return not stop.is_set()
+
+
+async def _all(events: Sequence[asyncio.Event]) -> None:
+    for each in events:
+        await each.wait()
+
+
+def _log_refusal(reason: str, code: str, peer: str) -> None:
+    """Log a refused request for metrics."""
+    log.warning("a request for metrics was refused: %s", reason, extra={"code": code, "peer": peer})
+
+
+@contextmanager
+def _reserved_port(host: str, port: int) -> Iterator[int]:
+    """Keep a port for the gateways during the block; yields its number. OSError if another program uses it."""
+    if port and (reason := why_not(host, port)):
+        raise OSError(f"cannot listen on {host}:{port}: {reason}")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host.strip("[]"), port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        reserved = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise OSError(f"cannot listen on {host}:{port}: {listening_error(error)}") from None
+    with reserved:
+        # Without listening, it gets no connections; with it, no other program can listen without sharing the port.
+        reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        try:
+            reserved.bind(address)
+        except OSError as error:
+            raise OSError(f"cannot listen on {host}:{port}: {listening_error(error)}") from None
+        yield reserved.getsockname()[1]
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder; wait for processes that are about to end. Raises LockedError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    deadline = time.monotonic() + LOCK_SECONDS
+    with ExitStack() as held:
+        while True:
+            try:
+                held.enter_context(Folder(folder, Disk()).held())
+                break
+            except LockedError:
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.05)
+        yield

@@ -1,0 +1,127 @@
+"""What a gateway does with a call: it passes the bytes to the worker that has the name, and the answers back."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import grpc
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_server.rpc.calls import Call
+from dynhull_server.state.errors import LimitExceededError
+
+from .placement import worker_of
+from .worker_link import WorkerLink, relayed
+
+Route = Callable[[bytes], WorkerLink]
+
+
+class Relay:
+    """The workers as one server.
+
+    Args:
+        links: the workers, by their numbers.
+        max_watch_lag: the seconds that a caller may take to receive one message of a call that only answers.
+    """
+
+    def __init__(self, links: Sequence[WorkerLink], max_watch_lag: float) -> None:
+        self.links = links
+        self._max_watch_lag = max_watch_lag
+
+    def link(self, name: str) -> WorkerLink:
+        """The worker that has a name."""
+        return self.links[worker_of(name, len(self.links))]
+
+    def route(self, message: bytes) -> WorkerLink:
+        """The worker that has the name in a request: the first field of nearly all of them. Raises DecodeError."""
+        return self.link(pb.DeleteHullRequest.FromString(message).name)
+
+    async def ask(self, method: str, finish: bool, route: Route, call: Call) -> bytes:
+        """A call with one request and one response.
+
+        Args:
+            method: its path.
+            finish: whether a gateway that drains waits for the response.
+            route: finds the worker of the request.
+            call: the call.
+        """
+        if not finish:
+            with call.cutoff():
+                message = await call.receive()
+                return await route(message).ask(method, call, message)
+        with call.cutoff():
+            message = await call.receive()
+        with call.short():
+            return await route(message).ask(method, call, message)
+
+    async def read(self, method: str, call: Call) -> None:
+        """A call with one request and many responses."""
+        with call.stream():
+            with call.cutoff():
+                message = await call.receive()
+            upstream = self.route(message).stream(method, call)
+            try:
+                with call.cutoff(), suppress(asyncio.InvalidStateError):  # it has ended: reading raises why
+                    await upstream.write(message)
+                    await upstream.done_writing()
+                while True:
+                    with call.cutoff():
+                        response = await next_response(upstream)
+                    if response is None:
+                        return
+                    await self.send(call, response)
+            finally:
+                upstream.cancel()
+
+    async def send(self, call: Call, response: bytes) -> None:
+        """Send a response. Raises LimitExceededError if the caller does not receive it."""
+        await call.write_within(self._max_watch_lag, response)
+
+    async def write(self, method: str, call: Call) -> None:
+        """A call with many requests, the first of which names a hull, and one or many responses."""
+        with call.stream():
+            with call.cutoff():
+                first = await call.read()
+            # Without any request, every worker refuses the call with the same words.
+            link = self.links[0] if first is None else self.route(first)
+            upstream = link.stream(method, call)
+            feeding = asyncio.create_task(self._feed(call, first, upstream))
+            try:
+                while (response := await next_response(upstream)) is not None:
+                    await call.write(response)
+                await feeding  # raises what has ended the requests
+            finally:
+                feeding.cancel()
+                upstream.cancel()
+
+    async def _feed(self, call: Call, message: bytes | None, upstream: Any) -> None:
+        """Pass on requests until the last, or until the call ends; the worker answers those that it has."""
+        try:
+            with call.cutoff(), suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError):
+                while message is not None:
+                    await upstream.write(message)
+                    message = await call.read()
+        finally:
+            with suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError):
+                await upstream.done_writing()
+
+
+async def next_response(upstream: Any) -> bytes | None:
+    """The next response; None after the last. Raises RelayedError."""
+    try:
+        response = await upstream.read()
+    except grpc.aio.AioRpcError as error:
+        raise relayed(error) from None
+    return None if response is grpc.aio.EOF else response
+
+
+def within(max_bytes: int) -> Any:
+    """A deserializer that leaves the bytes as they are, and refuses too many of them."""
+
+    def receive(data: bytes) -> tuple[bytes, int] | Exception:
+        if len(data) > max_bytes:
+            return LimitExceededError("max_message_bytes", max_bytes)
+        return data, len(data)
+
+    return receive

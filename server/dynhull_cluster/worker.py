@@ -1,0 +1,60 @@
+"""A worker: the server of one process, reached through private sockets, on its own part of the data."""
+
+from collections.abc import Callable, Sequence
+
+import grpc
+
+from dynhull_server.app import Server
+from dynhull_server.rpc.access import Caller, TokenFile
+from dynhull_server.rpc.calls import Context
+from dynhull_server.settings import Settings
+from dynhull_server.storage.worker_folders import worker_folder
+
+from .callers import authenticator
+from .frame_server import FrameServer
+from .sockets import Sockets
+
+# Each gateway watches the health of each worker; all of them have one address.
+HEALTH_CALLS = 1024
+
+
+def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
+    """The server of a worker."""
+    own = settings.model_copy(
+        update={
+            "data": worker_folder(settings.data, number),
+            "tls_cert": None,
+            "tls_key": None,
+            "tls_client_ca": None,
+            "metrics_port": None,
+            "max_health_calls": HEALTH_CALLS,
+            "max_health_calls_per_caller": HEALTH_CALLS,
+        }
+    )
+    return Server(own, PrivateEntrance(number, sockets))
+
+
+class PrivateEntrance:
+    """The sockets of a worker, which gateways reach."""
+
+    def __init__(self, number: int, sockets: Sockets) -> None:
+        self._number = number
+        self._sockets = sockets
+        self._frames: FrameServer | None = None
+
+    def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
+        """Callers are who a gateway says they are."""
+        return authenticator(tokens)
+
+    async def listen(self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler]) -> str:
+        """Listen on both sockets."""
+        address = f"unix:{self._sockets.grpc(self._number)}"
+        server.add_insecure_port(address)
+        self._frames = FrameServer(handlers)
+        await self._frames.listen(self._sockets.frames(self._number))
+        return address
+
+    async def close(self) -> None:
+        """Close the socket for frames."""
+        if self._frames is not None:
+            await self._frames.close()

@@ -1,0 +1,125 @@
+"""How callers reach a server: where it listens, and who its callers are."""
+
+import math
+import ssl
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import grpc
+
+from .certificates import server_context
+from .listening import why_not
+from .rpc.access import ANONYMOUS, Caller, TokenFile
+from .rpc.calls import Context
+from .settings import Settings
+
+# Milliseconds between pings on an idle connection, and until a connection that does not answer them is closed.
+KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
+# Bytes of each call that a client may send before the server reads them.
+LOOKAHEAD = 2**20
+# Milliseconds that a new connection has for the HTTP/2 handshake.
+HANDSHAKE_TIMEOUT = 10_000
+
+# Messages up to this many bytes beyond the limit are read, so that the refusal can have details.
+REFUSED_BYTES = 64 * 2**20
+
+
+class Entrance(Protocol):
+    """The way in, of a server that has its handlers."""
+
+    def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
+        """What returns the caller of a call, or raises UnauthenticatedError."""
+
+    async def listen(self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler]) -> str:
+        """Listen, before `server` is started. Returns the address.
+
+        Raises:
+            OSError: it cannot listen there.
+        """
+
+    async def close(self) -> None:
+        """Close what `listen` has opened beside the server, after the last call."""
+
+
+class PublicEntrance:
+    """The address of the settings, with their certificates and tokens.
+
+    Args:
+        settings: the settings.
+        shared_port: whether other processes may listen on the same port; each gets some of the connections.
+
+    Raises:
+        ValueError: the certificates cannot be used.
+    """
+
+    def __init__(self, settings: Settings, *, shared_port: bool = False) -> None:
+        tls_context(settings)  # gRPC does not say what is wrong with the files
+        self._settings = settings
+        self._shared_port = shared_port
+
+    def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
+        """Callers are known by their tokens, or without tokens by their addresses."""
+        return _anonymous if tokens is None else _bearer(tokens)
+
+    async def listen(self, server: grpc.aio.Server, _: Sequence[grpc.GenericRpcHandler]) -> str:
+        """Listen on the host and the port."""
+        settings = self._settings
+        address = f"{settings.host}:{settings.port}"
+        # gRPC does not give the operating system's reason.
+        if not self._shared_port and (reason := why_not(settings.host, settings.port)):
+            raise OSError(f"cannot listen on {address}: {reason}")
+        credentials = _server_credentials(settings)
+        port = (
+            server.add_insecure_port(address) if credentials is None else server.add_secure_port(address, credentials)
+        )
+        return f"{settings.host}:{port}"
+
+    async def close(self) -> None:
+        """Nothing beside the server is open."""
+
+
+def grpc_server(settings: Settings, *, shared_port: bool = False) -> grpc.aio.Server:
+    """A server with the limits of the settings, which does not listen yet."""
+    return grpc.aio.server(
+        options=[
+            # gRPC's own refusal of a large message has no details, so its limit is higher than ours.
+            ("grpc.max_receive_message_length", settings.max_message_bytes + REFUSED_BYTES),
+            ("grpc.max_send_message_length", -1),
+            # Otherwise a second server could start on the same port, and receive half of the calls.
+            ("grpc.so_reuseport", int(shared_port)),
+            ("grpc.keepalive_time_ms", KEEPALIVE),
+            ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
+            ("grpc.http2.bdp_probe", 0),
+            ("grpc.http2.lookahead_bytes", LOOKAHEAD),
+            ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
+            ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
+            ("grpc.max_allowed_incoming_connections", settings.max_connections),
+        ]
+    )
+
+
+def tls_context(settings: Settings) -> ssl.SSLContext | None:
+    """The certificates of the settings, for servers other than gRPC; None without TLS. Raises ValueError."""
+    if settings.tls_cert is None or settings.tls_key is None:
+        return None
+    return server_context(settings.tls_cert, settings.tls_key, settings.tls_client_ca)
+
+
+def _server_credentials(settings: Settings) -> grpc.ServerCredentials | None:
+    """The certificates of the settings; None without TLS."""
+    if settings.tls_cert is None or settings.tls_key is None:
+        return None
+    client_ca = None if settings.tls_client_ca is None else settings.tls_client_ca.read_bytes()
+    return grpc.ssl_server_credentials(
+        [(settings.tls_key.read_bytes(), settings.tls_cert.read_bytes())],
+        client_ca,
+        require_client_auth=client_ca is not None,
+    )
+
+
+def _anonymous(_: Context) -> Caller:
+    return ANONYMOUS
+
+
+def _bearer(tokens: TokenFile) -> Callable[[Context], Caller]:
+    return lambda context: tokens.authenticate(context.invocation_metadata() or ())
