@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 MOST_POINTS_DRAWN = 2000
+# The measures of a hull before any of them: at no number of changes. All hulls share it, and it stays empty.
+UNMEASURED: tuple[int, dict[str, Any]] = (-1, {})
 
 
 class Live:
@@ -128,7 +130,7 @@ class Live:
         """An independent hull of the same points. O(n)."""
         new = type(self).__new__(type(self))
         new._tree = self._tree.copy()
-        new._measured = (0, {})
+        new._measured = UNMEASURED
         return new
 
     __copy__ = copy

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 import numpy as np
 
 from . import _ellipsoid, _flat_map
-from ._base import Live
+from ._base import UNMEASURED, Live
 from ._globe import Gnomonic, as_center, as_lonlat, as_place
 from ._globe_tree import GlobeEntities, GlobeTree, GlobeWindowTree
 from ._hull import Multiset
@@ -201,7 +201,7 @@ class GeoHull(Multiset, Globe):
 
     def __init__(self, lonlat: npt.ArrayLike | None = None, center: tuple[float, float] | None = None) -> None:
         self._tree = self._tree_type(None if center is None else as_center(center))
-        self._measured = (0, {})
+        self._measured = UNMEASURED
         if lonlat is not None:
             self._tree.apply(+1, lonlat, False)
             self._tree.changes = 0
@@ -266,7 +266,7 @@ class GeoKeyedHull(Keyed, Globe):
         self, key_type: KeyType = "str", *, ordered: bool = False, center: tuple[float, float] | None = None
     ) -> None:
         self._tree = self._tree_type(known_kind(key_type), bool(ordered), None if center is None else as_center(center))
-        self._measured = (0, {})
+        self._measured = UNMEASURED
 
     @classmethod
     def from_entities(
@@ -347,7 +347,7 @@ class GeoWindowHull(Windowed, Globe):
     ) -> None:
         limits = checked_limits(max_age, max_points)
         self._tree = self._tree_type(*limits, None if center is None else as_center(center))
-        self._measured = (0, {})
+        self._measured = UNMEASURED
 
     def delete(self, lon: float, lat: float) -> bool:
         """Remove the oldest copy of a point. Returns whether the hull changed. O(log² n).
@@ -366,4 +366,4 @@ class GeoWindowHull(Windowed, Globe):
         max_age, max_points, center, contents = state
         self._tree = self._tree_type(max_age, max_points, center)
         self._tree.restore(*contents)
-        self._measured = (0, {})
+        self._measured = UNMEASURED

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from ._base import Hull, Live
+from ._base import UNMEASURED, Hull, Live
 from ._implementation import kernel
 from ._tree import HullTree
 from .arrays import Points, as_operations, as_pairs
@@ -140,7 +140,7 @@ class DynamicHull(Multiset, Hull):
 
     def __init__(self, points: npt.ArrayLike | None = None) -> None:
         self._tree = self._tree_type(points)
-        self._measured = (0, {})
+        self._measured = UNMEASURED
 
     # As a value
 

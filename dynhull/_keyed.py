@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ._base import Hull, Live
+from ._base import UNMEASURED, Hull, Live
 from ._entities import Entities
 from ._implementation import kernel
 
@@ -242,7 +242,7 @@ class KeyedHull(Keyed, Hull):
 
     def __init__(self, key_type: KeyType = "str", *, ordered: bool = False) -> None:
         self._tree = self._tree_type(known_kind(key_type), bool(ordered))
-        self._measured = (0, {})
+        self._measured = UNMEASURED
 
     @classmethod
     def from_entities(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
-from ._base import Hull, Live
+from ._base import UNMEASURED, Hull, Live
 from ._expiry import WindowTree
 from ._hull import MissingPointError
 from ._implementation import kernel
@@ -192,7 +192,7 @@ class WindowHull(Windowed, Hull):
 
     def __init__(self, max_age: float | None = None, max_points: int | None = None) -> None:
         self._tree = self._tree_type(*checked_limits(max_age, max_points))
-        self._measured = (0, {})
+        self._measured = UNMEASURED
 
     # As a value
 
@@ -203,7 +203,7 @@ class WindowHull(Windowed, Hull):
         max_age, max_points, contents = state
         self._tree = self._tree_type(max_age, max_points)
         self._tree.restore(*contents)
-        self._measured = (0, {})
+        self._measured = UNMEASURED
 
 
 def checked_limits(max_age: float | None, max_points: int | None) -> tuple[float | None, int | None]:

@@ -31,13 +31,14 @@ class Pool {
   Record& operator[](std::uint32_t i) { return data_[i]; }
   const Record& operator[](std::uint32_t i) const { return data_[i]; }
 
-  // Makes room for `extra` more records, so that as many calls of take() succeed. Grows by at least an eighth. A small
-  // pool grows to half as much again as needed, because moving memory costs more than untouched memory.
+  // Makes room for `extra` more records, so that as many calls of take() succeed. The first room is what is
+  // needed: many trees never grow. Later it grows by at least an eighth, and a small pool to half as much again as
+  // needed, because moving memory costs more than untouched memory.
   void reserve(std::size_t extra) {
     const std::size_t needed = used_ + extra;
     if (needed <= capacity_ + freed_) return;
     std::size_t capacity = std::max<std::size_t>({needed - freed_, std::size_t{capacity_} + capacity_ / 8, 2});
-    if (capacity < SMALL) capacity += capacity / 2;
+    if (capacity_ > 0 && capacity < SMALL) capacity += capacity / 2;
     if (capacity >= NOWHERE / 2) throw std::bad_alloc();
     capacity = memory::whole_pages(capacity * sizeof(Record)) / sizeof(Record);
     data_ = static_cast<Record*>(memory::resize(data_, bytes(), whole_pages(capacity)));
