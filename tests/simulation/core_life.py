@@ -161,8 +161,8 @@ class CoreServer:
         self._storage = storage
         contents = storage.open(lambda *_: None)
         self.core = Core(limits, contents.next_number, immediate=storage.immediate)
-        for row in contents.hulls:
-            kept = storage.read(row.number)
+        numbers = [row.number for row in contents.hulls]
+        for row, kept in zip(contents.hulls, storage.read_each(numbers), strict=True):
             self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
         fences = [storage.read_fence(row.number) for row in contents.fences]
         self.core.restore_fences([each for each in fences if each is not None])

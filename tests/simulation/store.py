@@ -115,6 +115,13 @@ class FaultyStorage:
         self.give_way()
         return kept
 
+    def read_each(self, numbers: Sequence[int]) -> Iterator[Kept]:
+        """Hulls, as at the start."""
+        for kept in self._inner.read_each(numbers):
+            self.give_way()
+            self._fail("read")
+            yield kept
+
     def oldest(self, number: int) -> int:
         """The oldest revision of a hull."""
         self._fail("oldest")

@@ -192,6 +192,24 @@ def test_a_hull_is_read_as_it_was(opened):
     same(opened.storage.read(1, NEWEST).records, records(1, 9))
 
 
+def test_many_hulls_are_read_like_each_alone(opened):
+    for number in range(1, 6):
+        opened.create(number)
+    for revision in range(1, 8):
+        opened.commit(*(Append(number, [record(revision)]) for number in (1, 3, 4)))
+    opened.commit(Append(5, records(1, 3)))
+    opened.snapshot(3, 7, points(4))
+    for numbers in ([1, 2, 3, 4, 5], [4, 3, 1], []):
+        together = list(opened.storage.read_each(numbers))
+        for number, kept in zip(numbers, together, strict=True):
+            alone = opened.storage.read(number)
+            same(kept.records, alone.records)
+            assert kept.revision == alone.revision
+            np.testing.assert_array_equal(kept.contents.points, alone.contents.points)
+    with pytest.raises(KeyError):
+        list(opened.storage.read_each([1, 6]))
+
+
 def test_a_snapshot_stands_for_the_batches_before_it(opened):
     opened.create(1)
     at = {}

@@ -61,6 +61,8 @@ TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
 TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
+# Hulls that share queries of the storage at the start.
+READ_TOGETHER = 1000
 # Seconds of loading between reports of the progress.
 LOAD = 0.1
 # Seconds between looks at the commit in progress.
@@ -139,7 +141,7 @@ class Engine:
             keeps=self._storage.keeps,
         )
         progress(0, len(contents.hulls))
-        left = iter(contents.hulls)
+        left = self._stored_hulls(contents.hulls)
         while loaded := await self.run(self.disk, partial(self._load_some, left)):
             for restored in loaded:
                 self._core.restore(*restored)
@@ -161,7 +163,12 @@ class Engine:
         self._supervisor.every(keeping.SECONDS, "fences", keeping.round)
         return contents.notes
 
-    def _load_some(self, rows: Iterator[HullRow]) -> list[tuple[HullRow, HullState, int]]:
+    def _stored_hulls(self, rows: Sequence[HullRow]) -> Iterator[tuple[HullRow, Kept]]:
+        for first in range(0, len(rows), READ_TOGETHER):
+            some = rows[first : first + READ_TOGETHER]
+            yield from zip(some, self._storage.read_each([row.number for row in some]), strict=True)
+
+    def _load_some(self, stored: Iterator[tuple[HullRow, Kept]]) -> list[tuple[HullRow, HullState, int]]:
         """Load the next hulls, for LOAD seconds: handing each to a thread takes longer than loading a small one.
 
         Returns the hulls and the numbers of their points in batches since the last snapshot; none after the last.
@@ -169,8 +176,7 @@ class Engine:
         clock = self._machine.clock
         until = clock.monotonic() + LOAD
         loaded = []
-        for row in rows:
-            kept = self._storage.read(row.number)
+        for row, kept in stored:
             state = HullState(self._limits, row.settings, kept, now=clock.monotonic())
             loaded.append((row, state, sum(len(record.rows) for record in kept.records)))
             if clock.monotonic() > until:
@@ -319,6 +325,10 @@ class Engine:
     def core(self) -> Core:
         """The core; only the engine's own parts look into it."""
         return self._core
+
+    def idle(self, hull: Hull) -> bool:
+        """Whether a small read of a hull can run now, without a request."""
+        return not self._stepping and self._core.idle(hull)
 
     async def ask(self, request: Request) -> Any:
         """The result of a request with a Waiter, or raise its error. Cancelling the caller ends only the wait."""

@@ -71,10 +71,11 @@ class HullState:
         last, cause = kept.last_revision, _last_cause(kept)
         self._follow_center()
         self.counts = Counts(last, len(self.hull), self.hull.distinct, contents.clock, cause, self.center, last)
-        self._producers = Producers(
-            limits.max_producers, limits.max_producers_per_caller, _last_sequences(kept), _skipping(kept), now
-        )
-        self._vertices = self.hull.vertices()
+        self._limits = limits
+        self._producers: Producers | None = None  # most of ten thousand hulls have none
+        if sequences := _last_sequences(kept):
+            self._producers = self._new_producers(sequences, _skipping(kept), now)
+        self._vertices = self.hull.vertices().copy()  # a copy of a few vertices takes a third of the memory
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
         self._changed_at = self.counts.revision
@@ -122,7 +123,11 @@ class HullState:
             SequenceGapError: batches before it are missing.
             LimitExceededError: the hull has too many producers to add one.
         """
-        return not write.producer or self._producers.is_new(
+        if not write.producer:
+            return True
+        if self._producers is None:
+            self._producers = self._new_producers({}, frozenset(), now)
+        return self._producers.is_new(
             write.producer, write.sequence, write.owner, now, may_skip=write.may_skip, after=write.after
         )
 
@@ -173,6 +178,7 @@ class HullState:
             self.torn = False
             raise
         if write.producer:
+            assert self._producers is not None  # `is_new` has asked them
             self._producers.applied(write.producer, write.sequence, write.owner, now, may_skip=write.may_skip)
         if gone:
             applied.expired = gone
@@ -289,18 +295,22 @@ class HullState:
 
     def last_sequence(self, producer: str) -> int:
         """The last sequence number applied of a producer, 0 where there is none."""
-        return self._producers.last(producer)
+        return 0 if self._producers is None else self._producers.last(producer)
 
     def kept(self) -> Kept:
         """The hull at this revision, for a snapshot. O(n)."""
         return Kept(
             self.counts.revision,
             self.contents.stored(),
-            self._producers.state(),
+            {} if self._producers is None else self._producers.state(),
             clock=self.contents.clock,
             center=self.center,
-            skipping=self._producers.skipping(),
+            skipping=frozenset() if self._producers is None else self._producers.skipping(),
         )
+
+    def _new_producers(self, last: dict[str, int], skipping: frozenset[str], now: float) -> Producers:
+        limits = self._limits
+        return Producers(limits.max_producers, limits.max_producers_per_caller, last, skipping, now)
 
 
 def _last_cause(kept: Kept) -> Cause | None:

@@ -102,6 +102,10 @@ class MemoryStorage:
             records = [record for record in hull.records if revision < record.revision <= until]
         return replace(base.kept, producers=dict(base.kept.producers), records=records)
 
+    def read_each(self, numbers: Sequence[int]) -> Iterator[Kept]:
+        """Hulls at their last revisions."""
+        return map(self.read, numbers)
+
     def oldest(self, number: int) -> int:
         """The oldest revision that `read` can return."""
         hull = self._hulls[number]

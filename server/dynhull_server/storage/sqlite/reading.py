@@ -2,12 +2,13 @@
 
 import sqlite3
 from array import array
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import islice
 from threading import Condition
 from typing import Any
 
-from ...state.records import Kept, Record
+from ...state.records import Kept
 from ..port import DamagedError
 from .chunks import joined, state_from
 from .encoding import checksum, decode
@@ -15,6 +16,7 @@ from .ledger import HullRows, Snapshot
 
 ROWS_A_QUERY = 1000
 KEPT_OPEN = 4
+BATCH_COLUMNS = "first, last, checksum, payload"
 
 
 class Readers:
@@ -91,19 +93,38 @@ def read_hull(connection: sqlite3.Connection, hull: HullRows, until: int) -> Kep
     """
     if until < hull.oldest:
         raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
-    try:
+    with _as_damage(hull):
         kept = _newest_snapshot(connection, hull, until)
-        ids = hull.between(kept.revision, until)
-        for records in _batches(connection, hull, ids):
-            kept.records += [record for record in records if kept.revision < record.revision <= until]
+        rows = rows_by_id(connection, BATCH_COLUMNS, "batches", hull.between(kept.revision, until))
+        _add_records(kept, hull, rows, until)
+    return kept
+
+
+def read_each(connection: sqlite3.Connection, hulls: Sequence[HullRows]) -> Iterator[Kept]:
+    """Hulls at their last revisions, in this order. Those without snapshots share queries: they may be many.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    ids = array("q", (place for hull in hulls if not hull.snapshots for place in hull.ids))
+    rows = rows_by_id(connection, BATCH_COLUMNS, "batches", ids)
+    for hull in hulls:
+        if hull.snapshots:
+            yield read_hull(connection, hull, hull.last)
+            continue
+        kept = Kept()
+        with _as_damage(hull):
+            _add_records(kept, hull, islice(rows, len(hull.ids)), hull.last)
+        yield kept
+
+
+@contextmanager
+def _as_damage(hull: HullRows) -> Iterator[None]:
+    """Convert errors of SQLite while it reads this hull."""
+    try:
+        yield
     except sqlite3.Error as error:
         raise DamagedError(f"hull {hull.row.name!r} cannot be read ({error}): restore a backup") from error
-    expected = kept.revision
-    for record in kept.records:
-        expected += 1
-        if record.revision != expected:
-            raise DamagedError(f"hull {hull.row.name!r}: revision {expected} is missing: restore a backup")
-    return kept
 
 
 def rows_by_id(
@@ -146,8 +167,18 @@ def _snapshot(connection: sqlite3.Connection, number: int, snapshot: Snapshot) -
     return kept
 
 
-def _batches(connection: sqlite3.Connection, hull: HullRows, ids: "array[int]") -> Iterable[Iterable[Record]]:
-    for first, last, stored, payload in rows_by_id(connection, "first, last, checksum, payload", "batches", ids):
+def _add_records(kept: Kept, hull: HullRows, rows: Iterable[tuple[Any, ...]], until: int) -> None:
+    """Add the revisions after the snapshot, up to `until` or the last one; `rows` are those that have them."""
+    expected = kept.revision
+    for first, last, stored, payload in rows:
         if checksum(payload, hull.row.number, first, last) != stored:
             raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
-        yield decode(payload, first)
+        for record in decode(payload, first):
+            if not kept.revision < record.revision <= until:
+                continue
+            expected += 1
+            if record.revision != expected:
+                raise DamagedError(f"hull {hull.row.name!r}: revision {expected} is missing: restore a backup")
+            kept.records.append(record)
+    if expected < min(until, hull.last):
+        raise DamagedError(f"hull {hull.row.name!r}: revision {expected + 1} is missing: restore a backup")

@@ -51,7 +51,7 @@ from .ledger import (
     Snapshot,
 )
 from .migration import make_tables, migrate
-from .reading import Readers, begin, read_hull, rows_by_id
+from .reading import Readers, begin, read_each, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
 from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
@@ -239,6 +239,14 @@ class SQLiteStorage:
                 hull = self._settled().hulls[number].copy()
                 begin(connection)
             return read_hull(connection, hull, until)
+
+    def read_each(self, numbers: Sequence[int]) -> Iterator[Kept]:
+        """Hulls at their last revisions."""
+        with _as_storage_errors(), self._readers.lend() as connection:
+            with self._visible:
+                hulls = [self._settled().hulls[number].copy() for number in numbers]
+                begin(connection)
+            yield from read_each(connection, hulls)
 
     def oldest(self, number: int) -> int:
         """The oldest revision that `read` can return."""
