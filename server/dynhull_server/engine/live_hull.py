@@ -16,6 +16,7 @@ from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
 from ..state.contents.keyed import KINDS
+from ..state.core import SMALL
 from ..state.errors import (
     FenceNotFoundError,
     HullEmptyError,
@@ -152,6 +153,8 @@ class LiveHull:
         while True:
             if self._hull.counts.revision < min_revision:
                 await self.reached(min_revision)
+            if rows <= SMALL and self._engine.idle(self._hull):
+                return self._hull.counts, function(self._hull.state)
             counts, result = await self._engine.ask(ReadHull(Waiter(), self._hull, function, rows=rows))
             if counts.revision >= min_revision:
                 return counts, result

@@ -1,13 +1,10 @@
-"""Counts of batches. Thousands arrive per second, so the counts are plain numbers, used only on the event loop."""
-
-from bisect import bisect_left
-from itertools import accumulate
+"""Counts of batches, used only on the event loop."""
 
 from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily
 from prometheus_client.metrics_core import Metric
-from prometheus_client.utils import INF, floatToGoString
 
 from ..state.batch import Applied
+from .durations import Durations
 
 
 class BatchCounts:
@@ -18,9 +15,7 @@ class BatchCounts:
     """
 
     def __init__(self, buckets: tuple[float, ...]) -> None:
-        self._bounds = buckets
-        self._took = [0] * (len(buckets) + 1)
-        self._seconds = 0.0
+        self._took = Durations(buckets)
         self._applied = self._duplicate = self._refused = 0
         self._inserted = self._deleted = self._missing = 0
         self._updates = dict.fromkeys(("move", "evict", "expire"), 0)
@@ -28,8 +23,7 @@ class BatchCounts:
 
     def applied(self, applied: Applied, seconds: float) -> None:
         """Count a batch that was applied `seconds` after its arrival."""
-        self._took[bisect_left(self._bounds, seconds)] += 1
-        self._seconds += seconds
+        self._took.add(seconds)
         if applied.duplicate:
             self._duplicate += 1
             return
@@ -81,6 +75,5 @@ class BatchCounts:
         durations = HistogramMetricFamily(
             "dynhull_batch_duration_seconds", "Seconds from the arrival of a batch until its acknowledgement is ready."
         )
-        bounds = map(floatToGoString, (*self._bounds, INF))
-        durations.add_metric([], list(zip(bounds, accumulate(self._took), strict=True)), self._seconds)
+        durations.add_metric([], self._took.buckets(), self._took.seconds)
         return [batches, updates, rows, durations]

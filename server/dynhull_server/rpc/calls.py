@@ -3,8 +3,8 @@
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any
 
@@ -147,11 +147,9 @@ class Call:
         """Holds a place of a streaming call, whose number is limited."""
         return self._calls.streams.take(self.owner)
 
-    @contextmanager
-    def short(self) -> Iterator[None]:
-        """Run the block to its end, even if the server drains or the token is removed."""
+    def finish(self) -> None:
+        """Run the call to its end from here, even if the server drains or the token is removed."""
         self._calls.finish(_current_task())
-        yield
 
     def cutoff(self) -> "Cutoff":
         """A block that `end` interrupts with its error."""
@@ -244,7 +242,7 @@ class Calls:
 
         def count(reason: str, code: str, peer: str) -> None:
             self._refusals.add(reason, METRICS_PAGE, code, peer)
-            self._metrics.call(METRICS_PAGE, code, 0.0)
+            self._metrics.calls.ended(METRICS_PAGE, code, 0.0)
 
         def refused(reason: str, code: str, peer: str) -> None:
             loop.call_soon_threadsafe(count, reason, code, peer)
@@ -284,9 +282,7 @@ class Calls:
         finally:
             if call is not None:
                 self._open.discard(call)
-            # Count after the answer is sent, because the caller waits for it.
-            seconds = time.perf_counter() - begun
-            asyncio.get_running_loop().call_soon(self._metrics.call, method, code, seconds)
+            self._metrics.calls.ended(method, code, time.perf_counter() - begun)
 
 
 class Cutoff:

@@ -145,8 +145,8 @@ def _unary(method: MethodDescriptor, behave: Behave) -> Work:
     async def finish(call: Call) -> bytes:
         with call.cutoff():
             request = await call.receive()
-        with call.short():
-            response = await behave(request, call)
+        call.finish()
+        response = await behave(request, call)
         return call.serialize(response)
 
     return finish

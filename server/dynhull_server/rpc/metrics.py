@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, PlatformCollector, ProcessCollector
+from prometheus_client import CollectorRegistry, Counter, Gauge, PlatformCollector, ProcessCollector
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
@@ -19,6 +19,7 @@ from ..engine.server_time import MICROSECONDS
 from ..engine.supervisor import Supervisor
 from .background import background_families
 from .batch_counts import BatchCounts
+from .call_counts import CallCounts
 from .fence_families import fence_families
 
 # Seconds, from the delay of a small batch to that of a batch that fills a message.
@@ -33,23 +34,14 @@ class Metrics:
     """Counters of one server, in a separate registry.
 
     Attributes:
-        batches: counts of batches, which a StateCollector exports.
+        calls, batches: counts of calls and batches, which a StateCollector exports.
     """
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
         PlatformCollector(registry=self.registry)
-        self._calls = Counter(
-            "dynhull_calls", "Completed calls, by method and status.", ["method", "code"], registry=self.registry
-        )
-        self._durations = Histogram(
-            "dynhull_call_duration_seconds",
-            "Seconds from the beginning of a call to its end.",
-            ["method"],
-            buckets=BUCKETS,
-            registry=self.registry,
-        )
+        self.calls = CallCounts(BUCKETS)
         self.batches = BatchCounts(BUCKETS)
         self._events = Counter(
             "dynhull_watch_events", "Events sent to watchers, by kind.", ["kind"], registry=self.registry
@@ -78,17 +70,6 @@ class Metrics:
             registry=self.registry,
         )
         self._watchers: dict[object, float | None] = {}
-        self._ended: dict[tuple[str, str], tuple[Counter, Histogram]] = {}
-
-    def call(self, method: str, code: str, seconds: float) -> None:
-        """Count a completed call."""
-        ended = self._ended.get((method, code))
-        if ended is None:  # looking up the labels takes longer than counting
-            ended = self._calls.labels(method, code), self._durations.labels(method)
-            self._ended[method, code] = ended
-        calls, durations = ended
-        calls.inc()
-        durations.observe(seconds)
 
     def queried(self, counts: Mapping[tuple[str, str], int]) -> None:
         """Count reads of a Query call, by method and status."""
@@ -135,7 +116,7 @@ class Metrics:
 
 
 class StateCollector(Collector):
-    """Collects hulls, watchers and counts of batches on the event loop, when called from another thread."""
+    """Collects hulls, watchers and counts of calls and batches on the event loop, when called from another thread."""
 
     def __init__(
         self, engine: Engine, metrics: Metrics, supervisor: Supervisor, loop: asyncio.AbstractEventLoop
@@ -152,6 +133,7 @@ class StateCollector(Collector):
     def _all(self) -> list[Metric]:
         return [
             *self._gauges(),
+            *self._metrics.calls.families(),
             *self._metrics.batches.families(self._engine.expired),
             *background_families(self._supervisor),
             *fence_families(self._engine.fences, self._engine.time()),

@@ -273,6 +273,11 @@ class Core:
         queue = self._queues.get(name)
         return None if queue is None else queue.line
 
+    def idle(self, hull: Hull) -> bool:
+        """Whether a small read of a hull needs no request, because nothing goes on in its queue."""
+        queue = self._queues.get(hull.name)
+        return queue is not None and queue.trip is None and not (queue.waiting or self._stopping or hull.ended)
+
     @property
     def busy(self) -> bool:
         """Whether any trip is in progress."""
