@@ -104,7 +104,9 @@ async def run(
         ending.cancel()
         reporting.cancel()
         bad.close()
-    log.info("stopped", points=sum(each.points for each in pumps), bad=bad.count)
+    points = sum(each.points for each in pumps)
+    seconds = max(each.ended for each in pumps) - min(each.begun for each in pumps)
+    log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count)
 
 
 async def _end(stop: asyncio.Event, running: "asyncio.Future[list[None]]", grace: float) -> None:

@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any
 
 import structlog
@@ -50,6 +51,7 @@ class Pump:
     ) -> None:
         self.reached = 0  # the number of the last message read
         self.points = 0  # acknowledged
+        self.begun = self.ended = monotonic()  # when the first message was read, and the last point acknowledged
         self._client = client
         self._feed = feed
         self._settings = settings
@@ -133,6 +135,8 @@ class Pump:
     async def _take(self, messages: Sequence[Message]) -> None:
         """Hand the rows of some messages to the lanes of their hulls."""
         self._figures.messages.labels(self._feed.name).inc(len(messages))
+        if not self.reached and not self.points and not self._under_way:
+            self.begun = monotonic()
         taken = Taken(messages)
         self._under_way.append(taken)
         for hull, chunk in chunks_of(taken, self._rows(messages)):
@@ -175,6 +179,7 @@ class Pump:
 
     def _settled(self, rows: int) -> None:
         self.points += rows
+        self.ended = monotonic()
         self._figures.points.labels(self._feed.name).inc(rows)
         self._news.set()
 
