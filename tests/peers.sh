@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What the tests talk to and pip cannot install: a real Prometheus and browser, systemd's checks, a clock that can be
-# set back, message brokers, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
+# set back, message brokers, readers of maps, reverse proxies, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
 # that need what is missing are skipped, and say so.
 set -uo pipefail
 cd "$(dirname "$0")"
@@ -14,6 +14,9 @@ command -v systemd-analyze >/dev/null || packages+=(systemd)
 command -v faketime >/dev/null || packages+=(faketime)
 command -v mosquitto >/dev/null || packages+=(mosquitto)
 command -v nats-server >/dev/null || packages+=(nats-server)
+command -v ogrinfo >/dev/null && command -v ogr2ogr >/dev/null || packages+=(gdal-bin)
+command -v nginx >/dev/null || packages+=(nginx-light)
+command -v caddy >/dev/null || packages+=(caddy)
 command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
 if [ ${#packages[@]} -gt 0 ]; then

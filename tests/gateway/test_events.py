@@ -1,14 +1,13 @@
 """Server-sent events: read by a real browser, over restarts of everything."""
 
 import json
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import pytest
-from gateway_process import Gateway, gateway_process
+from gateway_process import Events, Gateway, free_port, gateway_process
 from patience import PATIENCE, wait_until
 from peers import program
 from playwright.sync_api import Browser, Page, sync_playwright
@@ -49,12 +48,6 @@ def browser() -> Iterator[Browser]:
 
 def seen(page: Page, url: str) -> dict[str, Any]:
     return page.evaluate("url => window.seen[url]", url)
-
-
-def free_port() -> str:
-    """A port that was free a moment ago; processes that start again need the same one."""
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        return str(listening.getsockname()[1])
 
 
 def test_a_browser_misses_nothing_over_restarts(browser: Browser, tmp_path: Path) -> None:
@@ -111,35 +104,6 @@ def test_a_browser_misses_nothing_over_restarts(browser: Browser, tmp_path: Path
     revisions = [int(each.rpartition(":")[2]) for each in of_hull["ids"]]
     assert revisions == sorted(set(revisions))
     assert not of_hull["failed"]
-
-
-class Events:
-    """The events of a stream, read without a browser."""
-
-    def __init__(self, gateway: Gateway, path: str, **headers: str) -> None:
-        self._connection = gateway.connection()
-        self._connection.request("GET", path, headers={name.replace("_", "-"): each for name, each in headers.items()})
-        self.response = self._connection.getresponse()
-
-    def __iter__(self) -> Iterator[dict[str, str]]:
-        event: dict[str, str] = {}
-        while line := self.response.readline().decode():
-            name, _, value = line.rstrip("\n").partition(": ")
-            if name:
-                event[name] = value
-            else:
-                if {"event", "id"} & event.keys():
-                    yield event
-                event = {}
-
-    def next(self) -> tuple[str, Any]:
-        """The name and the data of the next event; those of an id alone are the id and None."""
-        event = next(iter(self))
-        return event.get("event", event.get("id")), json.loads(event["data"]) if "data" in event else None
-
-    def close(self) -> None:
-        self.response.close()
-        self._connection.close()
 
 
 def test_a_reader_continues_where_it_was(gateway: Gateway, name: str) -> None:

@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import socket
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -79,3 +80,42 @@ def gateway_process(address: str, *options: str, complaints: str = "") -> Iterat
             said = errors.read()
             assert ended == 0, said
             assert complaints in said if complaints else not said, said
+
+
+class Events:
+    """The events of a stream, read without a browser."""
+
+    def __init__(self, gateway: Gateway, path: str, **headers: str) -> None:
+        self._connection = gateway.connection()
+        self._connection.request(
+            "GET",
+            urlsplit(gateway.url).path + path,
+            headers={name.replace("_", "-"): each for name, each in headers.items()},
+        )
+        self.response = self._connection.getresponse()
+
+    def __iter__(self) -> Iterator[dict[str, str]]:
+        event: dict[str, str] = {}
+        while line := self.response.readline().decode():
+            name, _, value = line.rstrip("\n").partition(": ")
+            if name:
+                event[name] = value
+            else:
+                if {"event", "id"} & event.keys():
+                    yield event
+                event = {}
+
+    def next(self) -> tuple[str, Any]:
+        """The name and the data of the next event; those of an id alone are the id and None."""
+        event = next(iter(self))
+        return event.get("event", event.get("id")), json.loads(event["data"]) if "data" in event else None
+
+    def close(self) -> None:
+        self.response.close()
+        self._connection.close()
+
+
+def free_port() -> str:
+    """A port that was free a moment ago; processes that start again need the same one."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        return str(listening.getsockname()[1])

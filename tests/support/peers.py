@@ -13,10 +13,14 @@ import pytest
 
 JAVASCRIPT = Path(__file__).parents[1] / "javascript"
 INSTALLED_BY = {
+    "caddy": "Debian's package caddy",
     "chromium": "Debian's package chromium",
     "faketime": "Debian's package faketime",
     "mosquitto": "Debian's package mosquitto",
     "nats-server": "Debian's package nats-server",
+    "nginx": "Debian's package nginx-light",
+    "ogr2ogr": "Debian's package gdal-bin",
+    "ogrinfo": "Debian's package gdal-bin",
     "node": "Debian's package nodejs",
     "prometheus": "Debian's package prometheus",
     "promtool": "Debian's package prometheus",

@@ -10,10 +10,13 @@ from dynhull_client import AsyncHullClient
 
 from . import fences, health, hulls, points, problems, questions, uploads
 from .bodies import LimitedBodies
-from .events import routes
+from .events import routes as events
 from .events.feeds import Feeds
 from .figures import Figures, Measured
 from .gathering import Gatherer
+from .hosts import KnownHosts
+from .ogc import routes as maps
+from .ogc.entities import Snapshots
 from .paths import PathsAsSent
 from .problems import RESPONSES, Problem
 from .schemas import Batch
@@ -43,9 +46,10 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.settings = settings
     app.state.gatherer = Gatherer()
     app.state.feeds = Feeds()
+    app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()
-    routers = [module.router for module in (points, uploads, hulls, questions, fences, routes, health)]
+    routers = [module.router for module in (points, uploads, hulls, questions, fences, events, maps, health)]
     for router in routers:
         app.include_router(router)
     app.state.routes = [route for router in routers for route in router.routes]
@@ -60,8 +64,10 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
             allow_headers=SEEN_BY_PAGES,
             expose_headers=["Location", "Link", "Retry-After"],
         )
+    if settings.hosts:
+        app.add_middleware(KnownHosts, hosts=settings.hosts)
     app.add_middleware(Measured, figures=app.state.figures)
-    app.add_middleware(PathsAsSent)
+    app.add_middleware(PathsAsSent, root_path=settings.root_path)
     return app
 
 

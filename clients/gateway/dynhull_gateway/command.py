@@ -22,6 +22,13 @@ def gateway(
             "repeated. Without, no other origin may."
         ),
     ] = None,
+    allow_host: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name under which the gateway answers, as browsers and proxies send it in Host, without a port; * for "
+            "any. May be repeated. Default: the names of this machine on a loopback address, any elsewhere."
+        ),
+    ] = None,
     root_path: Annotated[
         str, typer.Option(help="Path below which a proxy shows the gateway to the world, such as /dynhull.")
     ] = "",
@@ -66,11 +73,13 @@ def gateway(
     """
     from dynhull_client import AsyncHullClient
 
+    from .hosts import hosts_of
     from .serve import run
     from .settings import Settings
 
     settings = Settings(
         origins=tuple(origin or ()),
+        hosts=hosts_of(allow_host, host),
         max_body=max_body * MIB,
         max_upload=max_upload * MIB,
         body_seconds=_seconds(body_timeout, "--body-timeout"),

@@ -44,7 +44,6 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
             access_log=False,
             lifespan="off",
             server_header=False,
-            root_path=settings.root_path,
             ws="none",
             forwarded_allow_ips=settings.forwarded_from,
             timeout_graceful_shutdown=round(settings.grace_seconds),

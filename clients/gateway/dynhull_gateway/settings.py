@@ -9,6 +9,7 @@ class Settings:
 
     Attributes:
         origins: the origins whose pages may read answers (CORS); "*" for all.
+        hosts: the names under which the gateway answers; none for any.
         max_body: bytes of a body that is read as a whole: JSON and GeoJSON.
         max_upload: bytes of a body of rows.
         body_seconds: seconds within which more of a body must arrive, and within which a body that is read as a whole
@@ -22,6 +23,7 @@ class Settings:
     """
 
     origins: tuple[str, ...] = ()
+    hosts: frozenset[str] = frozenset()
     max_body: int = 16 * 2**20
     max_upload: int = 2**30
     body_seconds: float = 30.0

@@ -1,0 +1,55 @@
+"""Names under which the gateway answers.
+
+A page of another site can have its own name lead to the gateway's address (DNS rebinding). Its requests then have the
+same origin as the gateway, for the browser: only the name in them differs.
+"""
+
+from collections.abc import Iterable
+from http import HTTPStatus
+from urllib.parse import urlsplit
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from .problems import problem
+
+LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+ANY = "*"
+
+
+def hosts_of(allowed: Iterable[str] | None, listening: str) -> frozenset[str]:
+    """The names to answer to, for a gateway that listens on an address; none for any."""
+    given = frozenset(each.lower() for each in allowed or ())
+    if ANY in given or (not given and listening not in LOOPBACK):
+        return frozenset()
+    return given | LOOPBACK
+
+
+class KnownHosts:
+    """Refuses requests under other names with 421, which names the option that allows them."""
+
+    def __init__(self, app: ASGIApp, hosts: frozenset[str]) -> None:
+        self._app = app
+        self._hosts = hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, or refuse it."""
+        if scope["type"] == "http":
+            given = next((value for name, value in scope["headers"] if name == b"host"), b"").decode("latin-1")
+            if _name(given) not in self._hosts:
+                refused = problem(
+                    HTTPStatus.MISDIRECTED_REQUEST,
+                    f"this gateway does not answer to {given}; dynhull gateway --allow-host NAME allows a name",
+                    reason="UNKNOWN_HOST",
+                    field="Host",
+                    value=given,
+                )
+                await refused(scope, receive, send)
+                return
+        await self._app(scope, receive, send)
+
+
+def _name(host: str) -> str | None:
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None

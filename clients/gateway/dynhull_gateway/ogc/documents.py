@@ -1,0 +1,97 @@
+"""What the documents of the standard look like."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.alias_generators import to_camel
+
+CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
+CONFORMANCE = [
+    "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/core",
+    "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/geojson",
+]
+GEOJSON = "application/geo+json"
+JSON = "application/json"
+OPENAPI = "application/vnd.oai.openapi+json;version=3.1"
+
+
+class Document(BaseModel):
+    """A document whose names are those of the standard: numberReturned for number_returned."""
+
+    model_config = ConfigDict(alias_generator=to_camel, populate_by_name=True)
+
+
+class Link(BaseModel):
+    """A link (RFC 8288)."""
+
+    href: str
+    rel: str
+    type: str
+    title: str
+
+
+class Landing(BaseModel):
+    """Where to go from here."""
+
+    title: str
+    description: str
+    links: list[Link]
+
+
+class Conformance(Document):
+    """The classes of requirements that are met."""
+
+    conforms_to: list[str]
+
+
+class Spatial(BaseModel):
+    """Boxes that the features are in: west, south, east, north."""
+
+    bbox: list[Annotated[list[float], Field(min_length=4, max_length=4)]]
+    crs: str = CRS84
+
+
+class Extent(BaseModel):
+    """Where the features are."""
+
+    spatial: Spatial
+
+
+class Collection(Document):
+    """Features of one kind."""
+
+    id: str
+    title: str
+    description: str
+    links: list[Link]
+    extent: Extent | None = None
+    item_type: Literal["feature"] = "feature"
+    crs: list[str] = [CRS84]
+
+
+class Collections(BaseModel):
+    """The collections that the caller may read."""
+
+    links: list[Link]
+    collections: list[Collection]
+
+
+class Feature(BaseModel):
+    """A GeoJSON Feature (RFC 7946)."""
+
+    type: Literal["Feature"]
+    id: str | int
+    geometry: dict[str, Any] | None
+    properties: dict[str, Any]
+    links: list[Link] | None = None
+
+
+class FeatureCollection(Document):
+    """A page of features."""
+
+    type: Literal["FeatureCollection"] = "FeatureCollection"
+    features: list[Feature]
+    links: list[Link]
+    time_stamp: str
+    number_returned: int
+    number_matched: int | None = None

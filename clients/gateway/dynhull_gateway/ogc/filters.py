@@ -1,0 +1,156 @@
+"""Which features are wanted: a box, a time, a page."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Annotated, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+MOST = 10_000
+FEW = 100
+NUMBER = r"-?[0-9]{1,20}(\.[0-9]{1,20})?([eE]-?[0-9]{1,2})?"
+BBOX = rf"^{NUMBER}(,{NUMBER}){{3}}((,{NUMBER}){{2}})?$"
+OPEN = ("", "..")
+INSTANT: TypeAdapter[datetime] = TypeAdapter(AwareDatetime)
+RFC3339 = re.compile(r"\d{4}-\d\d-\d\d[Tt]\d\d:\d\d:\d\d(\.\d+)?([Zz]|[+-]\d\d:\d\d)")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A page of features.
+
+    Attributes:
+        features: the features.
+        following: the name or key after which the next page begins; None on the last.
+        matched: the number of features on all pages; None if it is not known.
+    """
+
+    features: list[dict[str, Any]]
+    following: str | None
+    matched: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A box in degrees; west is greater than east where it crosses the antimeridian."""
+
+    west: float
+    south: float
+    east: float
+    north: float
+
+    @classmethod
+    def read(cls, text: str) -> Self:
+        """Of four numbers, or of six, two of which are heights."""
+        numbers = [float(each) for each in text.split(",")]
+        west, south, east, north = numbers if len(numbers) == 4 else (*numbers[:2], *numbers[3:5])
+        if south > north:
+            raise ValueError(f"the southern edge {south:g} is north of the northern edge {north:g}")
+        return cls(west, south, east, north)
+
+    def holds(self, lonlat: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+        """Which of (n, 2) places are in the box."""
+        lon, lat = lonlat[:, 0], lonlat[:, 1]
+        in_lon = (
+            (self.west <= lon) & (lon <= self.east)
+            if self.west <= self.east
+            else (self.west <= lon) | (lon <= self.east)
+        )
+        return in_lon & (self.south <= lat) & (lat <= self.north)
+
+    def meets(self, geometry: Mapping[str, Any] | None) -> bool:
+        """Whether a GeoJSON geometry has a point in the box."""
+        if geometry is None:
+            return False
+        shape = shapely.geometry.shape(geometry)
+        parts = [(self.west, self.east)] if self.west <= self.east else [(self.west, 180.0), (-180.0, self.east)]
+        return any(shape.intersects(shapely.box(west, self.south, east, self.north)) for west, east in parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """From a time to a time, both included; None for an open end."""
+
+    begin: datetime | None
+    end: datetime | None
+
+    @classmethod
+    def read(cls, text: str) -> Self:
+        """Of an instant, or of two with a slash between, one of which may be open: .. or nothing."""
+        ends = text.split("/")
+        if len(ends) > 2 or all(each in OPEN for each in ends):
+            raise ValueError("must be an instant, or an interval with a begin or an end")
+        begin, end = (_instant(each) for each in (ends if len(ends) == 2 else ends * 2))
+        if begin is not None and end is not None and begin > end:
+            raise ValueError("begins after its end")
+        return cls(begin, end)
+
+    def holds(self, times: npt.NDArray[np.datetime64]) -> npt.NDArray[np.bool_]:
+        """Which of (n,) times are in the interval."""
+        found = np.ones(len(times), np.bool_)
+        if self.begin is not None:
+            found &= times >= _as_numpy(self.begin)
+        if self.end is not None:
+            found &= times <= _as_numpy(self.end)
+        return found
+
+
+def _readable(kind: type[Box] | type[Interval]) -> Any:
+    def check(text: str) -> str:
+        kind.read(text)
+        return text
+
+    return AfterValidator(check)
+
+
+class Page(BaseModel):
+    """The parameters of a page. Unknown ones are refused, as the standard demands."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    bbox: Annotated[str, Field(pattern=BBOX), _readable(Box)] | None = Field(
+        default=None, description="West, south, east, north in degrees; with heights, six numbers."
+    )
+    datetime: Annotated[str, Field(max_length=100), _readable(Interval)] | None = Field(
+        default=None, description="An instant, or an interval such as 2026-01-01T00:00:00Z/.."
+    )
+    limit: int = Field(default=FEW, ge=1, description=f"The most features of a page; more than {MOST} means {MOST}.")
+    after: str | None = Field(default=None, max_length=300, description="The feature before the first one of the page.")
+    revision: int | None = Field(
+        default=None, ge=0, description="The revision of the page before, which is used again while it is at hand."
+    )
+
+    @property
+    def most(self) -> int:
+        """The most features."""
+        return min(self.limit, MOST)
+
+    @property
+    def box(self) -> Box | None:
+        """The box."""
+        return None if self.bbox is None else Box.read(self.bbox)
+
+    @property
+    def interval(self) -> Interval | None:
+        """The time."""
+        return None if self.datetime is None else Interval.read(self.datetime)
+
+
+def _instant(text: str) -> datetime | None:
+    if text in OPEN:
+        return None
+    try:
+        if RFC3339.fullmatch(text):
+            return INSTANT.validate_python(text)
+    except ValidationError:
+        pass
+    raise ValueError(f"{text!r} is not a time such as 2026-01-31T12:00:00Z")
+
+
+def _as_numpy(time: datetime) -> np.datetime64:
+    return np.datetime64(round(time.timestamp() * 1_000_000), "us")

@@ -1,0 +1,268 @@
+"""Where maps find hulls: the landing page, the collections and their features.
+
+The standard demands longitudes and latitudes (CRS84), so hulls of a plane are no collections: their coordinates would
+be drawn somewhere on the globe.
+"""
+
+from collections.abc import AsyncIterator
+from datetime import UTC, datetime
+from http import HTTPStatus
+from typing import Annotated, Any
+from urllib.parse import quote, urlencode
+
+import numpy as np
+from fastapi import APIRouter, Depends, Path, Query, Request
+from pydantic import BeforeValidator, StringConstraints
+from starlette.responses import Response
+
+from dynhull_client import AsyncHullClient, HullInfo, HullNotFoundError
+
+from ..callers import Caller, token_of
+from ..hulls import feature as hull_feature
+from ..problems import ProblemError
+from ..schemas import unquoted
+from .documents import (
+    CONFORMANCE,
+    GEOJSON,
+    JSON,
+    OPENAPI,
+    Collection,
+    Collections,
+    Conformance,
+    Extent,
+    Feature,
+    FeatureCollection,
+    Landing,
+    Link,
+    Spatial,
+)
+from .entities import Snapshots, feature
+from .filters import Found, Page
+
+router = APIRouter(tags=["maps"])
+
+HULLS = "hulls"
+ENTITIES = "entities:"
+ROUND = 100
+
+Segment = Annotated[str, StringConstraints(min_length=1, max_length=300), BeforeValidator(unquoted)]
+CollectionId = Annotated[Segment, Path(description="hulls, or entities:NAME for the keys of a hull.")]
+FeatureId = Annotated[Segment, Path(description="The name of a hull, or a key.")]
+GEO: dict[int | str, dict[str, Any]] = {200: {"content": {GEOJSON: {}}}}
+
+
+class GeoJson(Response):
+    """A response of GeoJSON."""
+
+    media_type = GEOJSON
+
+
+async def _no_parameters(request: Request) -> None:
+    """Refuse parameters that are not described, as the standard demands."""
+    for name in request.query_params:
+        raise ProblemError(HTTPStatus.BAD_REQUEST, f"there is no parameter {name!r}", "INVALID_FIELD", field=name)
+
+
+PLAIN = [Depends(_no_parameters)]
+
+
+@router.get("/", dependencies=PLAIN)
+async def landing(request: Request) -> Landing:
+    """The landing page: where the description and the data are."""
+    links = [
+        _link(request, "", "self", JSON, "This page"),
+        _link(request, "openapi.json", "service-desc", OPENAPI, "The description of every call"),
+        _link(request, "conformance", "conformance", JSON, "What of OGC API Features is there"),
+        _link(request, "collections", "data", JSON, "Hulls and their entities"),
+    ]
+    return Landing(title="dynhull", description="Convex hulls of moving points, live.", links=links)
+
+
+@router.get("/conformance", dependencies=PLAIN)
+async def conformance() -> Conformance:
+    """The classes of OGC API Features that are met."""
+    return Conformance(conforms_to=CONFORMANCE)
+
+
+@router.get("/collections", dependencies=PLAIN, response_model_exclude_none=True)
+async def collections(request: Request, client: Caller) -> Collections:
+    """The collections: all geographic hulls, and the keys of each that is keyed."""
+    keyed = [info.name async for info in client.list_hulls() if info.geographic and info.keyed is not None]
+    found = [_hulls(request), *(_entities(request, name) for name in keyed)]
+    return Collections(links=[_link(request, "collections", "self", JSON, "This page")], collections=found)
+
+
+@router.get("/collections/{collection}", dependencies=PLAIN, response_model_exclude_none=True)
+async def describe_collection(request: Request, client: Caller, collection: CollectionId) -> Collection:
+    """A collection."""
+    name = _hull_of(collection)
+    if name is None:
+        return _hulls(request)
+    await _info(client, name)
+    described = _entities(request, name)
+    bounds = _bounds(hull_feature(await client.get_hull(name))["geometry"])
+    if bounds is not None:
+        described.extent = Extent(spatial=Spatial(bbox=[bounds]))
+    return described
+
+
+@router.get("/collections/{collection}/items", response_model=FeatureCollection, response_class=GeoJson, responses=GEO)
+async def items(request: Request, client: Caller, collection: CollectionId, page: Annotated[Page, Query()]) -> Response:
+    """The features of a collection, in pages: follow the links "next"."""
+    name = _hull_of(collection)
+    more: dict[str, Any] = {}
+    if name is None:
+        found = await _hull_features(client, page)
+    else:
+        await _info(client, name)
+        kept: Snapshots = request.app.state.snapshots
+        snapshot = await kept.of(client, token_of(request), name, page.revision)
+        found = snapshot.page(page)
+        more = {"revision": snapshot.revision}
+    path = f"collections/{quote(collection, safe='')}/items"
+    links = [
+        _link(request, path, "self", GEOJSON, "This page", page.model_dump(exclude_none=True, exclude_defaults=True)),
+        _link(request, path.removesuffix("/items"), "collection", JSON, "The collection"),
+    ]
+    if found.following is not None:
+        asked = {**page.model_dump(exclude_none=True), **more, "after": found.following}
+        links.append(_link(request, path, "next", GEOJSON, "The next page", asked))
+    shown = FeatureCollection(
+        features=[Feature.model_validate(each) for each in found.features],
+        links=links,
+        time_stamp=datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z"),
+        number_returned=len(found.features),
+        number_matched=found.matched,
+    )
+    return GeoJson(shown.model_dump_json(by_alias=True, exclude={"features": {"__all__": {"links"}}}))
+
+
+@router.get(
+    "/collections/{collection}/items/{feature_id}",
+    response_model=Feature,
+    response_class=GeoJson,
+    responses=GEO,
+    dependencies=PLAIN,
+)
+async def item(request: Request, client: Caller, collection: CollectionId, feature_id: FeatureId) -> Response:
+    """A feature: a hull, or a key."""
+    name = _hull_of(collection)
+    if name is None:
+        await _info(client, feature_id)
+        found = hull_feature(await client.get_hull(feature_id))
+    else:
+        info = await _info(client, name)
+        found = await _entity(client, info, feature_id)
+    path = f"collections/{quote(collection, safe='')}"
+    links = [
+        _link(request, f"{path}/items/{quote(feature_id, safe='')}", "self", GEOJSON, "This feature"),
+        _link(request, path, "collection", JSON, "The collection"),
+    ]
+    return GeoJson(Feature.model_validate({**found, "links": links}).model_dump_json())
+
+
+def _hull_of(collection: str) -> str | None:
+    """The hull whose keys are the features; None for all hulls."""
+    if collection == HULLS:
+        return None
+    if not collection.startswith(ENTITIES):
+        raise _missing(f"there is no collection {collection!r}: it is {HULLS!r} or {ENTITIES!r} and a hull", collection)
+    return collection.removeprefix(ENTITIES)
+
+
+async def _info(client: AsyncHullClient, name: str) -> HullInfo:
+    """A geographic hull; ProblemError if there is none of that name."""
+    async for info in client.list_hulls(name) if name.isascii() else _none():
+        if info.name != name:
+            break
+        if not info.geographic:
+            detail = (
+                f"the hull {name!r} is in a plane, and OGC API Features serves longitudes and latitudes: "
+                f"/hulls/{quote(name, safe='')} has its coordinates"
+            )
+            raise _missing(detail, name, "NOT_GEOGRAPHIC")
+        return info
+    raise _missing(f"there is no hull {name!r}", name)
+
+
+async def _none() -> AsyncIterator[HullInfo]:
+    return
+    yield
+
+
+async def _hull_features(client: AsyncHullClient, page: Page) -> Found:
+    """Polygons of geographic hulls by name."""
+    every = [info.name async for info in client.list_hulls() if info.geographic]
+    names = [name for name in every if name > (page.after or "")]
+    matched = len(every) if page.box is None else None
+    found: list[dict[str, Any]] = []
+    for start in range(0, len(names), ROUND):
+        async with client.pipeline() as pipeline:
+            asked = [pipeline.get_hull(name) for name in names[start : start + ROUND]]
+        for answer in asked:
+            try:
+                shown = hull_feature(await answer)
+            except HullNotFoundError:  # deleted in the meantime
+                continue
+            if page.box is not None and not page.box.meets(shown["geometry"]):
+                continue
+            if len(found) == page.most:
+                return Found(found, str(found[-1]["id"]), matched)
+            found.append(shown)
+    return Found(found, None, matched)
+
+
+async def _entity(client: AsyncHullClient, info: HullInfo, text: str) -> dict[str, Any]:
+    """The feature of a key; ProblemError if the hull does not have it."""
+    key: str | int = text
+    if info.keyed == "int" and text.isdecimal() and len(text) <= 20:
+        key = int(text)
+    if isinstance(key, int) == (info.keyed == "int"):
+        answer = await client.positions(info.name, [key])
+        if answer.present[0]:
+            time = None if answer.times is None else answer.times[0]
+            return feature(key, answer.positions[0].tolist(), time)
+    raise _missing(f"the hull {info.name!r} has no key {text!r}", text, "KEY_MISSING")
+
+
+def _bounds(geometry: dict[str, Any] | None) -> list[float] | None:
+    """West, south, east and north of a geometry; None without one."""
+    if geometry is None:
+        return None
+    flat = np.array(list(_positions(geometry["coordinates"])))
+    (west, south), (east, north) = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
+    return [west, south, east, north]
+
+
+def _positions(coordinates: Any) -> Any:
+    if isinstance(coordinates[0], int | float):
+        yield coordinates[:2]
+    else:
+        for each in coordinates:
+            yield from _positions(each)
+
+
+def _hulls(request: Request) -> Collection:
+    return _collection(request, HULLS, "Hulls", "The polygon of each geographic hull, as it is now.")
+
+
+def _entities(request: Request, name: str) -> Collection:
+    return _collection(request, f"{ENTITIES}{name}", f"Entities of {name}", f"The position of each key of {name}.")
+
+
+def _collection(request: Request, ident: str, title: str, description: str) -> Collection:
+    path = f"collections/{quote(ident, safe='')}"
+    links = [
+        _link(request, path, "self", JSON, title),
+        _link(request, f"{path}/items", "items", GEOJSON, f"{title}: features"),
+    ]
+    return Collection(id=ident, title=title, description=description, links=links)
+
+
+def _link(request: Request, path: str, rel: str, kind: str, title: str, query: dict[str, Any] | None = None) -> Link:
+    href = f"{request.base_url}{path}" + (f"?{urlencode(query)}" if query else "")
+    return Link(href=href, rel=rel, type=kind, title=title)
+
+
+def _missing(detail: str, value: str, reason: str = "NOT_FOUND") -> ProblemError:
+    return ProblemError(HTTPStatus.NOT_FOUND, detail, reason, value=value)

@@ -1,0 +1,116 @@
+"""OGC API Features: what the standard demands, and what GDAL reads."""
+
+import json
+import subprocess
+from pathlib import Path
+from urllib.parse import quote, urlsplit
+
+import pytest
+from gateway_process import Gateway
+from peers import program
+
+from dynhull_client import HullClient
+
+KEYS = [f"v{number:03}" for number in range(250)]
+PLACES = [[5 + number % 25, 45 + number // 25] for number in range(250)]
+DAYS = [f"2026-01-{1 + number % 28:02}T00:00:00Z" for number in range(250)]
+
+
+@pytest.fixture(scope="module")
+def fleet(gateway: Gateway) -> str:
+    gateway.post("/hulls", {"name": "maps/fleet", "keyed": "str", "geographic": True, "ordering": "event_time"})
+    put = {"keys": KEYS, "points": PLACES, "times": DAYS}
+    assert gateway.post("/hulls/maps%2Ffleet/points", put).status == 200
+    return "maps/fleet"
+
+
+def items(gateway: Gateway, collection: str, query: str = "") -> dict:
+    return gateway.get(f"/collections/{quote(collection, safe='')}/items{query}").json
+
+
+def link(document: dict, rel: str) -> str | None:
+    return next((each["href"] for each in document["links"] if each["rel"] == rel), None)
+
+
+def test_from_the_landing_page_to_the_features(gateway: Gateway, fleet: str) -> None:
+    landing = gateway.get("/").json
+    assert {"self", "service-desc", "conformance", "data"} <= {each["rel"] for each in landing["links"]}
+    conformance = gateway.get(urlsplit(link(landing, "conformance")).path).json
+    assert "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/core" in conformance["conformsTo"]
+    collections = gateway.get(urlsplit(link(landing, "data")).path).json["collections"]
+    found = {each["id"]: each for each in collections}
+    path = urlsplit(link(found[f"entities:{fleet}"], "items")).path
+    answer = gateway.get(path)
+    assert answer.headers["Content-Type"] == "application/geo+json"
+    assert answer.json["numberMatched"] == 250
+    described = gateway.get(path.removesuffix("/items")).json
+    assert described["extent"]["spatial"]["bbox"] == [[5, 45, 29, 54]]
+    one = gateway.get(f"{path}/v001").json
+    assert (one["geometry"]["coordinates"], one["properties"]["time"]) == ([6, 45], "2026-01-02T00:00:00+00:00")
+    assert gateway.get(f"{path}/v999").status == 404
+
+
+def test_pages_have_every_feature_once(gateway: Gateway, fleet: str) -> None:
+    page = items(gateway, f"entities:{fleet}", "?limit=100")
+    gateway.post("/hulls/maps%2Ffleet/points", {"keys": ["v0000"], "points": [[6, 46]], "times": DAYS[:1]})
+    found = [each["id"] for each in page["features"]]
+    while (following := link(page, "next")) is not None:
+        parts = urlsplit(following)
+        page = gateway.get(f"{parts.path}?{parts.query}").json
+        found += [each["id"] for each in page["features"]]
+    assert found == KEYS
+    gateway.post("/hulls/maps%2Ffleet/points", {"remove": ["v0000"]})
+
+
+def test_boxes_and_times(gateway: Gateway, fleet: str) -> None:
+    boxed = items(gateway, f"entities:{fleet}", "?bbox=5,45,7,46&limit=99")["features"]
+    expected = {key for key, (lon, lat) in zip(KEYS, PLACES, strict=True) if lon <= 7 and lat <= 46}
+    assert {each["id"] for each in boxed} == expected
+    assert items(gateway, f"entities:{fleet}", "?bbox=40,45,0,41,50,9")["numberMatched"] == 0
+    assert items(gateway, f"entities:{fleet}", "?bbox=25,45,10,54")["numberMatched"] == 110
+    for interval, days in (
+        ("2026-01-03T00:00:00Z", {3}),
+        ("../2026-01-02T12:00:00Z", {1, 2}),
+        (f"{DAYS[26]}/", {27, 28}),
+    ):
+        found = items(gateway, f"entities:{fleet}", f"?datetime={interval}&limit=999")["features"]
+        assert {int(each["properties"]["time"][8:10]) for each in found} == days
+    assert [each["id"] for each in items(gateway, "hulls", "?bbox=0,40,40,60")["features"]] == [fleet]
+    assert items(gateway, "hulls", "?bbox=-40,40,-20,60")["features"] == []
+
+
+@pytest.mark.parametrize(
+    "query", ["bbox=1,2,3", "bbox=1,9,2,3", "bbox=a,b,c,d", "datetime=now", "datetime=../..", "limit=0", "unknown=1"]
+)
+def test_bad_parameters(gateway: Gateway, fleet: str, query: str) -> None:
+    refused = gateway.get(f"/collections/hulls/items?{query}")
+    assert (refused.status, refused.json["field"]) == (400, query.partition("=")[0]), fleet
+
+
+def test_hulls_of_a_plane_are_no_collections(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str"})
+    refused = gateway.get(f"/collections/{quote(f'entities:{name}', safe='')}/items").json
+    assert (refused["status"], refused["reason"]) == (404, "NOT_GEOGRAPHIC")
+    assert f"/hulls/{name}" in refused["detail"]
+    assert name not in [each["id"] for each in items(gateway, "hulls")["features"]]
+
+
+def test_gdal_reads_a_live_hull(gateway: Gateway, address: str, fleet: str, tmp_path: Path) -> None:
+    source = f"OAPIF:{gateway.url}"
+    layer = f"entities:{fleet}"
+    shown = subprocess.run(
+        [program("ogrinfo"), "-so", source, layer], capture_output=True, text=True, check=True, timeout=60
+    ).stdout
+    for each in ("Geometry: Point", "Feature Count: 250", "Extent: (5.000000, 45.000000) - (29.000000, 54.000000)"):
+        assert each in shown
+    for name, count in ((layer, 250), ("hulls", 1)):
+        out = tmp_path / f"{name[:5]}.geojson"
+        read = [program("ogr2ogr"), "-f", "GeoJSON", out, source, name, "--config", "OGR_OAPIF_PAGE_SIZE", "100"]
+        subprocess.run(read, check=True, timeout=60, capture_output=True)
+        features = json.loads(out.read_text())["features"]
+        assert len(features) == count
+    with HullClient(address) as client:
+        expected = client.get_hull(fleet).__geo_interface__["geometry"]["coordinates"]
+    assert [list(map(tuple, ring)) for ring in features[0]["geometry"]["coordinates"]] == [
+        [tuple(each) for each in ring] for ring in expected
+    ]
