@@ -210,7 +210,7 @@ def test_threads_ask_while_another_one_updates() -> None:
     threads = [threading.Thread(target=ask) for _ in range(3)]
     for each in threads:
         each.start()
-    for revision in range(2, 3_000):
+    for revision in range(2, 1_000):
         new = sides[revision % 2]
         if revision % 50 == 0:
             copy.update(snapshot(new, revision))

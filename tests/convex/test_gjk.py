@@ -7,7 +7,7 @@ from math import isqrt
 import numpy as np
 import oracle
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from inputs import any_points, grid_points
 from judges import fcl_body, fcl_distance
@@ -329,7 +329,6 @@ def any_size(d):
 @pytest.mark.parametrize("d", [2, 3])
 def test_depth_and_distance_at_every_size(d):
     @given(any_size(d))
-    @settings(max_examples=150)
     def within_the_bound(pair):
         p, q = pair
         bound = extent(p + q) / 10**12 + Fraction(5e-324)

@@ -69,7 +69,7 @@ def test_a_busy_day(seed, extent, key_type):
         places = np.round(places)  # many at one place, and on boundaries
     corners = random.random((60, 2)) * extent
     seen = 0
-    for step in range(18):
+    for step in range(12):
         for fence in random.integers(0, 25, 4).tolist():
             set_some(random, twins, fence, extent)
         if step % 3 == 0:

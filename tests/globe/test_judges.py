@@ -94,7 +94,7 @@ def test_diameter_against_every_pair():
 def test_distance_against_many_places_of_the_boundary():
     """The distance to each of some thousand places is at least that to the hull, and for the nearest hardly more."""
     rng = np.random.default_rng(6)
-    for _ in range(40):
+    for _ in range(20):
         center, radius, points = random_set(rng, 30)
         hull = GeoHull(points, center=center)
         step = hull.perimeter / 4000
