@@ -46,7 +46,7 @@ def test_from_the_landing_page_to_the_features(gateway: Gateway, fleet: str) -> 
     described = gateway.get(path.removesuffix("/items")).json
     assert described["extent"]["spatial"]["bbox"] == [[5, 45, 29, 54]]
     one = gateway.get(f"{path}/v001").json
-    assert (one["geometry"]["coordinates"], one["properties"]["time"]) == ([6, 45], "2026-01-02T00:00:00+00:00")
+    assert (one["geometry"]["coordinates"], one["properties"]["time"]) == ([6, 45], "2026-01-02T00:00:00.000000Z")
     assert gateway.get(f"{path}/v999").status == 404
 
 

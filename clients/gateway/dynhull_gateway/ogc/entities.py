@@ -3,7 +3,6 @@
 import bisect
 from collections import OrderedDict
 from dataclasses import dataclass
-from datetime import UTC
 from typing import Any
 
 import numpy as np
@@ -32,10 +31,12 @@ class Snapshot:
     @classmethod
     def of(cls, found: Entities) -> "Snapshot":
         """The SDK's answer."""
-        keys = list(found.keys)
-        numbers = [int(key) for key in keys if not isinstance(key, str)]
-        order = numbers or [str(key).encode() for key in keys]
-        return cls(found.revision, numbers or keys, order, found.points, found.times)
+        keys: list[Key] = [key if isinstance(key, str) else int(key) for key in found.keys]
+        numbers = [key for key in keys if isinstance(key, int)]
+        order: list[int] | list[bytes] = [str(key).encode() for key in keys]
+        if numbers:
+            order = numbers
+        return cls(found.revision, keys, order, found.points, found.times)
 
     def page(self, page: Page) -> Found:
         """The features of a page."""
@@ -59,8 +60,8 @@ class Snapshot:
 
     def _row_after(self, key: str) -> int:
         if self.order and isinstance(self.order[0], int):
-            return bisect.bisect_right(self.order, int(key) if key.isdecimal() else -1)  # type: ignore[type-var]
-        return bisect.bisect_right(self.order, key.encode("utf-8", "replace"))  # type: ignore[type-var]
+            return bisect.bisect_right(self.order, int(key) if key.isdecimal() else -1)
+        return bisect.bisect_right(self.order, key.encode("utf-8", "replace"))
 
 
 class Snapshots:
@@ -83,7 +84,7 @@ class Snapshots:
 
 def feature(key: Key, lonlat: list[float], time: np.datetime64 | None) -> dict[str, Any]:
     """A key as a GeoJSON Feature."""
-    when = None if time is None or time == NO_TIME else time.item().replace(tzinfo=UTC).isoformat()
+    when = None if time is None or time == NO_TIME else f"{np.datetime_as_string(time)}Z"
     return {
         "type": "Feature",
         "id": key,
