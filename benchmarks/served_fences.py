@@ -11,6 +11,11 @@ hull: one fence around a hull that changes some times a second, and many subject
 processor time of the server a change; the delay of events, from the moment at which the change is sent to the moment
 at which its events are read, median and 99th percentile; and how many changes had events.
 
+webhook: 10,000 subjects, each of which moves ten times a second, among 100 polygon fences, and a relay that delivers
+the events to an HTTP endpoint; server, relay and endpoint are processes. Columns: the length of a step, moves a second,
+events a second, how many were delivered, and their delay, from the moment at which the message with the move is due to
+the moment at which the endpoint has the event; and the processor time of each process in a second.
+
 stalled: single writes that make events each, alternately without anybody who watches and with watches that never read,
 and a consumer that never acknowledges. Columns: latency of a write, median and 99th percentile, and the growth of the
 server's memory a round.
@@ -20,10 +25,12 @@ import argparse
 import asyncio
 import os
 import statistics
+import subprocess
+import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -37,8 +44,8 @@ from dynhull_proto.v1 import fence_service_pb2 as fences
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 
-WORKS = ["many", "moves", "hull", "stalled"]
-NAME = "fleet"
+WORKS = ["many", "moves", "hull", "webhook", "stalled"]
+NAME, CONSUMER = "fleet", "bench"
 IN_FLIGHT = 8
 LOADED = 8192
 CORNERS = 8
@@ -47,6 +54,9 @@ AT_ONCE = 64  # fences created at a time
 STALLED, CROSSING, WRITES = 8, 16, 2000  # watches that never read, subjects that cross in a write, writes of a round
 MOVES = 2**18  # of a run, if these limits on its batches allow
 FEWEST, MOST = 16, 2048
+WALKERS, AREAS, PACE, TOGETHER = 10_000, 100, 10, 1000  # subjects, fences, moves a second of each, moves of a message
+PACED_SECONDS, WARM_UP = 12, 2  # the first ones are not counted
+DELIVERED_WITHIN = 60  # seconds after the last move
 COVERED = 0.7  # of the side of a cell that a fence fills
 
 
@@ -109,15 +119,19 @@ def polygon(area: np.ndarray) -> fence_pb2.FenceConfig:
 
 def events(address: str) -> int:
     """The number of all events so far."""
+    return sum(fence.last_sequence for fence in all_fences(address))
+
+
+def all_fences(address: str) -> Iterator[fence_pb2.Fence]:
     with grpc.insecure_channel(address) as channel:
         stub = FenceServiceStub(channel)
-        total, token = 0, ""
+        token = ""
         while True:
             page = stub.ListFences(fences.ListFencesRequest(page_size=1000, page_token=token))
-            total += sum(fence.last_sequence for fence in page.fences)
+            yield from page.fences
             token = page.next_page_token
             if not token:
-                return total
+                return
 
 
 def many(folder: Path, n: int, number: int) -> None:
@@ -228,6 +242,97 @@ def hull(folder: Path, n: int, rates: list[float], seconds: float) -> None:
             )
 
 
+def webhook(folder: Path, steps: list[float]) -> None:
+    print(
+        "\n| step | moves/s | events/s | delivered | delay, median | p99 | longest | CPU of server | relay | endpoint |"
+    )
+    print("| ---: |" + " ---: |" * 9)
+    every = np.array_split(np.arange(WALKERS), WALKERS // TOGETHER)
+    for step in steps:
+        random = np.random.default_rng(0)
+        places = random.random((WALKERS, 2))
+        with ExitStack() as stack:
+            address = started(stack, folder / f"webhook-{step}")
+            send(address, [puts(np.arange(WALKERS), places)])
+            asyncio.run(create_fences(address, polygons(AREAS)))
+            endpoint, port = started_endpoint(stack)
+            relay = started_relay(stack, address, port, folder / f"relay-{step}")
+            messages = []
+            for _ in range(PACED_SECONDS * PACE):
+                places = (places + random.normal(0, step, places.shape)) % 1.0
+                messages += [puts(keys, places[keys]) for keys in every]
+            processes = [next(pid for pid in processor_times() if pid not in (relay.pid, endpoint.pid)), relay.pid]
+            processes.append(endpoint.pid)
+            before = processor_times()
+            due, took = asyncio.run(send_paced(address, messages, PACE * len(every)))
+            wait_until_acknowledged(address)
+            after, total = processor_times(), events(address)
+            endpoint.terminate()
+            arrived = [line.split() for line in endpoint.communicate()[0].splitlines()]
+        delays = sorted(float(at) - due[int(revision)] for _, revision, at in arrived if int(revision) in due)
+        p99 = delays[min(len(delays) - 1, int(len(delays) * 0.99))]
+        delay = " | ".join(f"{each * 1e3:.0f} ms" for each in (statistics.median(delays), p99, delays[-1]))
+        shares = " | ".join(f"{(after[pid] - before[pid]) / took:.0%}" for pid in processes)
+        delivered = f"{len({event for event, *_ in arrived}):,} of {total:,}"
+        rates = f"{len(messages) * TOGETHER / took:,.0f} | {total / took:,.0f}"
+        print(f"| {step:g} | {rates} | {delivered} | {delay} | {shares} |", flush=True)
+
+
+async def send_paced(address: str, messages: list[bytes], rate: int) -> tuple[dict[int, float], float]:
+    """Send messages at this rate, and read the answers: when each revision was due, of those counted, and the time."""
+    due: dict[int, float] = {}
+    async with grpc.aio.insecure_channel(address, options=server.OPTIONS) as channel:
+        method = channel.stream_stream(server.SERVICE + "Stream", response_deserializer=pb.StreamResponse.FromString)
+        call, begun = method(), time.monotonic()
+
+        async def write() -> None:
+            for number, message in enumerate(messages):
+                await asyncio.sleep(begun + number / rate - time.monotonic())
+                await call.write(message)
+            await call.done_writing()
+
+        writing = asyncio.create_task(write())
+        for number in range(len(messages)):
+            response = await call.read()
+            if number >= WARM_UP * rate:
+                due[response.result.revision] = begun + number / rate
+        await writing
+        return due, time.monotonic() - begun
+
+
+def started_endpoint(stack: ExitStack) -> tuple[subprocess.Popen[str], int]:
+    """A process that receives events, and its port."""
+    command = [sys.executable, str(Path(__file__).with_name("endpoint.py"))]
+    process = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+    stack.callback(process.terminate)
+    assert process.stdout is not None
+    return process, int(process.stdout.readline())
+
+
+def started_relay(stack: ExitStack, address: str, port: int, state: Path) -> subprocess.Popen[bytes]:
+    """A relay of all fences to an endpoint, whose consumers are there."""
+    names = [f"fence/{number}" for number in range(AREAS)]
+    command = [str(Path(sys.executable).with_name("dynhull")), "relay", *names, "--consumer", CONSUMER, "--unsigned"]
+    command += ["--to", f"http://127.0.0.1:{port}/{{fence}}", "--allow-private", "--batch", "1000"]
+    process = subprocess.Popen([*command, "--address", address, "--state", str(state)], stderr=subprocess.DEVNULL)
+    stack.enter_context(process)
+    stack.callback(process.terminate)
+    wait_for(lambda: all(fence.consumers for fence in all_fences(address)))
+    return process
+
+
+def wait_until_acknowledged(address: str) -> None:
+    wait_for(lambda: not any(consumer.backlog for fence in all_fences(address) for consumer in fence.consumers))
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + DELIVERED_WITHIN
+    while not condition():
+        if time.monotonic() > end:
+            raise TimeoutError("events were not delivered in time")
+        time.sleep(0.1)
+
+
 def stalled(folder: Path, rounds: int) -> None:
     """Rounds of writes; in every second one, watches are open that are never read."""
     inside, outside = np.full((CROSSING, 2), 0.5), np.full((CROSSING, 2), 5.0)
@@ -284,23 +389,29 @@ def read(watch, seen: dict[int, float]) -> None:
 
 def processor_seconds() -> float:
     """The processor time of all processes that this one has started, so far."""
-    return sum(int(fields[11]) + int(fields[12]) for fields in children()) / os.sysconf("SC_CLK_TCK")
+    return sum(processor_times().values())
+
+
+def processor_times() -> dict[int, float]:
+    """The processor time of each of these processes."""
+    tick = os.sysconf("SC_CLK_TCK")
+    return {pid: (int(fields[11]) + int(fields[12])) / tick for pid, fields in children()}
 
 
 def resident() -> float:
     """The bytes of memory of these processes."""
-    return sum(int(fields[21]) for fields in children()) * os.sysconf("SC_PAGE_SIZE")
+    return sum(int(fields[21]) for _, fields in children()) * os.sysconf("SC_PAGE_SIZE")
 
 
-def children() -> Iterator[list[str]]:
-    """The fields of /proc/PID/stat after the name of the command, of each process that this one has started."""
+def children() -> Iterator[tuple[int, list[str]]]:
+    """The number of each process that this one has started, and the fields of /proc/PID/stat after its name."""
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rsplit(")", 1)[1].split()
         except (OSError, IndexError):  # it has ended
             continue
         if int(fields[1]) == os.getpid():
-            yield fields
+            yield int(stat.parent.name), fields
 
 
 def main() -> None:
@@ -310,6 +421,7 @@ def main() -> None:
     parser.add_argument("--fences", type=float, default=23_000)
     parser.add_argument("--batches", type=int, nargs="+", default=[64, 8192])
     parser.add_argument("--steps", type=float, nargs="+", default=[5e-5, 4e-4], help="standard deviation of a move")
+    parser.add_argument("--walks", type=float, nargs="+", default=[2e-4, 1e-3], help="the same, for `webhook`")
     parser.add_argument("--rates", type=float, nargs="+", default=[10, 100], help="changes of the hull a second")
     parser.add_argument("--seconds", type=float, default=10, help="of each of these rates")
     parser.add_argument("--repeat", type=int, default=3)
@@ -324,6 +436,8 @@ def main() -> None:
             moves(Path(data), int(arguments.subjects), number, arguments.batches, arguments.steps, arguments.repeat)
         if "hull" in arguments.works:
             hull(Path(data), int(arguments.subjects), arguments.rates, arguments.seconds)
+        if "webhook" in arguments.works:
+            webhook(Path(data), arguments.walks)
         if "stalled" in arguments.works:
             stalled(Path(data), arguments.repeat)
     print(f"\nload average at the end {os.getloadavg()[0]:.1f}")

@@ -158,7 +158,7 @@ def test_what_exists_and_what_does_not(client: HullClient, name: str) -> None:
         client.create_fence(f"{name}-2", area=SQUARE, subjects="nobody")
     with pytest.raises(InvalidRequestError) as refused:
         client.create_fence(f"{name}-2", area=[[0, 0], [4, 4], [4, 0], [0, 4]], subjects=name)
-    assert refused.value.field == "config.polygon_area.polygons[0]"
+    assert refused.value.field == "config.polygon_area.polygons[0].exterior"
     for call in (client.get_fence, client.delete_fence, client.fence_inside):
         with pytest.raises(FenceNotFoundError):
             call("nobody")

@@ -269,8 +269,8 @@ def test_a_hull_that_a_fence_depends_on_stays(
         ({"hull_area": {"name": "other", "without_self": True}}, "config.hull_area.without_self", "true"),
         (
             {"polygon_area": polygon(SQUARE, [1, 1, 2, 2, 2, 1, 1, 2])},
-            "config.polygon_area.polygons[0]",
-            "2 rings",
+            "config.polygon_area.polygons[0].holes[0]",
+            "4 corners",
         ),
         ({"polygon_area": polygon([0, 0, 1, 1, 2, 2])}, "config.polygon_area.polygons[0].exterior", "3 corners"),
         (

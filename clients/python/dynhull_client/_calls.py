@@ -5,6 +5,7 @@ The methods of `HullClient` and `AsyncHullClient` are made of these functions an
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Generic, Literal, Never, TypeVar
@@ -211,6 +212,26 @@ def choice(argument: str, value: Any, choices: Mapping[Any, Any]) -> Any:
     if value not in choices:
         raise ValueError(f"{argument} must be one of {', '.join(map(repr, choices))}, got {value!r}")
     return choices[value]
+
+
+def text(argument: str, value: Any) -> str:
+    """The value; TypeError if it is no str."""
+    if not isinstance(value, str):
+        raise TypeError(f"{argument} is {value!r}: must be a str")
+    return value
+
+
+def whole(argument: str, value: Any, bits: int = 64) -> int:
+    """The value as an integer without sign; TypeError if it is no integer, ValueError if it is out of range."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{argument} is {value!r}: must be an integer") from None
+    if number < 0:
+        raise ValueError(f"{argument} must be at least 0, got {number}")
+    if number >= 2**bits:
+        raise ValueError(f"{argument} must be less than 2**{bits}, got {number}")
+    return number
 
 
 def _positive(argument: str, value: int | None) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import grpc
+import numpy as np
 from google.protobuf.duration_pb2 import Duration
 
 from dynhull.arrays import as_coordinate
@@ -13,7 +14,7 @@ from dynhull_proto.v1 import fence_pb2
 from dynhull_proto.v1 import fence_service_pb2 as pb
 
 from ._areas import Prefix, as_area, encode_area
-from ._calls import Call, choice
+from ._calls import Call, choice, text, whole
 from ._errors import FenceExistsError, FenceNotFoundError
 from ._fence_messages import (
     BOUNDARIES,
@@ -104,7 +105,7 @@ def create_fence(
     config.initial = choice("initial", initial, INITIALS)
     create: Call[Fence] = Call(
         "CreateFence",
-        pb.CreateFenceRequest(name=name, config=config),
+        pb.CreateFenceRequest(name=text("name", name), config=config),
         lambda response: decode_fence(response.fence),
         timeout,
         repeatable=exist_ok,
@@ -113,7 +114,7 @@ def create_fence(
     wanted = decode_fence(fence_pb2.Fence(name=name, config=config))
     existing: Call[Fence] = Call(
         "GetFence",
-        pb.GetFenceRequest(name=name),
+        pb.GetFenceRequest(name=text("name", name)),
         lambda response: _as_wanted(decode_fence(response.fence), wanted),
         timeout,
         instead=lambda error: create if isinstance(error, FenceNotFoundError) else None,  # deleted in the meantime
@@ -145,18 +146,22 @@ def replace_fence(
     settings again make none.
     """
     given = locals()
-    request = pb.ReplaceFenceRequest(name=name, config=_config(area, subjects, given))
+    request = pb.ReplaceFenceRequest(name=text("name", name), config=_config(area, subjects, given))
     return Call("ReplaceFence", request, lambda response: decode_fence(response.fence), timeout)
 
 
 def delete_fence(name: str, *, timeout: float | None = None) -> Call[None]:
     """Delete a fence and its events. Its watches get a last event, "closed", and end."""
-    return Call("DeleteFence", pb.DeleteFenceRequest(name=name), lambda _: None, timeout, repeatable=False)
+    return Call(
+        "DeleteFence", pb.DeleteFenceRequest(name=text("name", name)), lambda _: None, timeout, repeatable=False
+    )
 
 
 def get_fence(name: str, *, timeout: float | None = None) -> Call[Fence]:
     """A fence with its settings, its counts and its consumers. FenceNotFoundError if there is none of that name."""
-    return Call("GetFence", pb.GetFenceRequest(name=name), lambda response: decode_fence(response.fence), timeout)
+    return Call(
+        "GetFence", pb.GetFenceRequest(name=text("name", name)), lambda response: decode_fence(response.fence), timeout
+    )
 
 
 def list_page(prefix: str, page_token: str, timeout: float | None) -> Call[tuple[list[Fence], str]]:
@@ -165,12 +170,14 @@ def list_page(prefix: str, page_token: str, timeout: float | None) -> Call[tuple
     def decode(response: pb.ListFencesResponse) -> tuple[list[Fence], str]:
         return [decode_fence(each) for each in response.fences], response.next_page_token
 
-    return Call("ListFences", pb.ListFencesRequest(prefix=prefix, page_token=page_token), decode, timeout)
+    return Call(
+        "ListFences", pb.ListFencesRequest(prefix=text("prefix", prefix), page_token=page_token), decode, timeout
+    )
 
 
 def fence_inside(name: str, *, timeout: float | None = None) -> Call[Inside]:
     """The subjects that are inside, all at one moment."""
-    return Call("ReadInside", pb.ReadInsideRequest(name=name), decode_inside, timeout, in_parts=True)
+    return Call("ReadInside", pb.ReadInsideRequest(name=text("name", name)), decode_inside, timeout, in_parts=True)
 
 
 def ack_fence(
@@ -185,13 +192,18 @@ def ack_fence(
         uid: the uid of the fence that made the event: FenceReplacedError if the fence was created again since then.
         timeout: seconds, instead of the client's.
     """
-    request = pb.AckFenceRequest(name=name, consumer=consumer, sequence=sequence, uid=uid)
+    request = pb.AckFenceRequest(
+        name=text("name", name),
+        consumer=text("consumer", consumer),
+        sequence=whole("sequence", sequence),
+        uid=text("uid", uid),
+    )
     return Call("AckFence", request, lambda response: decode_consumer(response.consumer), timeout)
 
 
 def delete_consumer(name: str, consumer: str, *, timeout: float | None = None) -> Call[None]:
     """Delete a consumer of a fence. What it has not acknowledged no longer counts as its backlog."""
-    request = pb.DeleteConsumerRequest(name=name, consumer=consumer)
+    request = pb.DeleteConsumerRequest(name=text("name", name), consumer=text("consumer", consumer))
     return Call("DeleteConsumer", request, lambda _: None, timeout, repeatable=False)
 
 
@@ -242,11 +254,16 @@ def watch_fence(
         raise ValueError("give either consumer, which knows its place, or after, not both")
     if consumer is not None and conflate:
         raise ValueError("conflate is for a watch without a consumer")
-    request = pb.WatchFenceRequest(name=name, uid=uid, conflate=conflate, max_responses_per_second=max_rate)
+    request = pb.WatchFenceRequest(
+        name=text("name", name),
+        uid=text("uid", uid),
+        conflate=_flag("conflate", conflate),
+        max_responses_per_second=as_coordinate(max_rate, "max_rate"),
+    )
     if consumer is not None:
-        request.consumer = consumer
+        request.consumer = text("consumer", consumer)
     elif after is not None:
-        request.after_sequence = after
+        request.after_sequence = whole("after", after)
     else:
         request.only_new = True
     if progress_interval is not None:
@@ -263,27 +280,37 @@ def _config(area: Any, subjects: str | Prefix | None, given: dict[str, Any]) -> 
         boundary=choice("boundary", given["boundary"], BOUNDARIES),
         margin=as_coordinate(given["margin"], "margin"),
         near_distance=as_coordinate(given["near"], "near"),
-        report_crosses=given["crosses"],
-        confirmations=0 if given["confirmations"] == 1 else given["confirmations"],
-        max_events=given["max_events"],
+        report_crosses=_flag("crosses", given["crosses"]),
+        confirmations=0 if given["confirmations"] == 1 else whole("confirmations", given["confirmations"], 32),
+        max_events=whole("max_events", given["max_events"]),
         dwell=_span(given["dwell"], "dwell"),
         min_dwell=_span(given["min_dwell"], "min_dwell"),
         max_event_age=_span(given["max_event_age"], "max_event_age"),
     )
-    encode_area(as_area(area), given["without_self"], config)
+    encode_area(as_area(area), _flag("without_self", given["without_self"]), config)
     if isinstance(subjects, Prefix):
-        config.subject_prefix = subjects.text
+        config.subject_prefix = text("subjects", subjects.text)
     elif subjects is not None:
-        config.subject_hull = subjects
+        config.subject_hull = text("subjects", subjects)
     elif other_hull is not None:
-        config.other_hull = other_hull
+        config.other_hull = text("other_hull", other_hull)
     return config
 
 
 def _span(seconds: float | timedelta | None, name: str) -> Duration | None:
     """A time span; none for 0, which means the same."""
     span = None if seconds is None else encode_duration(seconds, name)
-    return span if span is not None and span != Duration() else None
+    if span != Duration():
+        return span
+    if seconds:  # rounded to nothing, it would be no rule
+        raise ValueError(f"{name} is {seconds!r}: must be at least a microsecond, or 0")
+    return None
+
+
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} is {value!r}: must be True or False")
+    return bool(value)
 
 
 def _as_wanted(existing: Fence, wanted: Fence) -> Fence:

@@ -115,7 +115,9 @@ class FenceService:
     async def AckFence(self, request: pb.AckFenceRequest, call: Call) -> pb.AckFenceResponse:
         fence = self._read(call, request.name)
         name = decode_consumer(request.consumer)
-        consumer = await fence.acknowledge(name, min(request.sequence, decode.LARGEST_INTEGER), request.uid)
+        if request.sequence > decode.LARGEST_INTEGER:
+            raise SequenceAheadError("sequence", request.sequence, fence.fence.last)
+        consumer = await fence.acknowledge(name, request.sequence, request.uid)
         oldest = await _oldest_of(fence, consumer)
         return pb.AckFenceResponse(consumer=encode_consumer(fence.fence, consumer, oldest))
 

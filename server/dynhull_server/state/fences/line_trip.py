@@ -30,7 +30,7 @@ from ..hull_state import Counts, HullState
 from ..limits import FenceLimits
 from ..records import KeyRows, Record
 from ..trip import Leg, Place, Trip, write
-from .config import FenceConfig, PolygonArea
+from .config import CircleArea, FenceConfig, PolygonArea
 from .delaying import NO_ROWS, KeysChanged, delay, end_all, end_some
 from .delays import Delays
 from .fence import Fence
@@ -63,7 +63,8 @@ MOST_INSIDE = 2**18
 MOST_DUE = 4096
 NOTHING: Mapping[str, KeysChanged] = MappingProxyType({})
 # How the library names a ring.
-RING = re.compile(r"polygon (\d+)(?: ring (\d+))? (.*)", re.DOTALL)
+RING = re.compile(r"polygon (\d+)(?: ring (\d+):?)? (.*)", re.DOTALL)
+SUBJECT_FIELDS = {"hull": "subject_hull", "prefix": "subject_prefix", "other": "other_hull"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -446,7 +447,8 @@ class LineTrip(Trip):
         if config == leg.row.config:
             return fence
         if (config.kind, config.subjects) != (leg.row.config.kind, leg.row.config.subjects):
-            raise InvalidFenceError("subjects", config.subjects, "the subjects of a fence stay the same")
+            field = SUBJECT_FIELDS[config.kind]
+            raise InvalidFenceError(field, config.subjects, "the subjects of a fence stay the same")
         area = self._area(config)
         require_frames(config, area, None if config.kind == "prefix" else self._hull(config.subjects))
         if not fence.subjects and config.kind == "prefix":  # nobody is there to refuse an invalid area
@@ -600,6 +602,10 @@ def _lay(subjects: Subjects, number: int, config: FenceConfig, area: Hull | None
 def _invalid(config: FenceConfig, message: str) -> InvalidFenceError:
     """The error of an area that the library refuses."""
     named = RING.match(message)
+    if isinstance(config.area, CircleArea):
+        circle = f"center ({config.area.x}, {config.area.y}), radius {config.area.radius}"
+        problem = message if named is None else f"the polygon that stands for it {named.group(3)}"
+        return InvalidFenceError("circle_area", circle, problem)
     if named is None or not isinstance(config.area, PolygonArea):
         return InvalidFenceError("area", "", message)
     polygon, ring, problem = named.groups()

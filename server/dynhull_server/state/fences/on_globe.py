@@ -20,6 +20,8 @@ from .config import Area, CircleArea, FenceConfig, PolygonArea, Ring
 # A circle is a polygon with this many corners, every half degree of azimuth, each at the radius on WGS 84: its edges
 # are at most 1e-5 of the radius inside of the circle.
 CIRCLE_CORNERS = 720
+# Metres between places that are as far from each other as possible.
+HALF_ROUND = 20_003_931.5
 
 Rings = Sequence[Sequence[Points]]
 
@@ -49,6 +51,16 @@ def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull | None
         )
     if config.margin:
         raise InvalidFenceError("margin", config.margin, "a fence on the globe has no margin")  # nor without_self
+
+
+def require_circle(frame: Gnomonic, area: CircleArea) -> None:
+    """Raise ValueError unless the inside of a circle is that of the polygon that stands for it."""
+    center = np.array([[area.x, area.y]])
+    misplaced = off_globe(center) or out_of_reach(frame, center)
+    if misplaced is not None:
+        raise ValueError(f"the centre is {misplaced.place}: {misplaced.problem}")
+    if area.radius >= HALF_ROUND:
+        raise ValueError(f"the radius is {area.radius} m: no two places are {HALF_ROUND} m apart")
 
 
 def rings_of(area: Area, vertices: Points | None) -> Rings:
@@ -105,9 +117,6 @@ def _circle(area: CircleArea) -> Points:
     """The corners of a circle, counter-clockwise."""
     from pyproj import Geod  # takes a while to load, and only circles on the globe need it
 
-    misplaced = off_globe(np.array([[area.x, area.y]]))
-    if misplaced is not None:
-        raise ValueError(f"the centre is {misplaced.place}: {misplaced.problem}")
     azimuths = -np.linspace(0, 360, CIRCLE_CORNERS, endpoint=False)
     same = np.ones(CIRCLE_CORNERS)
     lon, lat, _ = Geod(ellps="WGS84").fwd(area.x * same, area.y * same, azimuths, area.radius * same)

@@ -18,7 +18,7 @@ from ..hull import Hull
 from ..hull_state import HullState
 from ..records import Keys, Times
 from .config import CircleArea, FenceConfig, HullArea
-from .on_globe import metres, outline, projected, rings_of
+from .on_globe import metres, outline, projected, require_circle, rings_of
 from .records import Key
 
 if TYPE_CHECKING:
@@ -198,6 +198,8 @@ def lay(
             inside=inside,
         )
     elif frame is not None:
+        if isinstance(area, CircleArea):
+            require_circle(frame, area)
         rings = projected(frame, rings_of(area, None))
         index.set_polygons(number, rings, closed=closed, margin=margin, cross=cross, inside=inside)
     elif isinstance(area, CircleArea):
