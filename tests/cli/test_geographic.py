@@ -1,9 +1,11 @@
 """Geographic hulls from the command line."""
 
 import json
+import re
 
 import pytest
 from command_line import dynhull
+from odd_places import NO_PLACES, TAKEN, TOO_FAR
 
 FIJI = "lon,lat,key\n177.4,-17.8,Nadi\n178.4,-18.1,Suva\n-179.9,-16.8,Taveuni\n179.4,-16.4,Labasa\n"
 
@@ -196,3 +198,29 @@ def test_rows_that_are_no_places_are_left_out(name, tmp_path, suffix):
     assert "point 2: the latitude is 95.0" in run("load", name, plain).stderr  # the hull is on the globe
     run("load", f"{name}-plane", plain)
     assert listed(f"{name}-plane")["points"] == 2
+
+
+@pytest.mark.usefixtures("served")
+def test_odd_places_are_refused_and_change_nothing(name):
+    run("create", name, "--geographic", "--center", "0,0")
+    run("create", f"keyed-{name}", "--keyed", "str", "--geographic", "--center", "0,0")
+    far = [(place, rf"{angle} degrees from the centre \(0\.0, 0\.0\)") for place, angle in TOO_FAR[:2]]
+    for (lon, lat), words in [*NO_PLACES[::3], *far]:
+        pair = f"{lon},{lat}"
+        for command in (
+            ["insert", name, "--", "1,2", pair],
+            ["put", f"keyed-{name}", "--", "a", str(lon), str(lat)],
+        ):
+            assert re.search(words, run(*command, code=2).stderr), command
+        if "from the centre" not in words:
+            for command in (
+                ["query", name, "locate", "--", "1,2", pair],
+                ["recenter", name, "--", pair],
+                ["create", f"{name}-new", "--geographic", "--center", pair],
+            ):
+                assert re.search(words, run(*command, code=2).stderr), command
+    assert (listed(name)["points"], listed(name)["center"]) == (0, [0, 0])
+    assert listed(f"keyed-{name}")["points"] == 0
+    places = [f"{lon},{lat}" for (lon, lat), _ in TAKEN]
+    run("insert", name, "--", *places)
+    assert listed(name)["points"] == len(TAKEN)

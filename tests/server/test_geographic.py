@@ -7,6 +7,7 @@ import grpc
 import numpy as np
 import pytest
 from command_line import dynhull as command
+from odd_places import NO_PLACES, TAKEN, TOO_FAR
 from patience import PATIENCE
 from refusal import refusal
 from server_process import server_process
@@ -292,3 +293,46 @@ def test_a_cause_that_older_clients_do_not_know_is_named(stub, client, fiji):
     events.cancel()
     assert first.cause == batch_pb2.CAUSE_RECENTER
     assert first.HasField("center")
+
+
+def at_row(place):
+    return [(1.0, 2.0), place]
+
+
+# The entries to a geographic hull through the SDK, with the place in row 1 of many, or alone.
+ENTRIES = {
+    "insert": lambda client, name, place: client.apply(name, insert=at_row(place)),
+    "delete": lambda client, name, place: client.apply(name, delete=at_row(place), missing="count"),
+    "move": lambda client, name, place: client.apply(name, move=([(1, 2)], [place])),
+    "put": lambda client, name, place: client.put(f"{name}-keyed", ["a", "b"], at_row(place)),
+    "locate": lambda client, name, place: client.locate(name, at_row(place)),
+    "count": lambda client, name, place: client.count(name, at_row(place)),
+    "distance": lambda client, name, place: client.distance(name, at_row(place)),
+    "tangents": lambda client, name, place: client.tangents(name, at_row(place)),
+    "lines": lambda client, name, place: client.intersect_lines(name, [(7, 8), (3, 4)], at_row(place)),
+    "recenter": lambda client, name, place: client.recenter(name, place),
+    "create": lambda client, name, place: client.create_hull(f"{name}-new", geographic=True, center=place),
+}
+ALONE = {"move", "recenter", "create"}
+REACH = {"insert", "move", "put", "tangents", "lines"}
+
+
+def test_odd_places_are_refused_by_every_entry_and_change_nothing(client, name):
+    client.create_hull(name, geographic=True, center=(0, 0))
+    client.create_hull(f"{name}-keyed", keyed="str", geographic=True, center=(0, 0))
+    client.apply(name, insert=[(1, 2), (3, 4), (-5, 6)])
+    far = [(place, rf"{angle} degrees from the centre \(0\.0, 0\.0\)", REACH) for place, angle in TOO_FAR]
+    for place, words, entries in [*((place, words, ENTRIES) for place, words in NO_PLACES), *far]:
+        for entry in entries:
+            with pytest.raises((InvalidRequestError, ValueError), match=words) as caught:
+                ENTRIES[entry](client, name, place)
+            assert entry in ALONE or "[1]" in str(caught.value) or "row 1" in str(caught.value), (entry, caught.value)
+    for place, _ in TOO_FAR:
+        assert client.locate(name, at_row(place)).sides.tolist() == [0, -1]
+        assert client.count(name, at_row(place)).counts.tolist() == [1, 0]
+    assert (client.get_hull(name).revision, client.get_hull(f"{name}-keyed").revision) == (1, 0)
+    assert not [each for each in client.list_hulls(name) if each.name == f"{name}-new"]
+    for place, back in TAKEN:
+        client.apply(name, insert=[place])
+        assert client.count(name, [back]).counts.tolist() == [1]
+    assert client.verify(name).equal
