@@ -127,6 +127,20 @@ def test_bad_messages_are_kept_aside(
         assert "more than 1 bad messages" in ingest.lines()[-1]
 
 
+def test_what_is_wrong_with_all_messages_passes_over_none(
+    client: HullClient, address: str, name: str, nats_port: int
+) -> None:
+    """A hull whose clock is that of the data needs event times."""
+    client.create_hull(name, keyed="str", max_age=60, clock="data")
+    publish(nats_port, name, [("p", {"id": "a", "lon": 1, "lat": 2, "ts": 1_700_000_000 + i}) for i in range(3)])
+    options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--key", "$.id")
+    with ingest_process(address, *options, code=2) as ingest:
+        ingest.process.wait(PATIENCE)
+        assert "each row needs one" in ingest.lines()[-1]
+    assert client.last_sequence(name, f"nats/{name}") == 0
+    assert ingested(address, *options, "--time", "$.ts")[-1]["points"] == 3
+
+
 def test_whatever_is_killed_each_message_is_applied_once(name: str, tmp_path: Path) -> None:
     """Points without keys: one that came twice would be counted twice."""
     port = free_port()

@@ -14,7 +14,6 @@ from dynhull_client import (
     DynhullError,
     HullExistsError,
     HullNotFoundError,
-    HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
     ProducerInUseError,
@@ -190,9 +189,11 @@ class Lane:
         self._news.set()
 
     def _raise(self, error: Exception) -> None:
-        """Raise the error of the writer, as one of the first chunk that is not settled if that is at fault."""
-        refusal = isinstance(error, (InvalidRequestError, HullUnsuitableError))
-        if refusal and self._flying:
+        """Raise the error of the writer: as one of the first chunk that is not settled if a row of it is at fault.
+
+        Without a row it is about all messages, as where the hull needs event times: none may be passed over.
+        """
+        if isinstance(error, InvalidRequestError) and error.row is not None and self._flying:
             raise _RefusedError(self._flying[0], error)
         raise error
 
