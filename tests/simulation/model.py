@@ -502,6 +502,13 @@ class Model:
             raise self.finds(f"revision {revision} of {asked.name} was answered as {seen}, and is kept as {kept}")
         self._answered(asked, (self._uids[uid].row.number, revision))
 
+    def located(self, asked: Asked, uid: str, revision: int, places: Sequence[float], sides: Sequence[int]) -> None:
+        """Points of the parabola with these x were located: they are vertices, or outside."""
+        kept = self._outline(uid, revision)
+        if sides != [0 if x in kept else -1 for x in places]:
+            raise self.finds(f"at revision {revision} of {asked.name}, {kept}, the sides of {places} were {sides}")
+        self._answered(asked, (self._uids[uid].row.number, revision))
+
     def named(self, uid: str, revision: int, seen: Sequence[float], keys: Sequence[Key]) -> None:
         """The keys of the points with these x were read."""
         kept = self._uids[uid].keys[revision]

@@ -72,6 +72,12 @@ WITH_FENCES = 0.12
 RECENTERS = 20
 ON_GLOBE = 0.1
 
+# The share of the shell's plans in which clients send streams of reads, and how many of these there are.
+WITH_QUERIES = 0.2
+QUERIES = (1, 1, 2, 4)
+# Where points of the parabola are asked for: most batches insert one of these.
+PLACES_ASKED = 12
+
 SWARM = (0, 1, 1, 5)
 
 # The share of the shell's plans in which a hull is recalled from the storage beside its deletion: by chance the two
@@ -149,12 +155,36 @@ def random_plan(seed: int, layer: str) -> Plan:
     if layer == "shell" and draw.random() < RECALLS_BESIDE_DELETES:
         draw.choice(lives)["clients"] += _recall_beside_delete(draw, names[0])
         plan["limits"]["history_bytes"] = 0
+    queries = random.Random(f"queries {seed}")  # the other plans stay as they were
+    if layer != "core" and queries.random() < WITH_QUERIES:
+        for _ in range(queries.choice(QUERIES)):
+            client = queries.choice(queries.choice(lives)["clients"])
+            client.insert(queries.randint(0, len(client)), _query(queries, (*names, *timed)))
     return plan
+
+
+def _query(draw: random.Random, names: tuple[str, ...]) -> Operation:
+    """A stream of reads. Between two looks at a hull of points, other points are located in it."""
+    messages = []
+    for _ in range(draw.choice((1, 2, 5))):
+        reads: list[Operation] = []
+        for name in draw.choices(names, k=draw.choice((1, 1, 3))):
+            look: Operation = {"name": name}
+            located = [
+                look | {"at": draw.sample(range(1, PLACES_ASKED), draw.choice((1, 1, 1, 3)))}
+                for _ in range(draw.choice((0, 2, 5)) if name in NAMES else 0)
+            ]
+            reads += [look, *located, look]
+        messages.append(reads)
+    op: Operation = {"do": "query", "messages": messages}
+    if draw.random() < 0.2:
+        op["leave"] = int(draw.expovariate(1 / 3))
+    return op
 
 
 def _recall_beside_delete(draw: random.Random, name: str) -> list[list[Operation]]:
     """Two clients: one writes to a hull and recalls it, the other deletes it."""
-    write = {"do": "write", "name": name, "create": True, "numbered": False, "rows": 1}
+    write = {"do": "write", "name": name, "create": name not in GLOBE, "numbered": False, "rows": 1}
     recalls = [{"do": "recall", "name": name, "back": draw.randint(0, 1)} for _ in range(draw.randint(1, 3))]
     return [[write, write, *recalls], [{"do": "rest", "seconds": 0.001}, {"do": "delete", "name": name}]]
 

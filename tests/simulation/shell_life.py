@@ -30,6 +30,7 @@ from .fence_model import PREFIX
 from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
 from .model import Finding, Model
 from .plan import Operation
+from .queries import Queries
 from .schedule import Schedule
 from .store import FaultyStorage
 
@@ -193,9 +194,12 @@ class ShellServer:
                     return
 
     async def special(self, client: Client, op: Operation) -> None:
-        """Let time pass, or watch a hull."""
+        """Let time pass, send a stream of reads, or watch a hull."""
         if op["do"] == "rest":
             await asyncio.sleep(op["seconds"])
+            return
+        if op["do"] == "query":
+            await Queries(self._engine, self.model).ask(client, op)
             return
         asked = self.model.ask(op["name"])
         try:
