@@ -37,8 +37,7 @@ class Globe(Live):
 
     @staticmethod
     def _as_point(x: float, y: float) -> Point:
-        ((lon, lat),) = as_place(x, y).tolist()
-        return lon, lat
+        return as_place(x, y)
 
     def _same_frame(self, other: Live) -> bool:
         return isinstance(other, Globe) and self.center == other.center

@@ -212,12 +212,12 @@ def as_lonlat(lonlat: npt.ArrayLike, name: str = "points") -> Points:
     return places
 
 
-def as_place(lon: Any, lat: Any) -> Points:
-    """Return one place as an array of shape (1, 2), checked like `as_lonlat`."""
+def as_place(lon: Any, lat: Any) -> Point:
+    """Return one place, checked like `as_lonlat`."""
     place = as_coordinate(lon, "lon"), as_coordinate(lat, "lat")
     if abs(place[0]) > 360 or abs(place[1]) > 90:
         _refuse_outside(place, "the point")
-    return np.array([place])
+    return place
 
 
 def as_center(center: Any) -> Point:

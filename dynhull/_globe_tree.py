@@ -58,8 +58,7 @@ class GlobeTree(HullTree):
 
     @staticmethod
     def _as_point(x: float, y: float) -> Point:
-        ((lon, lat),) = as_place(x, y).tolist()
-        return lon, lat
+        return as_place(x, y)
 
     @contextmanager
     def _in_frame(

@@ -57,9 +57,11 @@ def poles(rings: list[Points]) -> list[str]:
     return [name for name, pole in (("north", POLE), ("south", -POLE)) if (lat == pole).any()]
 
 
-def circle(area: Circle) -> Points:
-    """A circle with a radius in metres. For the eye: the server decides who is inside."""
+def circle(area: Circle, *, on_globe: bool) -> Points:
+    """A circle; on the globe its radius is in metres. For the eye: the server decides who is inside."""
     angles = np.linspace(0, 2 * np.pi, CORNERS_OF_CIRCLE, endpoint=False)
-    high = area.r / METRES_A_DEGREE
-    wide = high / max(cos(radians(area.y)), np.finfo(float).eps)
+    wide = high = area.r
+    if on_globe:
+        high = area.r / METRES_A_DEGREE
+        wide = high / max(cos(radians(area.y)), np.finfo(float).eps)
     return np.column_stack([area.x + wide * np.cos(angles), area.y + high * np.sin(angles)])

@@ -11,9 +11,8 @@ import shapely
 from dynhull_client import Circle, Fence, Points, Prefix
 
 from .degrees import Center, circle, shown
-from .outline import MOST_DRAWN, Box
+from .outline import MOST_DRAWN, Box, box_around
 
-CORNERS_OF_CIRCLE = 180
 LEAST_CORNERS = 3
 # Of more polygons the first ones are drawn.
 MOST_POLYGONS = MOST_DRAWN // LEAST_CORNERS
@@ -51,11 +50,9 @@ def area_of(name: str, fence: Fence | None, center: Center | None = None) -> Are
     message = _area_message(name, area_hulls(fence), margin, polygons, around)
     if not polygons:
         return Area(message)
-    outer = np.concatenate([rings[0] for rings in (*polygons, *around)])
-    left, bottom = outer.min(axis=0).tolist()
-    right, top = outer.max(axis=0).tolist()
+    bounds = box_around(np.concatenate([rings[0] for rings in (*polygons, *around)]))
     drawn = 0 if isinstance(fence.area, Circle) else sum(len(ring) for rings in polygons for ring in rings)
-    return Area(message, (left, bottom, right, top), corner_count(fence), drawn)
+    return Area(message, bounds, corner_count(fence), drawn)
 
 
 def _area_message(
@@ -95,7 +92,7 @@ def corner_count(fence: Fence) -> int:
 def _polygons(fence: Fence, *, on_globe: bool) -> list[Rings]:
     """The rings of the polygons to draw: the exterior, then the holes."""
     if isinstance(fence.area, Circle):
-        return [[circle(fence.area) if on_globe else _circle(fence.area, fence.area.r)]]
+        return [[circle(fence.area, on_globe=on_globe)]]
     if isinstance(fence.area, str):
         return []
     step = -(-corner_count(fence) // MOST_DRAWN)
@@ -103,11 +100,6 @@ def _polygons(fence: Fence, *, on_globe: bool) -> list[Rings]:
         [ring[:: max(1, min(step, len(ring) // LEAST_CORNERS))] for ring in (each.exterior, *each.holes)]
         for each in fence.area[:MOST_POLYGONS]
     ]
-
-
-def _circle(circle: Circle, radius: float) -> Points:
-    angles = np.linspace(0, 2 * np.pi, CORNERS_OF_CIRCLE, endpoint=False)
-    return np.column_stack([circle.x + radius * np.cos(angles), circle.y + radius * np.sin(angles)])
 
 
 def _around(polygons: list[Rings], margin: float) -> list[Rings]:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dynhull.arrays import Points
 
 from ..state.hull_state import VertexKeys
+from ..state.numbers import as_numbers
 from .steps import Run
 
 # Lists with at most this many vertices together are compared on the event loop.
@@ -100,7 +101,7 @@ def difference(
 
     Vertices common to two convex polygons have the same cyclic order in both, so they differ by a rotation only.
     """
-    before, after = _as_numbers(old), _as_numbers(new)
+    before, after = as_numbers(old), as_numbers(new)
     kept, there = np.isin(before, after, assume_unique=True), np.isin(after, before, assume_unique=True)
     common = before[kept]
     rotation = int(np.argmax(common == after[there][0])) if len(common) else 0
@@ -118,8 +119,3 @@ def _renamed(
         return there
     renamed: npt.NDArray[np.intp] = there[old_keys[kept] != new_keys[there]]
     return renamed
-
-
-def _as_numbers(vertices: Points) -> npt.NDArray[np.complex128]:
-    """One complex number per vertex, because numpy sorts and compares only scalars."""
-    return np.ascontiguousarray(vertices).view(np.complex128).ravel()

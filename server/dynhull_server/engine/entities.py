@@ -15,6 +15,7 @@ from ..state.batch import NO_POINTS
 from ..state.contents.keyed import Found, Keyed
 from ..state.errors import HullEmptyError
 from ..state.hull_state import Counts, HullState, VertexKeys
+from ..state.numbers import rows_of
 from ..state.outline import Outline
 from ..state.records import Contents, Keys
 from ..state.sample import sample_rows
@@ -104,14 +105,7 @@ async def support(
         raise HullEmptyError(hull.name)
     outline = await hull.outline(counts, vertices)
     extremes = await in_blocks(run, lambda rows: outline.support(directions[rows]), len(directions))
-    return counts, extremes, vertex_keys[await run(partial(_rows_of, extremes, vertices))]
-
-
-def _rows_of(points: Points, among: Points) -> npt.NDArray[np.intp]:
-    """The row of each point among different ones."""
-    numbers = np.ascontiguousarray(among).view(np.complex128).ravel()
-    order = np.argsort(numbers)
-    return order[np.searchsorted(numbers, np.ascontiguousarray(points).view(np.complex128).ravel(), sorter=order)]
+    return counts, extremes, vertex_keys[await run(partial(rows_of, extremes, vertices))]
 
 
 async def sample(hull: LiveHull, size: int, min_revision: int, run: Run) -> tuple[Counts, Points, Keys]:

@@ -211,7 +211,7 @@ class LiveHull:
             return await self.read(lambda state: question(state.outline(), slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision)
         if check is not None and counts.center is not None:
-            check(counts.center)
+            await (at_once if rows <= FEW_ROWS else self._engine.aside)(partial(check, counts.center))
         return counts, await self.ask_vertices(counts, vertices, question, rows)
 
     async def ask_vertices(

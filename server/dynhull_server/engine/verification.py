@@ -17,6 +17,7 @@ from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
 from ..state.fences.faults import FenceFault
+from ..state.numbers import as_numbers
 from ..state.records import Center, Contents
 from . import chan_process
 from .steps import Run
@@ -80,8 +81,7 @@ async def verify(
 def _given_at(points: Points, places: Points, vertices: Points) -> Points:
     """The vertices as they were given: the least pair at each of these projections, from the least vertex."""
     order = np.lexsort((*points.T[::-1], *places.T[::-1]))
-    numbers = np.ascontiguousarray(places[order]).view(np.complex128).ravel()
-    given = points[order[np.searchsorted(numbers, np.ascontiguousarray(vertices).view(np.complex128).ravel())]]
+    given = points[order[np.searchsorted(as_numbers(places[order]), as_numbers(vertices))]]
     start = int(np.lexsort(given.T[::-1])[0]) if len(given) else 0
     return np.roll(given, -start, axis=0)
 

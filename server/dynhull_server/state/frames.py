@@ -76,6 +76,11 @@ class Globe:
         self._frame = None if center is None else Gnomonic(center)
 
     @property
+    def frame(self) -> Gnomonic | None:
+        """The projection about the centre."""
+        return self._frame
+
+    @property
     def center(self) -> Center | None:
         """The centre."""
         return None if self._frame is None else self._frame.center
@@ -98,18 +103,23 @@ class Globe:
 
 def require_reach(center: Center, field: str, lonlat: Points) -> None:
     """Raise InvalidPlaceError for the first place of a request that a hull with this centre does not reach."""
-    misplaced = out_of_reach(Gnomonic(center), lonlat)
-    if misplaced is not None:
-        raise InvalidPlaceError(field, misplaced.row, misplaced.place, misplaced.problem)
+    _projected(Gnomonic(center), field, lonlat)
 
 
 def require_lines(center: Center, origins: Points, targets: Points) -> None:
     """Raise InvalidPlaceError unless great circles through (k, 2) origins and targets are lines of the projection."""
-    require_reach(center, "origins", origins)
-    require_reach(center, "targets", targets)
     frame = Gnomonic(center)
-    same = (frame.project(origins)[0] == frame.project(targets)[0]).all(axis=1)
+    same = (_projected(frame, "origins", origins) == _projected(frame, "targets", targets)).all(axis=1)
     if same.any():
         row = int(np.argmax(same))
         lon, lat = targets[row].tolist()
         raise InvalidPlaceError("targets", row, (lon, lat), "is the same place as the origin, so there is no line")
+
+
+def _projected(frame: Gnomonic, field: str, lonlat: Points) -> Points:
+    """The projections of places of a request, all of which the hull is to reach."""
+    xy, near = frame.project(lonlat)
+    if not near.all():
+        misplaced = too_far(frame, lonlat, near)
+        raise InvalidPlaceError(field, misplaced.row, misplaced.place, misplaced.problem)
+    return xy

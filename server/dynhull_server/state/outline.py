@@ -9,6 +9,7 @@ from dynhull import DynamicHull
 from dynhull.arrays import Checked, Points, as_points
 from dynhull.globe import Gnomonic, distance
 
+from .numbers import as_numbers
 from .records import Center
 
 Array = npt.NDArray[np.float64]
@@ -50,8 +51,8 @@ class GlobeOutline:
         self._vertices = vertices
         places, _ = self._project(vertices)
         self._hull = DynamicHull(places)
-        order = np.argsort(_as_numbers(places))
-        self._order, self._sorted = order, _as_numbers(places)[order]
+        order = np.argsort(as_numbers(places))
+        self._order, self._sorted = order, as_numbers(places)[order]
 
     def __len__(self) -> int:
         return len(self._vertices)
@@ -105,9 +106,4 @@ class GlobeOutline:
 
     def _given(self, places: Points) -> Points:
         """The vertices at some of their projections, all different."""
-        return self._vertices[self._order[np.searchsorted(self._sorted, _as_numbers(places))]]
-
-
-def _as_numbers(points: Points) -> npt.NDArray[np.complex128]:
-    """One complex number per point, because numpy sorts only scalars."""
-    return np.ascontiguousarray(points).view(np.complex128).ravel()
+        return self._vertices[self._order[np.searchsorted(self._sorted, as_numbers(places))]]

@@ -16,6 +16,7 @@ from ..admission import GREATEST_TIME, admit, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, LimitExceededError, MisfitError
 from ..frames import Globe
+from ..numbers import as_numbers
 from ..records import Center, Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
 from .live import REPLAYED_TOGETHER
 from .multiset import NO_KEYS, apply_points, missing_point
@@ -109,7 +110,7 @@ class Windowed:
         if batch.count_missing or not len(batch.deletes):
             return
         there = self._staying(admitted.clock)
-        rehearsal = DynamicHull(there[np.isin(_as_numbers(there), _as_numbers(batch.deletes))])
+        rehearsal = DynamicHull(there[np.isin(as_numbers(there), as_numbers(batch.deletes))])
         apply_points(rehearsal, batch)
 
     def expires_before(self, admitted: Admitted) -> int | None:
@@ -257,8 +258,3 @@ def _without_pairs(inserts: Points, deletes: Points) -> tuple[RowNumbers, RowNum
             wanted[point] -= 1
             leaving.append(row)
     return np.array(entering, np.intp), np.array(leaving, np.intp)
-
-
-def _as_numbers(points: Points) -> npt.NDArray[np.complex128]:
-    """One complex number per point, because numpy compares only scalars."""
-    return np.ascontiguousarray(points).view(np.complex128).ravel()

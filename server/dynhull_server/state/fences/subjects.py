@@ -134,7 +134,7 @@ class Subjects:
             return [0.0] * len(keys)
         own = isinstance(config.area, HullArea) and config.area.without_self
         vertices = None if area is None else area.state.vertices()
-        if frame_of(self.hull.state) is not None:  # there are no margins
+        if self.hull.state.center is not None:  # there are no margins
             found = np.zeros(len(keys))
             empty = vertices is not None and not len(vertices)
             found[outside] = np.inf if empty else metres(rings_of(config.area, vertices), points[outside])
@@ -223,4 +223,5 @@ def indexed(state: HullState) -> KeyedHull:
 
 def frame_of(state: HullState) -> Gnomonic | None:
     """The projection of the points of a geographic hull that has a centre."""
-    return None if state.center is None else Gnomonic(state.center)
+    globe = state.contents.globe
+    return None if globe is None else globe.frame
