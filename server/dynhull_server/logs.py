@@ -4,6 +4,7 @@ import logging
 import sys
 from typing import Any
 
+import grpc
 import structlog
 
 
@@ -39,4 +40,15 @@ def configure(level: str, form: str, process: str = "") -> None:
             processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *render],
         )
     )
+    handler.addFilter(_concerns_the_server)
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
+
+
+def caller_has_left(error: BaseException | None) -> bool:
+    """Whether gRPC could not send or receive since the call has ended, which it may notice before its cancellation."""
+    return isinstance(error, grpc.aio.InternalError) and str(error).startswith('Failed "execute_batch"')
+
+
+def _concerns_the_server(record: logging.LogRecord) -> bool:
+    """Callers may leave at any time, also while gRPC answers them, which it logs as an error."""
+    return not (record.exc_info and caller_has_left(record.exc_info[1]))

@@ -14,6 +14,7 @@ from google.rpc import code_pb2
 from google.rpc.status_pb2 import Status
 from grpc_status import rpc_status
 
+from ..logs import caller_has_left
 from ..state.errors import LimitExceededError
 from .access import UNAUTHENTICATED_CALLER, Caller, PermissionDeniedError, Rights, UnauthenticatedError
 from .metrics import Metrics
@@ -275,7 +276,10 @@ class Calls:
         except asyncio.CancelledError:
             code = "CANCELLED"
             raise
-        except Exception:
+        except Exception as error:
+            if caller_has_left(error):
+                code = "CANCELLED"
+                raise asyncio.CancelledError from None
             code = "INTERNAL"
             log.exception("a call failed; this is a bug", extra={"method": method})
             await context.abort(grpc.StatusCode.INTERNAL, "internal error, see the server's log")
