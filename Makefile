@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server properties robustness simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server fuzz-gateway properties robustness simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -102,6 +102,9 @@ contract: .venv/.check  ## with a release: the contract that later ones must not
 
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics
+
+fuzz-gateway: .venv/.test  ## many more bad HTTP requests than `make test` sends
+	FUZZ_EXAMPLES=200 $(BIN)/pytest tests/gateway/test_schema.py --timeout 0
 
 robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, leave calls, flip bits, while models check every promise
 	$(BIN)/python tests/robustness/server/torture.py --faults 100

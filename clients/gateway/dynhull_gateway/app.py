@@ -4,6 +4,7 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.middleware.cors import CORSMiddleware
+from pydantic import BaseModel
 
 import dynhull_client
 from dynhull_client import AsyncHullClient
@@ -16,10 +17,11 @@ from .figures import Figures, Measured
 from .gathering import Gatherer
 from .hosts import KnownHosts
 from .ogc import routes as maps
+from .ogc.documents import FeatureCollection, Item
 from .ogc.entities import Snapshots
 from .paths import PathsAsSent
 from .problems import RESPONSES, Problem
-from .schemas import Batch
+from .schemas import Batch, Feature
 from .settings import Settings
 
 DESCRIPTION = """Exact convex hulls of points that are inserted, moved and deleted.
@@ -27,6 +29,8 @@ DESCRIPTION = """Exact convex hulls of points that are inserted, moved and delet
 Every error is an `application/problem+json` (RFC 9457) that names the field, the position and the value at fault. A
 token of the server is sent as `Authorization: Bearer`. Numbers are doubles; there is null where a double is infinite or
 not a number. A slash in the name of a hull or a fence is written `%2F` in a path."""
+# What the descriptions of routes refer to by name.
+REFERRED: tuple[type[BaseModel], ...] = (Problem, Batch, Feature, FeatureCollection, Item)
 SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
 
 
@@ -76,12 +80,15 @@ def description(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         made = FastAPI.openapi(app)
         schemas = made["components"]["schemas"]
-        for model in (Problem, Batch):
+        for model in REFERRED:
             own = model.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas |= {**own.pop("$defs", {}), model.__name__: own}
         for path in made["paths"].values():
             for operation in path.values():
                 operation["responses"].pop("422", None)  # the framework's own; ours are 400
+                for content in operation["responses"].get("200", {}).get("content", {}).values():
+                    if "$ref" in content["schema"]:
+                        content["schema"].pop("type", None)  # "string", the framework's guess
                 if "security" in operation:
                     operation["security"].append({})  # a server without tokens needs none
         for unused in ("HTTPValidationError", "ValidationError"):

@@ -1,8 +1,9 @@
 """Limits on the bodies of requests: how large they may be, and how slowly they may arrive."""
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Collection
 from email.message import Message
+from functools import lru_cache
 from http import HTTPStatus
 
 from starlette.requests import Request
@@ -15,19 +16,25 @@ from .settings import Settings
 WHOLE = (b"", b"application/json", b"application/geo+json")
 
 
-def require_type(request: Request, types: Iterable[str]) -> str:
+def require_type(request: Request, types: Collection[str]) -> str:
     """The media type of a body; ProblemError if it is none of these, or not in UTF-8."""
     given = request.headers.get("content-type", "")
-    message = Message()
-    message["content-type"] = given
-    if given.strip() and message.get_content_type() in types:
-        charset = message.get_content_charset("utf-8")
+    kind, charset = _media_type(given)
+    if kind in types:
         if charset in ("utf-8", "utf8", "us-ascii"):
-            return message.get_content_type()
+            return kind
         detail = f"the body is {charset}: it must be UTF-8"
     else:
         detail = f"the body is {given or 'of no type'}: Content-Type must be {' or '.join(types)}"
     raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, detail, "MEDIA_TYPE", field="Content-Type", value=given)
+
+
+@lru_cache(maxsize=64)
+def _media_type(given: str) -> tuple[str, str]:
+    """The media type and the encoding in a header; an empty type without one."""
+    message = Message()
+    message["content-type"] = given
+    return message.get_content_type() if given.strip() else "", message.get_content_charset("utf-8")
 
 
 class LimitedBodies:

@@ -1,7 +1,9 @@
 """Small changes of many requests, gathered into batches.
 
-While a batch of a hull is on its way, the requests for this hull that arrive meanwhile wait and then go together: many
-callers cost the server few batches, and a single one waits for nobody.
+While batches of a hull are on their way, the requests for this hull that arrive meanwhile wait and then go together:
+many callers cost the server few batches, and a single one waits for nobody. Two are on their way at a time, so that one
+is read and answered while the other is applied. Requests that are not answered have no order, as if each had a
+connection of its own.
 """
 
 import asyncio
@@ -18,6 +20,7 @@ from .schemas import Batch, Key
 
 MOST_ROWS = 8192
 SMALL_ROWS = 1024
+IN_FLIGHT = 2
 
 GATHERED = ({"insert"}, {"insert", "times"}, {"keys", "points"}, {"keys", "points", "times"})
 
@@ -37,7 +40,7 @@ class _Lane:
     """What one caller sends to one hull."""
 
     waiting: deque[_Waiting] = field(default_factory=deque)
-    task: asyncio.Task[None] | None = None
+    tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 def _kind(batch: Batch) -> frozenset[object] | None:
@@ -69,8 +72,10 @@ class Gatherer:
         rows = len(batch.insert or batch.keys or ())
         waiting = _Waiting(batch, kind, rows, asyncio.get_running_loop().create_future())
         lane.waiting.append(waiting)
-        if lane.task is None:
-            lane.task = asyncio.create_task(self._run(client, token, name, lane), name=f"gathering for {name}")
+        if len(lane.tasks) < IN_FLIGHT:
+            task = asyncio.create_task(self._run(client, token, name, lane), name=f"gathering for {name}")
+            lane.tasks.add(task)
+            task.add_done_callback(lane.tasks.discard)
         return await waiting.answer
 
     async def _run(self, client: AsyncHullClient, token: str | None, name: str, lane: _Lane) -> None:
@@ -81,10 +86,10 @@ class Gatherer:
                 together = _next(lane.waiting)
                 await _send(client, name, together)
         finally:
-            del self._lanes[token, name]
-            for each in (*together, *lane.waiting):  # if the task was cancelled: nobody else would answer them
-                if not each.answer.done():
-                    each.answer.set_exception(ProblemError(503, "the gateway stops", "DRAINING"))
+            for each in together:  # if the task was cancelled: nobody else would answer them
+                _fail(each, ProblemError(503, "the gateway stops", "DRAINING"))
+            if not lane.waiting and len(lane.tasks) == 1:
+                self._lanes.pop((token, name), None)
 
 
 def _next(waiting: deque[_Waiting]) -> list[_Waiting]:
@@ -112,8 +117,7 @@ async def _send(client: AsyncHullClient, name: str, together: Sequence[_Waiting]
         )
         if len(together) == 1 or uncertain:
             for each in together:
-                if not each.answer.done():
-                    each.answer.set_exception(error)
+                _fail(each, error)
             return
         middle = len(together) // 2
         await _send(client, name, together[:middle])
@@ -122,6 +126,11 @@ async def _send(client: AsyncHullClient, name: str, together: Sequence[_Waiting]
     for each in together:
         if not each.answer.done():
             each.answer.set_result(answer)
+
+
+def _fail(waiting: _Waiting, error: Exception) -> None:
+    if not waiting.answer.done():
+        waiting.answer.set_exception(error)
 
 
 def _joined(batches: Sequence[Batch]) -> Batch:

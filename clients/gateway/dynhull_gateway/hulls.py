@@ -29,7 +29,12 @@ async def create_hull(client: Caller, hull: schemas.NewHull) -> schemas.HullInfo
     return schemas.HullInfo.model_validate(await client.create_hull(**hull.arguments()))
 
 
-@router.get("/hulls/{name}", response_model=schemas.Hull)
+AS_FEATURE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {GEOJSON: {"schema": {"$ref": "#/components/schemas/Feature"}}}}
+}
+
+
+@router.get("/hulls/{name}", response_model=schemas.Hull, responses=AS_FEATURE)
 async def get_hull(
     client: Caller,
     name: HullPath,

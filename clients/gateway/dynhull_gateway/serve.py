@@ -41,6 +41,7 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
         config = uvicorn.Config(
             app,
             log_config=None,
+            log_level="error",  # bad requests are answered, not logged
             access_log=False,
             lifespan="off",
             server_header=False,

@@ -41,12 +41,19 @@ AfterSequence = Annotated[
 ]
 Conflate = Annotated[bool, Query(description="Leave out events that cancel each other.")]
 
+
+class Described(Response):
+    """What the description of a stream says; an `EventStream` needs more than a status."""
+
+    media_type = EventStream.media_type
+
+
 EVENTS: dict[int | str, dict[str, Any]] = {
     200: {"description": "Events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
 }
 
 
-@router.get("/hulls/{name}/events", response_class=EventStream, responses=EVENTS)
+@router.get("/hulls/{name}/events", response_class=Described, responses=EVENTS)
 async def hull_events(
     request: Request,
     client: Caller,
@@ -72,7 +79,7 @@ async def hull_events(
     return EventStream(texts, state.health, state.figures)
 
 
-@router.get("/fences/{name}/events", response_class=EventStream, responses=EVENTS)
+@router.get("/fences/{name}/events", response_class=Described, responses=EVENTS)
 async def follow_fence(
     request: Request,
     client: Caller,

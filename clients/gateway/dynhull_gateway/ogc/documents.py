@@ -1,16 +1,17 @@
 """What the documents of the standard look like."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.alias_generators import to_camel
+
+from ..schemas import Feature
 
 CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 CONFORMANCE = [
     "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/core",
     "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/geojson",
 ]
-GEOJSON = "application/geo+json"
 JSON = "application/json"
 OPENAPI = "application/vnd.oai.openapi+json;version=3.1"
 
@@ -76,14 +77,10 @@ class Collections(BaseModel):
     collections: list[Collection]
 
 
-class Feature(BaseModel):
-    """A GeoJSON Feature (RFC 7946)."""
+class Item(Feature):
+    """A feature on its own."""
 
-    type: Literal["Feature"]
-    id: str | int
-    geometry: dict[str, Any] | None
-    properties: dict[str, Any]
-    links: list[Link] | None = None
+    links: list[Link]
 
 
 class FeatureCollection(Document):

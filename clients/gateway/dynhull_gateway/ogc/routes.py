@@ -12,26 +12,26 @@ from urllib.parse import quote, urlencode
 
 import numpy as np
 from fastapi import APIRouter, Depends, Path, Query, Request
-from pydantic import BeforeValidator, StringConstraints
+from pydantic import BaseModel, BeforeValidator, StringConstraints
 from starlette.responses import Response
 
 from dynhull_client import AsyncHullClient, HullInfo, HullNotFoundError
 
 from ..callers import Caller, token_of
+from ..hulls import GEOJSON
 from ..hulls import feature as hull_feature
 from ..problems import ProblemError
-from ..schemas import unquoted
+from ..schemas import Feature, unquoted
 from .documents import (
     CONFORMANCE,
-    GEOJSON,
     JSON,
     OPENAPI,
     Collection,
     Collections,
     Conformance,
     Extent,
-    Feature,
     FeatureCollection,
+    Item,
     Landing,
     Link,
     Spatial,
@@ -48,7 +48,12 @@ ROUND = 100
 Segment = Annotated[str, StringConstraints(min_length=1, max_length=300), BeforeValidator(unquoted)]
 CollectionId = Annotated[Segment, Path(description="hulls, or entities:NAME for the keys of a hull.")]
 FeatureId = Annotated[Segment, Path(description="The name of a hull, or a key.")]
-GEO: dict[int | str, dict[str, Any]] = {200: {"content": {GEOJSON: {}}}}
+
+
+def geojson(model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+    """The description of a response of GeoJSON."""
+    schema = {"$ref": f"#/components/schemas/{model.__name__}"}
+    return {200: {"description": "GeoJSON.", "content": {GEOJSON: {"schema": schema}}}}
 
 
 class GeoJson(Response):
@@ -106,7 +111,7 @@ async def describe_collection(request: Request, client: Caller, collection: Coll
     return described
 
 
-@router.get("/collections/{collection}/items", response_model=FeatureCollection, response_class=GeoJson, responses=GEO)
+@router.get("/collections/{collection}/items", response_class=GeoJson, responses=geojson(FeatureCollection))
 async def items(request: Request, client: Caller, collection: CollectionId, page: Annotated[Page, Query()]) -> Response:
     """The features of a collection, in pages: follow the links "next"."""
     name = _hull_of(collection)
@@ -134,14 +139,14 @@ async def items(request: Request, client: Caller, collection: CollectionId, page
         number_returned=len(found.features),
         number_matched=found.matched,
     )
-    return GeoJson(shown.model_dump_json(by_alias=True, exclude={"features": {"__all__": {"links"}}}))
+    unknown = {"number_matched"} if found.matched is None else None
+    return GeoJson(shown.model_dump_json(by_alias=True, exclude=unknown))
 
 
 @router.get(
     "/collections/{collection}/items/{feature_id}",
-    response_model=Feature,
     response_class=GeoJson,
-    responses=GEO,
+    responses=geojson(Item),
     dependencies=PLAIN,
 )
 async def item(request: Request, client: Caller, collection: CollectionId, feature_id: FeatureId) -> Response:
@@ -158,7 +163,7 @@ async def item(request: Request, client: Caller, collection: CollectionId, featu
         _link(request, f"{path}/items/{quote(feature_id, safe='')}", "self", GEOJSON, "This feature"),
         _link(request, path, "collection", JSON, "The collection"),
     ]
-    return GeoJson(Feature.model_validate({**found, "links": links}).model_dump_json())
+    return GeoJson(Item.model_validate({**found, "links": links}).model_dump_json())
 
 
 def _hull_of(collection: str) -> str | None:

@@ -1,0 +1,98 @@
+"""The pages about the gateway: their commands and the page of HTML, run as a reader would run them."""
+
+import functools
+import html
+import re
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+from command_line import dynhull
+from gateway_process import gateway_process
+from patience import PATIENCE
+from peers import program
+from playwright.sync_api import expect, sync_playwright
+from server_process import server_process
+
+ADDRESS = "http://127.0.0.1:8080"
+ORIGIN = "http://127.0.0.1:8000"
+
+
+def commands(site: Path, page: str, first: str) -> list[str]:
+    """The commands of a page that begin so, in order."""
+    text = html.unescape(re.sub(r"<[^>]+>", "", (site / "how-to" / page / "index.html").read_text()))
+    return [line for line in text.splitlines() if re.match(first, line)]
+
+
+def shell(command: str, folder: Path) -> str:
+    done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, check=True, timeout=PATIENCE)
+    return done.stdout
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """The folder over HTTP, as `python3 -m http.server` serves it."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            return
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder)) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.mark.long
+def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], site: Path, tmp_path: Path) -> None:
+    page = take_program("how-to/browser", "index.html")
+    create, put, upload, show, wrong, more = commands(site, "browser", "(curl|printf) ")
+    assert commands(site, "browser", "dynhull gateway") == [f"dynhull gateway --origin {ORIGIN}"]
+    with (
+        server_process() as server,
+        served(tmp_path) as origin,
+        gateway_process(server.address, "--origin", origin) as gateway,
+        sync_playwright() as playwright,
+    ):
+        for each in (create, put, upload):
+            assert "problem" not in shell(each.replace(ADDRESS, gateway.url), tmp_path)
+        assert '"repeated":2' in shell(upload.replace(ADDRESS, gateway.url), tmp_path)
+        assert '"area":6.0' in shell(show.replace(ADDRESS, gateway.url), tmp_path)
+        assert '"pointer":"/points/0/1"' in shell(wrong.replace(ADDRESS, gateway.url), tmp_path)
+        (tmp_path / "index.html").write_text(page.read_text().replace(ADDRESS, gateway.url))
+        browser = playwright.chromium.launch(executable_path=program("chromium"), args=["--no-sandbox"])
+        shown = browser.new_page()
+        shown.goto(origin)
+        state = shown.locator("#state")
+        expect(state).to_have_text("revision 2: 3 vertices", timeout=PATIENCE * 1000)
+        shell(more.replace(ADDRESS, gateway.url), tmp_path)
+        expect(state).to_have_text("revision 3: 4 vertices", timeout=PATIENCE * 1000)
+        assert shown.locator("polygon").get_attribute("points") == "0,0 4,0 4,3 2,4"
+        browser.close()
+
+
+@pytest.mark.long
+def test_a_live_hull_on_a_map(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program("ogrinfo")
+    with server_process() as server, gateway_process(server.address) as gateway:
+        monkeypatch.setenv("DYNHULL_ADDRESS", server.address)
+        for line in commands(site, "qgis", "dynhull (create|put)"):
+            done = dynhull(*line.split()[1:])
+            assert done.exit_code == 0, done.stderr
+        listed, read, written = commands(site, "qgis", "ogr")
+        assert "entities:ships" in shell(listed.replace(ADDRESS, gateway.url), tmp_path)
+        assert "POLYGON ((7.86 53.99,8.58 53.55,9.99 53.54,7.86 53.99))" in shell(
+            read.replace(ADDRESS, gateway.url), tmp_path
+        )
+        shell(written.replace(ADDRESS, gateway.url), tmp_path)
+        assert "Feature Count: 3" in shell("ogrinfo -al -so ships.gpkg", tmp_path)
+        (boxed,) = commands(site, "qgis", "curl")
+        assert '"numberMatched":2' in shell(boxed.replace(ADDRESS, gateway.url), tmp_path)
