@@ -70,8 +70,8 @@ class Composed:
         with call.cutoff():
             message = await call.receive()
         _, _, size = decode.decode_page(request.FromString(message))
-        with call.short():
-            pages = await _together(link.ask(method, call, message) for link in self._relay.links)
+        call.finish()
+        pages = await _together(link.ask(method, call, message) for link in self._relay.links)
         parsed = [response.FromString(page) for page in pages]
         found = sorted((each for page in parsed for each in getattr(page, field)), key=lambda each: each.name)
         more = len(found) > size or any(page.next_page_token for page in parsed)

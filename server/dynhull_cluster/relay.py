@@ -52,8 +52,8 @@ class Relay:
                 return await route(message).ask(method, call, message)
         with call.cutoff():
             message = await call.receive()
-        with call.short():
-            return await route(message).ask(method, call, message)
+        call.finish()
+        return await route(message).ask(method, call, message)
 
     async def read(self, method: str, call: Call) -> None:
         """A call with one request and many responses."""
