@@ -16,9 +16,9 @@ the events to an HTTP endpoint; server, relay and endpoint are processes. Column
 events a second, how many were delivered, and their delay, from the moment at which the message with the move is due to
 the moment at which the endpoint has the event; and the processor time of each process in a second.
 
-stalled: single writes that make events each, alternately without anybody who watches and with watches that never read,
-and a consumer that never acknowledges. Columns: latency of a write, median and 99th percentile, and the growth of the
-server's memory a round.
+stalled: single writes that make events each, in blocks, in pairs: one without anybody who watches, one with watches
+that never read, of consumers that never acknowledge. Columns: latency of a write, median and 99th percentile, and the
+server's memory at the end of the block; and the ratios of the pairs.
 """
 
 import argparse
@@ -51,7 +51,8 @@ LOADED = 8192
 CORNERS = 8
 NO_SNAPSHOTS = 10**12
 AT_ONCE = 64  # fences created at a time
-STALLED, CROSSING, WRITES = 8, 16, 2000  # watches that never read, subjects that cross in a write, writes of a round
+STALLED, CROSSING, WRITES = 8, 16, 500  # watches that never read, subjects that cross in a write, writes of a block
+HISTORY_BYTES = 2**20
 MOVES = 2**18  # of a run, if these limits on its batches allow
 FEWEST, MOST = 16, 2048
 WALKERS, AREAS, PACE, TOGETHER = 10_000, 100, 10, 1000  # subjects, fences, moves a second of each, moves of a message
@@ -71,8 +72,8 @@ def send(address: str, messages: list[bytes]) -> float:
     return asyncio.run(server.stream(address, messages, len(messages), IN_FLIGHT))
 
 
-def started(stack: ExitStack, folder: Path) -> str:
-    options = ["--data", str(folder), "--durability", "sync", "--snapshot-points", str(NO_SNAPSHOTS)]
+def started(stack: ExitStack, folder: Path, *more: str) -> str:
+    options = ["--data", str(folder), "--durability", "sync", "--snapshot-points", str(NO_SNAPSHOTS), *more]
     address = stack.enter_context(durability.serving(*options))
     with durability.service(address) as stub:
         config = hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_INTEGER_KEYS)
@@ -333,42 +334,46 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.1)
 
 
-def stalled(folder: Path, rounds: int) -> None:
-    """Rounds of writes; in every second one, watches are open that are never read."""
+def stalled(folder: Path, pairs: int) -> None:
+    """Blocks of writes in pairs, in one of which watches are open that are never read; either comes first in turn."""
     inside, outside = np.full((CROSSING, 2), 0.5), np.full((CROSSING, 2), 5.0)
     requests = [
         pb.ApplyRequest(name=NAME, batch=area_batch(np.arange(CROSSING), places)) for places in (inside, outside)
     ]
     found: dict[bool, list[tuple[float, float, float]]] = {False: [], True: []}
     with ExitStack() as stack:
-        address = started(stack, folder / "stalled")
+        # Little memory for recent events, which are there in either case: it is full before the first pair.
+        address = started(stack, folder / "stalled", "--fence-history-bytes", str(HISTORY_BYTES))
         stub, channel = stack.enter_context(durability.service(address)), grpc.insecure_channel(address)
         fence_stub = FenceServiceStub(stack.enter_context(channel))
         around = polygon(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float))
         fence_stub.CreateFence(fences.CreateFenceRequest(name="around", config=around))
-        for number in range(-2, 2 * rounds):  # the first two are not counted
-            is_stalled = number % 2 == 1
+        for number in range(-2, 2 * pairs):  # the first two are not counted
+            is_stalled = number % 4 in (1, 2)
             watches = [
                 fence_stub.WatchFence(fences.WatchFenceRequest(name="around", consumer=f"idle-{each}"))
                 for each in range(STALLED if is_stalled else 0)
             ]
-            memory, times = resident(), []
+            times = []
             for write in range(WRITES):
                 begun = time.perf_counter()
                 stub.Apply(requests[write % 2])
                 times.append(time.perf_counter() - begun)
-            grown = resident() - memory
+            times.sort()
+            if number >= 0:
+                found[is_stalled].append((statistics.median(times), times[int(len(times) * 0.99)], resident()))
             for watch in watches:
                 watch.cancel()
-            if number >= 0:
-                times.sort()
-                found[is_stalled].append((statistics.median(times), times[int(len(times) * 0.99)], grown))
-    print("\n| | median | p99 | memory grows by |")
+    print("\n| | median | p99 | memory |")
     print("| --- | ---: | ---: | ---: |")
     for is_stalled, rows in found.items():
-        median, p99, grown = (statistics.median(column) for column in zip(*rows, strict=True))
+        median, p99, memory = (statistics.median(column) for column in zip(*rows, strict=True))
         who = f"with {STALLED} stalled watches" if is_stalled else "without a watch"
-        print(f"| {who} | {median * 1e3:.2f} ms | {p99 * 1e3:.2f} ms | {grown / 2**20:.2f} MB |", flush=True)
+        print(f"| {who} | {median * 1e3:.2f} ms | {p99 * 1e3:.2f} ms | {memory / 2**20:.1f} MB |")
+    both = [np.array(found[is_stalled]) for is_stalled in (True, False)]
+    low, middle, high = np.percentile(both[0] / both[1], [25, 50, 75], axis=0)
+    shown = " | ".join(f"{m:.3f} ({a:.3f} to {b:.3f})" for a, m, b in zip(low, middle, high, strict=True))
+    print(f"| ratio of {pairs} pairs: median, quartiles | {shown} |", flush=True)
 
 
 def area_batch(keys: np.ndarray, places: np.ndarray) -> batch_pb2.Batch:
@@ -439,7 +444,7 @@ def main() -> None:
         if "webhook" in arguments.works:
             webhook(Path(data), arguments.walks)
         if "stalled" in arguments.works:
-            stalled(Path(data), arguments.repeat)
+            stalled(Path(data), 5 * arguments.repeat)
     print(f"\nload average at the end {os.getloadavg()[0]:.1f}")
 
 

@@ -3,8 +3,9 @@
 import asyncio
 import types
 from collections.abc import AsyncIterator, Callable, Coroutine, Generator
-from contextlib import aclosing, asynccontextmanager, suppress
+from contextlib import AbstractContextManager, aclosing, asynccontextmanager, nullcontext, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,15 @@ from live_engine import LIMITS
 from patience import PATIENCE
 
 from dynhull.keys import PackedKeys
+from dynhull_proto.v1 import fence_pb2
+from dynhull_proto.v1 import fence_service_pb2 as fs
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.engine.watch_fence import watch_fence
+from dynhull_server.rpc.access import EVERYTHING, Rights
+from dynhull_server.rpc.fence_service import FenceService
+from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.config import CircleArea, FenceConfig
@@ -112,6 +118,50 @@ async def waited(engine: Engine) -> None:
             await fence.reached(fence.fence.last + 1)
 
 
+class Caller:
+    """A call of the service whose client is slow: each message takes a turn of the loop."""
+
+    access = Rights(EVERYTHING)
+
+    def __init__(self) -> None:
+        self.sent: list[Any] = []
+
+    def cutoff(self) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    async def write_within(self, _: float, message: Any) -> None:
+        await asyncio.sleep(0)
+        self.sent.append(message)
+
+
+async def served(engine: Engine, method: str, request: Any) -> Any:
+    """The answer of the service, or what it has sent."""
+    service, caller = FenceService(engine, Metrics(), max_corners=100, max_watch_lag=PATIENCE), Caller()
+    answer = await getattr(service, method)(request, caller)
+    return caller.sent if answer is None else answer
+
+
+async def watched_by_consumer(engine: Engine) -> None:
+    """A watch of a new consumer that waits for an event that does not come."""
+    request = fs.WatchFenceRequest(name="fence", consumer="mail", progress_interval={"seconds": 60})
+    with suppress(TimeoutError):
+        async with asyncio.timeout(0.05):
+            await served(engine, "WatchFence", request)
+
+
+SETTINGS = fence_pb2.FenceConfig(circle_area={"radius": 5}, subject_hull="fleet")
+
+SERVED: dict[str, tuple[str, Any]] = {
+    "create": ("CreateFence", fs.CreateFenceRequest(name="other", config=SETTINGS)),
+    "replace": ("ReplaceFence", fs.ReplaceFenceRequest(name="fence", config=SETTINGS)),
+    "delete": ("DeleteFence", fs.DeleteFenceRequest(name="other")),
+    "get": ("GetFence", fs.GetFenceRequest(name="fence")),
+    "list": ("ListFences", fs.ListFencesRequest()),
+    "inside": ("ReadInside", fs.ReadInsideRequest(name="fence")),
+    "acknowledge": ("AckFence", fs.AckFenceRequest(name="fence", consumer="mail", sequence=1)),
+    "drop consumer": ("DeleteConsumer", fs.DeleteConsumerRequest(name="fence", consumer="mail")),
+}
+
 CALLS: dict[str, Callable[[Engine], Coroutine[Any, Any, Any]]] = {
     "create": lambda engine: engine.fences.create("other", CIRCLE),
     "delete": lambda engine: engine.fences.delete("other"),
@@ -123,6 +173,11 @@ CALLS: dict[str, Callable[[Engine], Coroutine[Any, Any, Any]]] = {
     "old events": lambda engine: engine.fences.get("fence").events(0, 10),
     "watch": lambda engine: watched(engine, 0, engine.fences.get("fence").fence.last),
     "wait": waited,
+    "served watch": watched_by_consumer,
+    **{
+        f"served {name}": partial(lambda method, request, engine: served(engine, method, request), *call)
+        for name, call in SERVED.items()
+    },
 }
 
 
@@ -140,11 +195,11 @@ async def _life(folder: Path, name: str) -> int:
         await engine.fences.create("fence", replace(CIRCLE, initial="none"))
         fence = engine.fences.get("fence")
         for at in range(1, SUSPENSIONS):
-            if name == "delete" and "other" not in engine.core.fences:
+            if name.endswith("delete") and "other" not in engine.core.fences:
                 await engine.fences.create("other", CIRCLE)
-            if name == "create" and "other" in engine.core.fences:
+            if name.endswith("create") and "other" in engine.core.fences:
                 await engine.fences.delete("other")
-            if name == "drop consumer":
+            if name.endswith(("drop consumer", "served get", "served list")):
                 await fence.acknowledge("mail", 0)
             await put(engine, "a", 1.0)
             await put(engine, "a", 99.0)

@@ -26,6 +26,7 @@ from .target import GoneError, NotDeliveredError, RefusedError, Target
 LONGEST_RETRY_AFTER = 86400.0  # seconds
 FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER = 0.1, 5.0
 SECONDS_BETWEEN_LOOKS = 5.0
+SECONDS_BETWEEN_ACKNOWLEDGEMENTS = 0.2
 
 Result = TypeVar("Result")
 
@@ -191,7 +192,7 @@ class Lane:
         self._log.error("refused: a dead letter now", id=letters[0].id, letters=len(letters), error=reason)
 
     async def _acknowledge(self) -> None:
-        """Acknowledge what is delivered: during one call to the server more is delivered, so calls are few."""
+        """Acknowledge what is delivered, now and then: each acknowledgement is a commit of the server."""
         pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
         while True:
             await self._news.wait()
@@ -199,6 +200,7 @@ class Lane:
             try:
                 await self._acknowledge_now()
                 pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+                await asyncio.sleep(SECONDS_BETWEEN_ACKNOWLEDGEMENTS)
             except (UnavailableError, DeadlineError, OutcomeUnknownError) as error:
                 self._log.warning("not acknowledged, trying again", error=str(error))
                 self._news.set()
