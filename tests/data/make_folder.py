@@ -1,6 +1,6 @@
 """Write a data folder with the installed version: a fixture for the versions after it, which must open it.
 
-    python tests/data/make_folder.py tests/data/format4
+    python tests/data/make_folder.py tests/data/format6
 
 By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
 the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
@@ -14,6 +14,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 from pathlib import Path
 
 import grpc
@@ -102,13 +103,32 @@ def fill_fences(client):
     client.put("vans", ["van é1", "van é3"], [[9.5, 4], [-9, -9]], times=[MOMENT + SECOND] * 2)
     client.put("vans", ["van é1", "van é5"], [[10.5, 4], [1, 1]], times=[MOMENT + 2 * SECOND] * 2)
     client.ack_fence("gate", "relay", 2)
+    # A subject that waits for its event, and a fence that has dropped some.
+    client.create_fence("late", area=Circle(0, 0, 1), subjects="vans", confirmations=3)
+    client.put("vans", ["van é7"], [[0, 0.5]], times=[MOMENT + 3 * SECOND])
+    client.create_fence("short", area=Circle(50, 50, 1), subjects="vans", max_events=2)
+    for second in range(4, 11):
+        client.put("vans", ["van é6"], [[50 * (second % 2), 50]], times=[MOMENT + second * SECOND])
+    while client.get_fence("short").first_sequence == 1:
+        continue
+
+
+def events(client, fence):
+    """The events that are kept, from a durable consumer's view."""
+    with client.watch_fence(fence.name, after=0) as watch:
+        return [
+            [event.sequence, event.type, event.hull, event.key and str(event.key), event.position, event.distance]
+            for event in islice(watch, fence.last_sequence - fence.first_sequence + 1)
+        ]
 
 
 def export_fences(client, target):
     found = {
         fence.name: {
             "inside": {each.hull: list(map(str, each.keys)) for each in client.fence_inside(fence.name).subjects},
+            "first": fence.first_sequence,
             "last": fence.last_sequence,
+            "events": events(client, fence),
             "consumers": {each.name: each.acknowledged for each in fence.consumers},
         }
         for fence in client.list_fences()
