@@ -164,7 +164,7 @@ class CoreServer:
         numbers = [row.number for row in contents.hulls]
         for row, kept in zip(contents.hulls, storage.read_each(numbers), strict=True):
             self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
-        fences = [storage.read_fence(row.number) for row in contents.fences]
+        fences = storage.read_fences([row.number for row in contents.fences])
         self.core.restore_fences([each for each in fences if each is not None])
         threads: Any = NoThreads()
         self._commits = GroupCommit(storage, threads, Clock(), lambda _: None, lambda _: None)
@@ -211,7 +211,9 @@ class CoreServer:
             case Examine():
                 self._settle(effect)
             case Stir():
-                for fence, events in effect.stirred:
+                made = {} if effect.events is None else effect.events.by_fence()
+                for fence in effect.fences:
+                    events = made.get(fence.number, ())
                     self.schedule.note((fence.row.uid, [event[:5] for event in events]))
             case Retry():
                 self._pauses.append(effect.ticket)
@@ -249,7 +251,7 @@ class CoreServer:
             for number, load in effect.hulls:
                 row = self._storage.row(number)
                 states.append(load(self._storage.read(number)) if row else None)
-            fences = [self._storage.read_fence(number) for number in effect.fences]
+            fences = self._storage.read_fences(effect.fences)
             restored = None if effect.restore is None else effect.restore(states, fences)
             event = Examined(effect.ticket, states, fences, restored)
         except Exception as error:
@@ -367,12 +369,12 @@ class CoreServer:
         """Read events as a watch does."""
         fence = self.core.fence(op["name"])
         asked = self.model.ask(PREFIX + op["name"])
-        events = fence.recent(after, op["most"])
+        events = fence.events(after, op["most"])
         if events is None:
             try:
                 events = self._storage.read_events(fence.number, after, op["most"])
             except KeyError:  # deleted meanwhile
-                events = fence.recent(fence.oldest_recent - 1, op["most"]) or []
+                events = fence.events(fence.oldest_recent - 1, op["most"]) or []
             except (OSError, MemoryError) as error:
                 raise NotStoredError(str(error)) from error
         sent = following(after, events, fence.first)

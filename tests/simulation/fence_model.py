@@ -142,19 +142,23 @@ class FenceModel:
             before: the hulls that have changed, by name, with their revisions before.
         """
         by_fence: dict[int, list[Any]] = {}
+        made: dict[int, list[FenceEvent]] = {}
         for change in changes:
+            if isinstance(change, AppendEvents):
+                for number, events in change.block.by_fence().items():
+                    by_fence.setdefault(number, [])
+                    made.setdefault(number, []).extend(events)
+                continue
             number = change.row.number if isinstance(change, AddFence | ChangeFence) else change.number
             by_fence.setdefault(number, []).append(change)
-        made: dict[int, list[FenceEvent]] = {}
         for number, of_fence in by_fence.items():
-            events = [event for change in of_fence if isinstance(change, AppendEvents) for event in change.events]
-            made[number] = self._numbered(number, of_fence, events)
+            made[number] = self._numbered(number, of_fence, made.get(number, []))
         self._revised(before, made)
         for number, of_fence in by_fence.items():
             fence = self.ever[number]
             fence.events += made[number]
             self._drop(fence, of_fence)
-            if isinstance(of_fence[-1], DropFence):
+            if of_fence and isinstance(of_fence[-1], DropFence):
                 self._deleted(fence)
         for fence in self.alive.values():
             for name, (truth, revision) in before.items():
@@ -168,12 +172,12 @@ class FenceModel:
 
     def _numbered(self, number: int, changes: list[Any], events: list[FenceEvent]) -> list[FenceEvent]:
         """The new events of a fence, if their numbers and times are in order; those of new settings are explained."""
-        first = changes[0]
+        first = changes[0] if changes else None
         if isinstance(first, AddFence):
             self._added(first.row)
         fence = self.ever.get(number)
         if fence is None or fence.deleted is not None:
-            raise self._model.finds(f"{first} is kept of a fence that is not there")
+            raise self._model.finds(f"{first or events} are kept of a fence that is not there")
         sequences = [event.sequence for event in events]
         if sequences != list(range(fence.last + 1, fence.last + 1 + len(events))):
             raise self._model.finds(f"events {sequences} of {fence.row.name} are kept after {fence.last}")

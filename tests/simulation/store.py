@@ -127,11 +127,11 @@ class FaultyStorage:
         self._fail("oldest")
         return self._inner.oldest(number)
 
-    def read_fence(self, number: int) -> KeptFence | None:
-        """A fence."""
+    def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
+        """Fences."""
         self.give_way()
         self._fail("read")
-        kept = self._inner.read_fence(number)
+        kept = self._inner.read_fences(numbers)
         self.give_way()
         return kept
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.fences.config import FenceConfig, PolygonArea
+from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.records import (
     AddFence,
     AppendEvents,
@@ -102,12 +103,22 @@ def events(first, last):
     return [event(sequence) for sequence in range(first, last + 1)]
 
 
+def appended(number, made):
+    """The change that adds events of one fence."""
+    return AppendEvents(block_of({number: made}))
+
+
+def read_fence(storage, number):
+    (fence,) = storage.read_fences([number])
+    return fence
+
+
 def fill_fence(storage, last, number=9, hull="fleet"):
     """A fence with a commit for each event, a consumer, a delay, and one who was inside from the beginning."""
     inside = Inside(0, (Members(hull, PackedKeys.pack(["a"]), 1),))
     storage.commit([AddFence(fence_row(number, hull=hull), inside)])
     for each in events(1, last):
-        storage.commit([AppendEvents(number, [each])])
+        storage.commit([appended(number, [each])])
     storage.commit([PutConsumer(number, Consumer("mail", 1, 0))])
     storage.commit([PutDelays(number, {(hull, "é"): Delay(True, 2**50, 1, int(Cause.MOVED))})])
 

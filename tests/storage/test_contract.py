@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from folders import event, events, fence_row, fill_fence, same
+from folders import appended, event, events, fence_row, fill_fence, read_fence, same
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.fences.records import (
     NO_WAITS,
     AddFence,
-    AppendEvents,
     ChangeFence,
     Consumer,
     Delay,
@@ -472,16 +471,16 @@ def fenced(opened, last, number=9):
 
 
 def inside_of(opened, number=9):
-    kept = opened.storage.read_fence(number)
+    kept = read_fence(opened.storage, number)
     return {each.hull: list(each.keys) for each in kept.inside.members}
 
 
 def test_a_fence_comes_back_with_its_events(opened):
     assert opened.contents.fences == []
     fenced(opened, 3)
-    opened.commit(AppendEvents(9, events(4, 6)), PutConsumer(9, Consumer("mail", 5, 2)))
+    opened.commit(appended(9, events(4, 6)), PutConsumer(9, Consumer("mail", 5, 2)))
     for _ in range(2):
-        kept = opened.storage.read_fence(9)
+        kept = read_fence(opened.storage, 9)
         assert kept.row == fence_row()
         assert kept.events == events(1, 6)
         assert (kept.first, kept.last, kept.consumers) == (1, 6, {"mail": Consumer("mail", 5, 2)})
@@ -491,7 +490,7 @@ def test_a_fence_comes_back_with_its_events(opened):
         opened.reopen()
         assert opened.contents.fences == [fence_row()]
         assert opened.contents.next_number == 10
-    assert opened.storage.read_fence(1) is None
+    assert read_fence(opened.storage, 1) is None
 
 
 def test_all_kinds_of_events_come_back(opened):
@@ -505,8 +504,8 @@ def test_all_kinds_of_events_come_back(opened):
     ]
     kinds[0] = kinds[0]._replace(inside=members)
     fenced(opened, 0)
-    opened.commit(AppendEvents(9, kinds))
-    same(opened.reopen().storage.read_fence(9).events[0].inside[0].keys.data, members[0].keys.data)
+    opened.commit(appended(9, kinds))
+    same(read_fence(opened.reopen().storage, 9).events[0].inside[0].keys.data, members[0].keys.data)
     found = opened.storage.read_events(9, 0, 10)
     assert found[1:] == kinds[1:]
     assert [(each.hull, list(each.keys), each.revision) for each in found[0].inside] == [
@@ -520,7 +519,7 @@ def test_who_is_inside_replaces_earlier_events(opened):
     members = (Members("fleet", PackedKeys.pack(f"key {i:05}" for i in range(40_000)), 4),)
     opened.carry_out(opened.storage.inside(9, Inside(4, members, 2**61)))
     for _ in range(2):
-        kept = opened.storage.read_fence(9)
+        kept = read_fence(opened.storage, 9)
         assert (kept.inside.sequence, kept.inside.time, kept.events, kept.first) == (4, 2**61, events(5, 6), 1)
         assert [key for each in kept.inside.members for key in each.keys] == list(members[0].keys)
         opened.reopen()
@@ -528,7 +527,8 @@ def test_who_is_inside_replaces_earlier_events(opened):
     opened.commit(DropEvents(9, 5))
     for _ in range(2):
         assert opened.storage.read_events(9, 0, 10) == events(5, 6)
-        assert opened.storage.read_fence(9).first == 5
+        assert opened.storage.read_events(9, 0, 1) == events(5, 5)
+        assert read_fence(opened.storage, 9).first == 5
         opened.reopen()
 
 
@@ -538,7 +538,7 @@ def test_since_when_who_is_inside_waits_comes_back(opened):
     integers = Members("b", np.array([2, 2**63], np.uint64), 5, np.array([NO_TIME, 2**62]))
     opened.carry_out(opened.storage.inside(9, Inside(2, (strings, integers, Members("c", PackedKeys.pack(["a"]), 6)))))
     for _ in range(2):
-        kept = opened.storage.read_fence(9).inside.members
+        kept = read_fence(opened.storage, 9).inside.members
         found = {each.hull: [] for each in kept}
         for each in kept:
             found[each.hull] += [None] if each.since is None else each.since.tolist()
@@ -552,24 +552,24 @@ def test_since_when_a_fence_asks_for_how_long_comes_back(opened):
         changed = replace(fence_row(), config=replace(fence_row().config, dwell=waits.time), waits=waits)
         opened.commit(ChangeFence(changed))
         for _ in range(2):
-            assert opened.storage.read_fence(9).row == changed
+            assert read_fence(opened.storage, 9).row == changed
             opened.reopen()
 
 
 def test_delays_come_back_until_they_end(opened):
     fenced(opened, 2)
-    first = opened.storage.read_fence(9).delays
+    first = read_fence(opened.storage, 9).delays
     assert list(first) == [("fleet", "é")]
     some = {("fleet", "b"): Delay(False, -1, 0, 255), ("b", 2**64 - 1): Delay(True, 2**62, 2**32 - 1, 0)}
     opened.commit(PutDelays(9, some), PutDelays(9, {("fleet", "é"): None, ("b", 7): None}))
     for _ in range(2):
-        assert opened.storage.read_fence(9).delays == some
+        assert read_fence(opened.storage, 9).delays == some
         opened.reopen()
     opened.commit(PutDelays(9, {("b", 2**64 - 1): Delay(True, 3, 2, 1)}))
     opened.commit(PutDelays(9, {("fleet", "b"): None, ("fleet", "é"): Delay(True, 4, 1, 1)}))
     opened.commit(PutDelays(9, {("fleet", "é"): None}))
     for _ in range(2):
-        assert opened.storage.read_fence(9).delays == {("b", 2**64 - 1): Delay(True, 3, 2, 1)}
+        assert read_fence(opened.storage, 9).delays == {("b", 2**64 - 1): Delay(True, 3, 2, 1)}
         opened.reopen()
 
 
@@ -578,20 +578,20 @@ def test_settings_and_consumers_of_a_fence_change(opened):
     changed = replace(fence_row(), config=replace(fence_row().config, margin=0.0, max_events=7))
     opened.commit(ChangeFence(changed), PutConsumer(9, Consumer("post")), DropConsumer(9, "mail"))
     for _ in range(2):
-        kept = opened.storage.read_fence(9)
+        kept = read_fence(opened.storage, 9)
         assert (kept.row, kept.consumers) == (changed, {"post": Consumer("post")})
         opened.reopen()
 
 
 def test_a_deleted_fence_leaves_nothing(opened):
     fenced(opened, 3)
-    opened.commit(AppendEvents(9, events(4, 4)), DropFence(9))
+    opened.commit(appended(9, events(4, 4)), DropFence(9))
     fenced(opened, 1, number=10)
     opened.carry_out(opened.storage.sweep())
     assert opened.carry_out(opened.storage.inside(9, Inside(3))) <= 1
     for _ in range(2):
-        assert opened.storage.read_fence(9) is None
-        assert opened.storage.read_fence(10).events == events(1, 1)
+        assert read_fence(opened.storage, 9) is None
+        assert read_fence(opened.storage, 10).events == events(1, 1)
         assert opened.contents.next_number in (1, 11)
         opened.reopen()
 
@@ -600,9 +600,9 @@ def test_a_deleted_fence_leaves_nothing(opened):
     "change",
     [
         AddFence(fence_row(), Inside()),
-        AppendEvents(9, events(2, 3)),
-        AppendEvents(9, events(4, 4)),
-        AppendEvents(8, events(1, 1)),
+        appended(9, events(2, 3)),
+        appended(9, events(4, 4)),
+        appended(8, events(1, 1)),
         ChangeFence(fence_row(8)),
         DropFence(8),
         PutConsumer(8, Consumer("mail")),
@@ -611,8 +611,8 @@ def test_a_deleted_fence_leaves_nothing(opened):
 def test_changes_of_fences_that_do_not_fit_are_refused(opened, change):
     fenced(opened, 2)
     with pytest.raises(NotCommittedError):
-        opened.commit(AppendEvents(9, events(3, 3)), PutConsumer(9, Consumer("post")), change, change)
+        opened.commit(appended(9, events(3, 3)), PutConsumer(9, Consumer("post")), change, change)
     for _ in range(2):
-        kept = opened.storage.read_fence(9)
+        kept = read_fence(opened.storage, 9)
         assert (kept.events, list(kept.consumers)) == (events(1, 2), ["mail"])
         opened.reopen()

@@ -7,7 +7,7 @@ import sqlite3
 import numpy as np
 import pytest
 from command_line import dynhull
-from folders import DATABASE, OLD_FOLDERS, append, opened, same, snapshot
+from folders import DATABASE, OLD_FOLDERS, append, opened, read_fence, same, snapshot
 from test_faults import FaultyDisk, failure
 
 from dynhull.keys import PackedKeys
@@ -219,7 +219,7 @@ def test_a_folder_of_format_4_has_every_fence(folder, name):
         assert contents.notes == []
         found = {}
         for row in contents.fences:
-            kept = storage.read_fence(row.number)
+            kept = read_fence(storage, row.number)
             inside = {hull: sorted(keys) for hull, keys in members_after(kept).items() if keys}
             consumers = {each: consumer.acknowledged for each, consumer in kept.consumers.items()}
             found[row.name] = {"inside": inside, "last": kept.last, "consumers": consumers}

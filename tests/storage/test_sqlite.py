@@ -16,6 +16,7 @@ from folders import (
     flip,
     killed,
     opened,
+    read_fence,
     record,
     records,
     same,
@@ -23,7 +24,9 @@ from folders import (
     stopped,
 )
 
+from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
+from dynhull_server.state.fences.records import DropEvents, Inside, Members
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept, Window
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
@@ -170,7 +173,10 @@ def test_a_foreign_value_in_any_column_is_refused_or_repaired_with_a_note(folder
         storage.commit([step])
     append(storage, 4, 6)
     fill_fence(storage, 4)
-    kept, fence = [points_of(storage, number) for number in (1, 2)], storage.read_fence(9)
+    for step in storage.inside(9, Inside(2, (Members("fleet", PackedKeys.pack(["a"]), 2),))):
+        storage.commit([step])
+    storage.commit([DropEvents(9, 3)])
+    kept, fence = [points_of(storage, number) for number in (1, 2)], read_fence(storage, 9)
     storage.close()
     with closing(sqlite3.connect(folder / DATABASE)) as database:
         columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
@@ -193,7 +199,7 @@ def test_a_foreign_value_in_any_column_is_refused_or_repaired_with_a_note(folder
         if not contents.notes:
             for number, expected in enumerate(kept, start=1):
                 np.testing.assert_array_equal(points_of(storage, number), expected)
-            assert storage.read_fence(9) == fence
+            assert read_fence(storage, 9) == fence
         storage.close()
     assert damaged >= 2 * len(columns)
 

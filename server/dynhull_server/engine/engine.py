@@ -184,7 +184,7 @@ class Engine:
         return loaded
 
     def _restore_fences(self, contents: Contents) -> None:
-        kept = [self._storage.read_fence(row.number) for row in contents.fences]
+        kept = self._storage.read_fences([row.number for row in contents.fences])
         self._core.restore_fences([each for each in kept if each is not None])
 
     def keep_house(self, snapshot_points: int, sync_seconds: float | None) -> None:
@@ -382,7 +382,7 @@ class Engine:
             case Examine():
                 self._examine(effect)
             case Stir():
-                self.fences.stir(effect.stirred)
+                self.fences.stir(effect.fences, effect.events)
             case Retry():
                 self._supervisor.failed("examination", effect.reason)
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))
@@ -431,7 +431,7 @@ class Engine:
         def examined() -> Event:
             try:
                 states = [self._stored(number, load) for number, load in effect.hulls]
-                fences = [self._storage.read_fence(number) for number in effect.fences]
+                fences = self._storage.read_fences(effect.fences)
                 restored = None if effect.restore is None else effect.restore(states, fences)
                 return Examined(effect.ticket, states, fences, restored)
             except Exception as error:  # no error may end the trip

@@ -7,8 +7,11 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
 from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError
 from ..state.fences.config import FenceConfig
+from ..state.fences.event_block import EventBlock
 from ..state.fences.fence import Fence
 from ..state.fences.fence_leg import members
 from ..state.fences.records import Consumer, EventType, FenceEvent, Inside
@@ -88,14 +91,14 @@ class LiveFence:
         Raises:
             NotStoredError: the storage cannot be read.
         """
-        found = self.fence.recent(after, most)
+        found = self.fence.events(after, most)
         if found is not None:
             return found
         try:
             read = partial(self._storage.read_events, self.fence.number, after, most)
             events: list[FenceEvent] = await self._engine.run(self._engine.disk, read)
         except KeyError:  # deleted meanwhile: what is left of it is in memory
-            return self.fence.recent(self.fence.oldest_recent - 1, most) or []
+            return self.fence.events(self.fence.oldest_recent - 1, most) or []
         except (StorageError, OSError, MemoryError) as error:
             raise NotStoredError(str(error)) from error
         return events
@@ -189,11 +192,14 @@ class Fences:
             raise FenceNotFoundError(name)
         await self._engine.ask(DeleteFence(Waiter(), name, self._engine.time(), rows=fence.inside))
 
-    def stir(self, stirred: Sequence[tuple[Fence, list[FenceEvent]]]) -> None:
+    def stir(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
         """Count the events of fences, and wake those who watch these."""
-        for fence, events in stirred:
-            self.events.update(event.type for event in events)
-            self.stirred[fence] = None
+        if events is not None:
+            for kind, count in enumerate(np.bincount(events.types).tolist()):
+                if count:
+                    self.events[EventType(kind)] += count
+        self.stirred.update(dict.fromkeys(fences))
+        for fence in fences:
             live = self._live.get(fence)
             if live is not None:
                 live.moved()

@@ -57,5 +57,5 @@ def _age(live: LiveFence, now: int) -> float:
     """The age in seconds of the oldest event of the largest backlog, as far as it is in memory."""
     fence = live.fence
     after = max(fence.last - _backlog(live), fence.oldest_recent - 1)
-    events = fence.recent(after, 1)
+    events = fence.events(after, 1)
     return max(now - events[0].time, 0) / MICROSECONDS if events else 0.0

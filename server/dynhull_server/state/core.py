@@ -68,6 +68,7 @@ from .fences.line import Line
 from .fences.line_trip import MOST_DUE, Ground, LineTrip
 from .fences.pair import Pair
 from .fences.queues import SPANNING, components, depends_on, merged
+from .fences.recent import RecentEvents
 from .fences.requests import (
     PREFIX,
     STRUCTURAL,
@@ -167,6 +168,7 @@ class Core:
         self._fences: SortedDict[str, Fence] = SortedDict()
         # The prefixes of fences, by the names of their queues; also of those that are being created.
         self._prefixes: dict[str, str] = {}
+        self._recent = RecentEvents(limits.fences.fence_history_bytes)
         self._creating = self._fencing = 0
         self._first_order = self._last_order = 0
         self._trips = 0
@@ -308,7 +310,7 @@ class Core:
         """Add the fences that the storage has kept. Call this after `restore`, and before the first step."""
         subjects: dict[str, Subjects] = {}
         for each in kept:
-            fence = Fence(each.row, self._limits.fences.fence_history_bytes)
+            fence = Fence(each.row)
             fence.restored(each)
             config = each.row.config
             fence.area = None if config.area_hull is None else self.get(config.area_hull)
@@ -858,7 +860,13 @@ class Core:
 
     def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
         """Publish what a trip has committed of fences, and join or part the queues."""
+        events = trip.events
+        fences = {leg.fence.number: leg.fence for leg in trip.fence_legs.values()}
         stirred = []
+        for fence, told in trip.log.fences():
+            fences[fence.number] = fence
+            fence.told(told)
+            stirred.append(fence)
         moved = any(leg.area is not leg.fence.area for leg in trip.fence_legs.values())
         trip.dismiss()
         for leg in trip.fence_legs.values():
@@ -875,9 +883,12 @@ class Core:
                 for subjects in fence.subjects.values():
                     subjects.dropped(fence)
             if leg.events or changed:
-                stirred.append((fence, leg.events))
+                stirred.append(fence)
+        if events is not None:
+            of_runs = [fences[number] for number in events.fences.tolist()]
+            self._recent.add(events, of_runs, len(self._fences))
         if stirred:
-            effects.append(Stir(stirred))
+            effects.append(Stir(stirred, events))
         if trip.structural:
             self._rejoin(trip, moved=moved)
 

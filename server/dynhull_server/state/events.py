@@ -10,8 +10,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .batch import Batch, KeyedBatch
+    from .fences.event_block import EventBlock
     from .fences.fence import Fence
-    from .fences.records import FenceEvent, KeptFence
+    from .fences.records import KeptFence
     from .fences.restoring import Restored
     from .hull import Hull
     from .hull_state import HullState
@@ -347,9 +348,15 @@ class Reply:
 
 @dataclass(slots=True)
 class Stir:
-    """Wake the watchers of these fences, which have new events."""
+    """Wake the watchers of these fences, which have new events or settings.
 
-    stirred: "list[tuple[Fence, list[FenceEvent]]]"
+    Attributes:
+        fences: the fences.
+        events: their new events; None for none.
+    """
+
+    fences: "list[Fence]"
+    events: "EventBlock | None"
 
 
 Effect = Compute | Commit | Examine | Retry | Reply | Stir

@@ -122,16 +122,18 @@ class MemoryStorage:
         """No steps: deletes leave nothing behind."""
         return iter(())
 
-    def read_fence(self, number: int) -> KeptFence | None:
-        """A fence as last committed; DamagedError if its hulls were not kept."""
+    def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
+        """Fences as last committed; DamagedError if their hulls were not kept."""
         with self._turn:
-            fence = self._fences.get(number)
-            if fence is None:
-                return None
-            if not self.keeps:
-                raise DamagedError(f"who is inside of {fence.row.name} was not kept")
-            events = [event for event in fence.events if event.sequence > fence.inside.sequence]
-            return replace(fence, events=events, consumers=dict(fence.consumers), delays=dict(fence.delays))
+            return [self._kept(self._fences.get(number)) for number in numbers]
+
+    def _kept(self, fence: KeptFence | None) -> KeptFence | None:
+        if fence is None:
+            return None
+        if not self.keeps:
+            raise DamagedError(f"who is inside of {fence.row.name} was not kept")
+        events = [event for event in fence.events if event.sequence > fence.inside.sequence]
+        return replace(fence, events=events, consumers=dict(fence.consumers), delays=dict(fence.delays))
 
     def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
         """Events of a fence."""
@@ -191,9 +193,11 @@ class MemoryStorage:
         for change in changes:
             if not isinstance(change, FENCE_CHANGES):
                 continue
+            if isinstance(change, AppendEvents):
+                self._examine_events(change, last)
+                continue
             number = change.row.number if isinstance(change, AddFence | ChangeFence) else change.number
-            there = self._fences.get(number)
-            before = last.get(number, None if there is None else there.last)
+            before = self._last_event(number, last)
             if isinstance(change, AddFence):
                 if before is not None:
                     raise NotCommittedError(f"fence {number} already exists")
@@ -203,11 +207,25 @@ class MemoryStorage:
                 raise NotCommittedError(f"there is no fence {number}")
             if isinstance(change, DropFence):
                 last[number] = None
-            elif isinstance(change, AppendEvents):
-                sequences = [event.sequence for event in change.events]
-                if sequences != list(range(before + 1, before + 1 + len(sequences))):
-                    raise NotCommittedError(f"events {sequences} of fence {number} do not follow {before}")
-                last[number] = before + len(sequences)
+
+    def _examine_events(self, change: AppendEvents, last: dict[int, int | None]) -> None:
+        block = change.block
+        for number, first, count in zip(
+            block.fences.tolist(), block.firsts.tolist(), block.counts.tolist(), strict=True
+        ):
+            before = self._last_event(number, last)
+            if before is None:
+                raise NotCommittedError(f"there is no fence {number}")
+            if first != before + 1:
+                raise NotCommittedError(f"event {first} of fence {number} does not follow {before}")
+            last[number] = before + count
+
+    def _last_event(self, number: int, changed: Mapping[int, int | None]) -> int | None:
+        """The last event of a fence, None if it does not exist."""
+        if number in changed:
+            return changed[number]
+        fence = self._fences.get(number)
+        return None if fence is None else fence.last
 
     def _last(self, number: int, changed: Mapping[int, int | None]) -> int | None:
         """The last revision of a hull, None if it does not exist."""
@@ -237,7 +255,10 @@ class MemoryStorage:
                 del self._fences[change.number]
             case ChangeFence():
                 self._fences[change.row.number].row = change.row
-            case AppendEvents() | PutDelays() | DropEvents() | PutConsumer() | DropConsumer():
+            case AppendEvents():
+                for number, events in change.block.by_fence().items():
+                    self._fences[number].events += events
+            case PutDelays() | DropEvents() | PutConsumer() | DropConsumer():
                 self._change(self._fences[change.number], change)
 
     def _append(self, change: Append) -> None:
@@ -245,12 +266,8 @@ class MemoryStorage:
         hull.last = change.records[-1].revision
         hull.records += change.records
 
-    def _change(
-        self, fence: KeptFence, change: AppendEvents | PutDelays | DropEvents | PutConsumer | DropConsumer
-    ) -> None:
+    def _change(self, fence: KeptFence, change: PutDelays | DropEvents | PutConsumer | DropConsumer) -> None:
         match change:
-            case AppendEvents():
-                fence.events += change.events
             case PutDelays():
                 for subject, delay in change.delays.items():
                     if delay is None:

@@ -140,8 +140,8 @@ class Storage(Protocol):
     def sweep(self) -> Iterator["Step"]:
         """Drop the rows of deleted hulls and unfinished snapshots, in the same way. Run only one sweep at a time."""
 
-    def read_fence(self, number: int) -> KeptFence | None:
-        """A fence as last committed, with the events that follow who was inside; None if no fence has that number.
+    def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
+        """Fences as last committed, with the events that follow who was inside; None where no fence has that number.
 
         Raises:
             DamagedError: the data is damaged.

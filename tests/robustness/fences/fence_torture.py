@@ -84,7 +84,7 @@ class Torture:
         for row in contents.hulls:
             kept = self.storage.read(row.number)
             self.core.restore(row, HullState(LIMITS, row.settings, kept, 0.0), 0)
-        self.core.restore_fences([self.storage.read_fence(row.number) for row in contents.fences])
+        self.core.restore_fences(self.storage.read_fences([row.number for row in contents.fences]))
         self.commits: list[Commit] = []
         self.computing: list[Any] = []
         self.waiting: list[Any] = []
@@ -133,7 +133,7 @@ class Torture:
             None if self.storage.row(number) is None else load(self.storage.read(number))
             for number, load in effect.hulls
         ]
-        fences = [self.storage.read_fence(number) for number in effect.fences]
+        fences = self.storage.read_fences(effect.fences)
         restored = None if effect.restore is None else effect.restore(states, fences)
         self.counts["examined"] += 1
         self.later = partial(self.dispatch, Examined(effect.ticket, states, fences, restored))
@@ -233,7 +233,7 @@ class Torture:
                 assert same(one, other), (name, fence.config, one, other)
             self.checked[name] = row.uid, fence.last
             if self.counts["commits"] % 50 == 0:
-                kept = self.storage.read_fence(row.number)
+                (kept,) = self.storage.read_fences([row.number])
                 assert {key: each.acknowledged for key, each in kept.consumers.items()} == fence.consumers
 
     def compare_inside(self) -> None:

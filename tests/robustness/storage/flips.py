@@ -28,6 +28,7 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.fences.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.records import (
     AddFence,
     AppendEvents,
@@ -163,7 +164,7 @@ class Builder:
             self.storage.commit([AddFence(FENCE_ROW, inside)])
         made = [fence_event(len(events) + i + 1) for i in range(1 + turn % 3)]
         consumer = PutConsumer(FENCE, Consumer("mail", turn, 0))
-        self.storage.commit([AppendEvents(FENCE, made), consumer])
+        self.storage.commit([AppendEvents(block_of({FENCE: made})), consumer])
         events += made
         if turn == 2:
             members = Members("hull 2", PackedKeys.pack(["a"]), 5)
@@ -321,7 +322,7 @@ def difference(storage: SQLiteStorage, acknowledged: Acknowledged) -> str:
     """How the storage differs from what was acknowledged; empty where it does not."""
     for number, records in acknowledged.items():
         if number == FENCE:
-            fence = storage.read_fence(FENCE)
+            (fence,) = storage.read_fences([FENCE])
             if fence is None or fence.row != FENCE_ROW or fence.consumers != {"mail": Consumer("mail", 4, 0)}:
                 return f"the fence is {fence}"
             if storage.read_events(FENCE, 0, 10**6) != records or fence.last != len(records):

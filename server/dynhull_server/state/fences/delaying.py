@@ -10,7 +10,8 @@ from dynhull.keys import key_list, take_keys
 
 from ..contents.live import AnyKeyedHull
 from ..records import KeyRows
-from .fence_leg import FenceLeg, Swap, caused
+from .event_log import Swap
+from .fence_leg import FenceLeg, caused
 from .records import Cause, Delay, EventType, Key, Subject
 from .subjects import Subjects, keyed
 

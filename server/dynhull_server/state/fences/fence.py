@@ -1,7 +1,6 @@
 """A fence as clients see it: its committed state, and recent events."""
 
-from collections import deque
-from itertools import islice
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dynhull.keys import key_list
@@ -9,15 +8,14 @@ from dynhull.keys import key_list
 from ..records import NO_TIME, Keys
 from .delays import Delays
 from .dwelling import Dwelling, dwelling_after
+from .recent import RecentRuns
 from .records import Consumer, FenceEvent, FenceRow, KeptFence
 
 if TYPE_CHECKING:
     from ..hull import Hull
+    from .event_log import Told
     from .pair import Pair
     from .subjects import Subjects
-
-# Bytes that an event takes in memory, about, without the keys of a snapshot.
-EVENT_BYTES, KEY_BYTES = 400, 20
 
 
 class Fence:
@@ -25,7 +23,6 @@ class Fence:
 
     Args:
         row: its identity and settings.
-        recent_bytes: the memory for its recent events.
 
     Attributes:
         row: its identity and settings, as stored.
@@ -43,9 +40,10 @@ class Fence:
         due: when it is planned to look at those who wait, None if it is not.
         unsaved: the number of events since who is inside was last stored.
         ended: whether it has been deleted.
+        recent: its recent events.
     """
 
-    def __init__(self, row: FenceRow, recent_bytes: int) -> None:
+    def __init__(self, row: FenceRow) -> None:
         self.row = row
         self.delays = Delays(row.config) if row.config.delays else None
         self.area: Hull | None = None
@@ -60,9 +58,7 @@ class Fence:
         self.due: int | None = None
         self.unsaved = 0
         self.ended = False
-        self._recent_bytes = recent_bytes
-        self._recent: deque[FenceEvent] = deque()
-        self._bytes = 0
+        self.recent = RecentRuns()
 
     @property
     def name(self) -> str:
@@ -94,6 +90,11 @@ class Fence:
         """The number of subjects that wait for a time."""
         return (0 if self.dwelling is None else len(self.dwelling)) + (0 if self.delays is None else len(self.delays))
 
+    @property
+    def follows_events(self) -> bool:
+        """Whether it has rules that look at each of its events."""
+        return self.dwelling is not None or self.delays is not None
+
     def keys_inside(self, subjects: "Subjects") -> Keys:
         """The keys of a hull that are inside, ascending, as its events say."""
         keys = subjects.index.inside(self.number)
@@ -122,40 +123,32 @@ class Fence:
             self.time = max(self.time, kept.events[-1].time)
         if self.delays is not None:
             self.time = max(self.time, self.delays.newest)
-        self._recent.clear()
-        self._bytes = 0
+        self.recent.clear()
 
-    def published(self, events: list[FenceEvent]) -> None:
+    def told(self, told: "Told") -> None:
+        """Record that crossings have made events, which are committed."""
+        self.last, self.time = told.last, told.time
+        self.unsaved += told.made
+        self.inside += told.change
+
+    def published(self, events: Sequence[FenceEvent]) -> None:
         """Record committed events."""
         self.last = events[-1].sequence
         self.time = events[-1].time
         if self.dwelling is not None:
             self.dwelling.follow(events)
         self.unsaved += len(events)
-        self._recent += events
-        self._bytes += sum(map(_size, events))
-        while self._bytes > self._recent_bytes and len(self._recent) > 1:
-            self._bytes -= _size(self._recent.popleft())
 
-    def recent(self, after: int, most: int) -> list[FenceEvent] | None:
+    def events(self, after: int, most: int) -> list[FenceEvent] | None:
         """At most that many committed events after a sequence; None if the first of them is not in memory."""
         after = max(after, self.first - 1)
-        if after >= self.last:
-            return []
-        if not self._recent or self._recent[0].sequence > after + 1:
-            return None
-        start = after + 1 - self._recent[0].sequence
-        return list(islice(self._recent, start, start + most))
+        return [] if after >= self.last else self.recent.events(after, most)
 
     @property
     def oldest_recent(self) -> int:
         """The sequence of the oldest event in memory; that of the next one if there is none."""
-        return self._recent[0].sequence if self._recent else self.last + 1
+        return self.recent.first or self.last + 1
 
     def backlog(self, consumer: Consumer) -> int:
         """The number of events that are kept and not acknowledged."""
         return self.last - max(consumer.acknowledged, self.first - 1)
-
-
-def _size(event: FenceEvent) -> int:
-    return EVENT_BYTES + KEY_BYTES * sum(len(each.keys) for each in event.inside)

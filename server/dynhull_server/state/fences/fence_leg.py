@@ -11,11 +11,11 @@ from dynhull.keys import PackedKeys, key_list, take_keys
 from ..changes import FenceChange
 from ..records import NO_TIME, Keys
 from .dwelling import Dwelling
+from .event_log import Swap, Told
 from .fence import Fence
 from .pair import Pair
 from .records import (
     AddFence,
-    AppendEvents,
     Cause,
     ChangeFence,
     Consumer,
@@ -36,8 +36,6 @@ from .records import (
 )
 from .subjects import Subjects, keyed
 
-# A cause as the index knows it, and what it is here.
-Swap = tuple[Cause, Cause]
 # Some rows of crossings.
 Rows = slice | npt.NDArray[np.intp]
 TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS}
@@ -48,20 +46,22 @@ class FenceLeg:
 
     Args:
         fence: the fence.
+        created: whether the trip creates it.
+        told: what the trip has said of it before; None for nothing.
 
     Attributes:
         fence: the fence.
         row: its identity and settings after the trip.
         area, pair: the hull that is its area, and the two hulls that it compares, after the trip.
         created, deleted: whether the trip creates or deletes it.
-        events: the events that it makes.
+        events: the events that it makes, after those of crossings in the log of the trip.
         consumers: its consumers after the trip.
         first: the oldest event that is kept after the trip.
         inside: who is inside of a new fence that says nothing about it.
         delays: the delays that it changes.
     """
 
-    def __init__(self, fence: Fence, *, created: bool = False) -> None:
+    def __init__(self, fence: Fence, *, created: bool = False, told: Told | None = None) -> None:
         self.fence = fence
         self.row: FenceRow = fence.row
         self.area = fence.area
@@ -73,12 +73,13 @@ class FenceLeg:
         self.first = fence.first
         self.inside = Inside()
         self.delays: dict[Subject, Delay | None] = {}
-        self._time = fence.time
+        self._last = fence.last if told is None else told.last
+        self._time = fence.time if told is None else told.time
 
     @property
     def last(self) -> int:
         """The sequence of the last event."""
-        return self.events[-1].sequence if self.events else self.fence.last
+        return self.events[-1].sequence if self.events else self._last
 
     @property
     def area_revision(self) -> int:
@@ -258,18 +259,19 @@ class FenceLeg:
         )
         self.events.append(event)
 
+    def settings(self) -> Iterator[FenceChange]:
+        """The changes to commit before its events."""
+        if self.created:
+            yield AddFence(self.row, self.inside)
+        elif self.row is not self.fence.row and not self.deleted:
+            yield ChangeFence(self.row)
+
     def changes(self) -> Iterator[FenceChange]:
-        """The changes to commit."""
+        """The changes to commit after its events."""
         fence, number = self.fence, self.fence.number
         if self.deleted:
             yield DropFence(number)
             return
-        if self.created:
-            yield AddFence(self.row, self.inside)
-        elif self.row is not fence.row:
-            yield ChangeFence(self.row)
-        if self.events:
-            yield AppendEvents(number, self.events)
         if self.delays:
             yield PutDelays(number, self.delays)
         if self.first != fence.first:

@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import Crossings, FenceIndex, KeyedHull
+from dynhull.keys import take_keys
 
 from ..batch import Applied
 from ..changes import Change
@@ -33,12 +35,26 @@ from ..trip import Leg, Place, Trip, write
 from .config import CircleArea, FenceConfig, PolygonArea
 from .delaying import NO_ROWS, KeysChanged, delay, end_all, end_some
 from .delays import Delays
+from .event_block import EventBlock, block_of, joined
+from .event_log import EventLog, Swap, first_rows
 from .fence import Fence
-from .fence_leg import FenceLeg, Swap, members
+from .fence_leg import FenceLeg, members
 from .line import Line
 from .on_globe import require_frames
 from .pair import Pair
-from .records import NO_WAITS, Cause, Consumer, EventType, FenceRow, Inside, KeptFence, Key, Subject, Waits
+from .records import (
+    NO_WAITS,
+    AppendEvents,
+    Cause,
+    Consumer,
+    EventType,
+    FenceRow,
+    Inside,
+    KeptFence,
+    Key,
+    Subject,
+    Waits,
+)
 from .requests import (
     STRUCTURAL,
     CreateFence,
@@ -97,7 +113,9 @@ class LineTrip(Trip):
         ground: what there is of fences.
 
     Attributes:
-        fence_legs: the fences that it changes, by number.
+        fence_legs: the fences that it changes otherwise than by events of crossings, by number.
+        log: the events of crossings.
+        events: all events that it has made, also the last ones of fences that it deletes; None for none.
         examined: the numbers of the fences that are examined after a failure.
         structural: whether it changes which hulls share a queue.
         creates: the number of fences that it creates, at most.
@@ -112,9 +130,11 @@ class LineTrip(Trip):
         "_inside",
         "_journals",
         "creates",
+        "events",
         "examined",
         "fence_legs",
         "left",
+        "log",
         "structural",
         "weight",
     )
@@ -122,6 +142,8 @@ class LineTrip(Trip):
     def __init__(self, legs: list[Leg], requests: list[Request], now: float, pause: float, ground: Ground) -> None:
         super().__init__(legs, requests, now, pause, None)
         self.fence_legs: dict[int, FenceLeg] = {}
+        self.log = EventLog()
+        self.events: EventBlock | None = None
         self._ground = ground
         self._by_name = {leg.name: leg for leg in legs}
         self._journals: dict[str, list[Record]] = {}
@@ -136,6 +158,8 @@ class LineTrip(Trip):
     def run(self) -> None:
         """Run the requests."""
         super().run()
+        self.log.settle()
+        self.events = self._block(self.fence_legs.values())
         if self.left:
             del self.requests[-len(self.left) :]
 
@@ -151,10 +175,24 @@ class LineTrip(Trip):
 
     def changes(self) -> list[Change]:
         """The changes to commit."""
+        legs = self.fence_legs.values()
+        stored = self.events
+        if any(leg.deleted for leg in legs):
+            stored = self._block([leg for leg in legs if not leg.deleted])
         return [
             *(change for leg in self.legs for change in leg.changes()),
-            *(change for leg in self.fence_legs.values() for change in leg.changes()),
+            *(change for leg in legs for change in leg.settings()),
+            *([] if stored is None else [AppendEvents(stored)]),
+            *(change for leg in legs for change in leg.changes()),
         ]
+
+    def _block(self, legs: Iterable[FenceLeg]) -> EventBlock | None:
+        """The events of crossings, then those of these legs; None for none."""
+        crossed, of_legs = self.log.block(), {leg.fence.number: leg.events for leg in legs if leg.events}
+        found = [crossed] if crossed is not None else []
+        if of_legs:
+            found.append(block_of(of_legs))
+        return joined(found) if found else None
 
     def touched(self) -> dict[str, Subjects]:
         """The hulls by name whose subjects may differ from what the storage has, if the trip is not committed.
@@ -180,8 +218,11 @@ class LineTrip(Trip):
     def landed(self, states: list[HullState | None], fences: list[KeptFence | None]) -> bool:
         """Whether the trip was committed, given what the storage has of its hulls and the examined fences."""
         found = dict(zip(self.examined, fences, strict=True))
-        return super().landed(states, fences) and all(
-            leg.landed(found[number]) for number, leg in self.fence_legs.items()
+        if not super().landed(states, fences):
+            return False
+        told = ((found[number], each) for number, each in self.log.told.items() if number not in self.fence_legs)
+        return all(leg.landed(found[number]) for number, leg in self.fence_legs.items()) and all(
+            kept is not None and kept.last == each.last for kept, each in told
         )
 
     def pairs(self) -> set[int]:
@@ -277,8 +318,9 @@ class LineTrip(Trip):
                     name: (line.subjects[name], None) for name in changed if name in line.subjects
                 }
                 crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls)}
+                areas = {name: area.hull.state.counts.revision for name, area in line.areas.items()}
                 for name, (subjects, crossings) in sorted(crossed.items()):
-                    self._cross(subjects, crossings, swap, now, changed.get(name))
+                    self._cross(subjects, crossings, areas, swap, now, changed.get(name))
                 for fence, pair, causes in line.paired(hulls):
                     self._fence_leg(fence).paired(pair, causes, now)
         except BaseException:  # an index may have lost crossings
@@ -289,24 +331,31 @@ class LineTrip(Trip):
         self,
         subjects: Subjects,
         crossings: Crossings | None,
+        areas: Mapping[str, int],
         swap: Swap | None,
         now: int,
         changed: KeysChanged | None = None,
     ) -> None:
-        """Make the events of a change of the keys of a hull, or of the areas of its fences."""
+        """Make the events of a change of the keys of a hull, or of the areas of its fences with these revisions."""
         crossed = set()
         if crossings is not None and len(crossings):
             if changed is not None and changed.expired:
                 crossings = _with_expiries(crossings, changed.expired)
-            numbers = crossings.fences
-            starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1])).tolist()
-            for first, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
-                fence = subjects.fences[int(numbers[first])]
-                crossed.add(fence)
-                if fence.delays is None:
-                    self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), swap, now)
-                else:
-                    delay(self._fence_leg(fence), subjects, crossings, slice(first, end), swap, now, changed)
+            starts = first_rows(crossings.fences)
+            fences = [subjects.fences[number] for number in crossings.fences[starts].tolist()]
+            apart = [fence.follows_events or fence.number in self.fence_legs for fence in fences]
+            runs = zip(fences, apart, starts.tolist(), [*starts[1:].tolist(), len(crossings)], strict=True)
+            if any(apart):
+                for fence, _, first, end in (run for run in runs if run[1]):
+                    crossed.add(fence)
+                    if fence.delays is None:
+                        self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), swap, now)
+                    else:
+                        delay(self._fence_leg(fence), subjects, crossings, slice(first, end), swap, now, changed)
+                counts = np.diff(starts, append=len(crossings))
+                crossings = _some(crossings, np.flatnonzero(np.repeat(np.logical_not(apart), counts)))
+            if len(crossings):
+                self.log.add(subjects, crossings, areas, swap, now)
         for fence in () if changed is None else list(subjects.delaying):
             if fence not in crossed:  # subjects may have reported that they stay
                 delay(self._fence_leg(fence), subjects, None, NO_ROWS, None, now, changed)
@@ -319,7 +368,8 @@ class LineTrip(Trip):
     def _fence_leg(self, fence: Fence) -> FenceLeg:
         leg = self.fence_legs.get(fence.number)
         if leg is None:
-            leg = self.fence_legs[fence.number] = FenceLeg(fence)
+            self.log.settle()
+            leg = self.fence_legs[fence.number] = FenceLeg(fence, told=self.log.told.get(fence.number))
         return leg
 
     def _do(self, request: Request) -> object:
@@ -374,8 +424,8 @@ class LineTrip(Trip):
             raise FenceNotFoundError(request.name)
         match request:
             case ReadFence():
-                leg = self.fence_legs.get(fence.number)
-                return request.function(fence, () if leg is None else leg.events)
+                leg, made = self.fence_legs.get(fence.number), self.log.events(fence)
+                return request.function(fence, made if leg is None else [*made, *leg.events])
             case ReplaceFence():
                 return self._replace(request, fence)
             case DeleteFence():
@@ -414,7 +464,7 @@ class LineTrip(Trip):
             config,
             _waits(config, 0, request.time),
         )
-        fence = Fence(row, ground.limits.fence_history_bytes)
+        fence = Fence(row)
         fence.area = self._area(config)
         require_frames(config, fence.area, None if config.kind == "prefix" else self._hull(config.subjects))
         if config.kind == "other":
@@ -468,7 +518,7 @@ class LineTrip(Trip):
         leg.area = area
         try:
             for subjects in fence.subjects.values():
-                self._cross(subjects, subjects.take(config, area), REPLACEMENT, request.time)
+                self._cross(subjects, subjects.take(config, area), {}, REPLACEMENT, request.time)
             end_all(leg, request.time)
         except BaseException:
             self._tear(())
@@ -581,6 +631,11 @@ def _with_expiries(crossings: Crossings, expired: Collection[Key]) -> Crossings:
     causes = crossings.causes.copy()
     causes[ended] ^= np.uint8(Cause.REMOVED | Cause.EXPIRED)
     return replace(crossings, causes=causes)
+
+
+def _some(crossings: Crossings, rows: npt.NDArray[np.intp]) -> Crossings:
+    columns = {each.name: getattr(crossings, each.name)[rows] for each in fields(crossings) if each.name != "keys"}
+    return Crossings(**columns, keys=take_keys(crossings.keys, rows))
 
 
 def _check(config: FenceConfig, area: Hull | None) -> None:

@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..records import NO_TIME, Keys, Times
 from .config import FenceConfig
+
+if TYPE_CHECKING:
+    from .event_block import EventBlock
 
 Key = str | int
 Subject = tuple[str, Key]  # the name of its hull, and its key
@@ -221,10 +224,9 @@ class DropFence:
 
 @dataclass(frozen=True, slots=True)
 class AppendEvents:
-    """Events of consecutive sequences."""
+    """Events of fences; those of each fence have the sequences after its last event."""
 
-    number: int
-    events: list[FenceEvent]
+    block: "EventBlock"
 
 
 @dataclass(frozen=True, slots=True)

@@ -205,7 +205,7 @@ def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
         raise DamagedError(f"the data is damaged and was not copied: {'; '.join(report.fatal)}")
     findings.ledger.totals = findings.ledger.totals._replace(mode=STOPPED)
     if opened.version < FORMAT:
-        migrate(connection, opened.version, findings.ledger)
+        migrate(connection, opened.version, findings.ledger, findings.starts)
     else:
         renew_totals(connection, findings.ledger.totals)
     connection.execute("COMMIT")

@@ -17,7 +17,7 @@ from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
 from .hull_rows import found_hulls, values
 from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
-from .schema import APPLICATION_ID, DELAYS_SINCE, FENCES_SINCE, FORMAT, PAGE_BYTES, SCHEMAS, found
+from .schema import APPLICATION_ID, FENCES_SINCE, FORMAT, PAGE_BYTES, SCHEMAS, found
 from .totals import Totals, read_totals
 
 MOST_MESSAGES = 5  # of SQLite's checks
@@ -37,6 +37,7 @@ class Findings:
         damaged: the numbers of the damaged hulls.
         repairs: the steps that repair the database.
         both_totals: whether both copies of the totals are intact.
+        starts: for a migration, where the events of fences begin that have dropped some, by number.
     """
 
     ledger: Ledger = field(default_factory=Ledger)
@@ -45,6 +46,7 @@ class Findings:
     damaged: set[int] = field(default_factory=set)
     repairs: list[AnyStep] = field(default_factory=list)
     both_totals: bool = True
+    starts: dict[int, int] = field(default_factory=dict)
 
     def blame(self, hull: HullRows, text: str, *, fatal: bool) -> None:
         """Record damage to a hull."""
@@ -174,11 +176,11 @@ class _Examination:
         self._chunks()
         self._batches()
         if self._version >= FENCES_SINCE:
-            delays = self._version >= DELAYS_SINCE
-            examination = FenceExamination(self._connection, self._ledger, contents=self._contents, delays=delays)
+            examination = FenceExamination(self._connection, self._ledger, self._version, contents=self._contents)
             self._fences = examination.run()
             self._findings.fatal += self._fences.fatal
             self._findings.repairs += self._fences.repairs
+            self._findings.starts = self._fences.starts
         self._compare(totals)
         for scanned in self._hulls.values():
             self._judge(scanned)

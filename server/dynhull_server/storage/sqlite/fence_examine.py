@@ -2,16 +2,20 @@
 
 import sqlite3
 import struct
-from collections import Counter
+from array import array
+from collections import Counter, defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import count, pairwise
 from typing import TYPE_CHECKING, Any
 
 from ...state.fences.records import Consumer
 from .encoding import checksum, weight
+from .event_blocks import decode_runs
 from .event_rows import decode_delay
-from .fence_ledger import DropInside, FenceRows, FenceStep
+from .fence_ledger import DropInside, FenceRows, FenceStep, Start
 from .fence_rows import consumer_values, found_fences
+from .schema import DELAYS_SINCE, STARTS_SINCE
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -26,6 +30,7 @@ class FoundFences:
         next_number: a number greater than that of any fence found.
         fatal: damage that prevents serving the database.
         repairs: steps that drop unfinished rows.
+        starts: where the events of fences begin that have dropped some, in a format that does not store it.
     """
 
     rows: int = 0
@@ -33,6 +38,7 @@ class FoundFences:
     next_number: int = 1
     fatal: list[str] = field(default_factory=list)
     repairs: list[FenceStep] = field(default_factory=list)
+    starts: dict[int, int] = field(default_factory=dict)
 
 
 class FenceExamination:
@@ -41,22 +47,26 @@ class FenceExamination:
     Args:
         connection: a connection with an open transaction.
         ledger: receives the rows.
+        version: the format.
         contents: whether to read payloads.
-        delays: whether the format has delays.
     """
 
-    def __init__(self, connection: sqlite3.Connection, ledger: "Ledger", *, contents: bool, delays: bool) -> None:
+    def __init__(self, connection: sqlite3.Connection, ledger: "Ledger", version: int, *, contents: bool) -> None:
         self._connection = connection
         self._ledger = ledger
         self._fences = ledger.fences
         self._contents = contents
-        self._has_delays = delays
+        self._has_delays = version >= DELAYS_SINCE
+        self._has_starts = version >= STARTS_SINCE
+        self._lasts: defaultdict[int, array[int]] = defaultdict(lambda: array("q"))
         self._found = FoundFences()
 
     def run(self) -> FoundFences:
         """Read everything once."""
         found = self._found
         self._fence_rows()
+        if self._has_starts:
+            self._starts()
         self._events()
         self._insides()
         self._consumers()
@@ -64,8 +74,8 @@ class FenceExamination:
             self._delays()
         for fence in self._fences.values():
             self._judge(fence)
-        found.rows = sum(fence.count for fence in self._fences.values())
-        found.sum = sum(fence.sum for fence in self._fences.values())
+        found.rows = sum(fence.count for fence in self._fences.values()) + len(self._ledger.events)
+        found.sum = sum(fence.sum for fence in self._fences.values()) + self._ledger.events.sum
         found.next_number = max((number + 1 for number in self._fences), default=1)
         names = Counter(fence.row.name for fence in self._fences.values())
         found.fatal += [f"{times} fences have the name {name!r}" for name, times in names.items() if times > 1]
@@ -79,23 +89,64 @@ class FenceExamination:
             found = weight(each.checksum, each.number)
             self._fences[each.number] = FenceRows(each.row, found, found)
 
+    def _starts(self) -> None:
+        newest = 0
+        for place, number, first, stored in self._connection.execute(
+            "SELECT rowid, fence, first, checksum FROM starts ORDER BY rowid"
+        ):
+            newest = place
+            fence = self._fences.get(number)
+            if fence is None:
+                self._ledger.dead["starts"].append(place)
+                continue
+            if fence.start is not None or not _begins(number, first, stored):
+                self._blame(fence, "where its events begin is damaged")
+                continue
+            start, _ = Start.at(place, number, first)
+            fence.begin(start, 0)
+        self._ledger.start_ids = count(newest + 1)
+
     def _events(self) -> None:
-        column = "payload" if self._contents else "NULL"
+        column = "payload" if self._contents else "CASE fence WHEN 0 THEN payload END"
         query = f"SELECT rowid, fence, first, last, checksum, {column} FROM events ORDER BY rowid"  # noqa: S608  (ours)
         newest = 0
         for place, number, first, last, stored, payload in self._connection.execute(query):
             newest = place
-            fence = self._fences.get(number)
-            if fence is None:
+            try:
+                whole = (number != 0 and not self._contents) or checksum(payload, number, first, last) == stored
+                each = weight(stored, number, first, last)
+                if not whole:
+                    runs = []
+                elif number == 0:
+                    runs = [column.tolist() for column in decode_runs(payload)]
+                else:
+                    runs = [[number], [first], [last - first + 1]]
+            except (ValueError, TypeError, struct.error):
+                whole = False
+            if whole:
+                self._place(place, each, zip(*runs, strict=True))
+            elif number in self._fences:
+                self._blame(self._fences[number], f"events {first} to {last}: damaged")
+            elif number == 0:
+                self._found.fatal.append(f"row {place} of events is damaged")
+            else:
                 self._ledger.dead["events"].append(place)
-                continue
-            each = self._weight(fence, f"events {first} to {last}", stored, payload, number, first, last)
-            if each is None:
-                continue
-            if fence.firsts and first != fence.last + 1:
-                self._blame(fence, f"events {fence.last + 1} to {first - 1} are missing")
-            fence.append(first, last, place, each)
         self._ledger.event_ids = count(newest + 1)
+
+    def _place(self, place: int, weight: int, runs: Iterable[tuple[int, int, int]]) -> None:
+        """Assign the runs of a row to their fences: the number of the fence, the first sequence and the count."""
+        needed = 0
+        for number, first, many in runs:
+            fence = self._fences.get(number)
+            if fence is not None and first + many > fence.first:
+                fence.firsts.append(first)
+                fence.places.append(place)
+                self._lasts[number].append(first + many - 1)
+                needed += 1
+        if needed:
+            self._ledger.events.add(place, weight, needed)
+        else:
+            self._ledger.dead["events"].append(place)
 
     def _insides(self) -> None:
         column = "payload" if self._contents else "NULL"
@@ -169,13 +220,37 @@ class FenceExamination:
         for sequence, rows in fence.insides.items():
             if not rows.complete:
                 self._found.repairs.append(DropInside(fence.row.number, sequence))
+        lasts = self._lasts[fence.row.number]
+        if any(first != last + 1 for first, last in zip(fence.firsts[1:], lasts, strict=False)):
+            self._judge_order(fence, lasts)
         base = fence.base
-        if fence.firsts and fence.firsts[0] > base + 1:
-            self._blame(fence, f"events {base + 1} to {fence.firsts[0] - 1} are missing")
-        fence.last = max(fence.last, base)
+        fence.last = max(lasts[-1] if lasts else fence.first - 1, base)
+        oldest = fence.firsts[0] if fence.firsts else fence.last + 1
+        if not self._has_starts and oldest > 1:
+            self._found.starts[fence.row.number] = oldest
+        known = min(fence.first if self._has_starts else oldest, base + 1)
+        if max(oldest, fence.first) > known:
+            self._blame(fence, f"events {known} to {max(oldest, fence.first) - 1} are missing")
+
+    def _judge_order(self, fence: FenceRows, lasts: "array[int]") -> None:
+        """Bring the runs in order, and blame what is missing or there twice."""
+        ordered = sorted(zip(fence.firsts, fence.places, lasts, strict=True))
+        for (_, _, last), (first, _, _) in pairwise(ordered):
+            if first > last + 1:
+                self._blame(fence, f"events {last + 1} to {first - 1} are missing")
+            elif first <= last:
+                self._blame(fence, f"events {first} to {last} are stored twice")
+        fence.firsts, fence.places, lasts[:] = (array("q", column) for column in zip(*ordered, strict=True))
 
     def _blame(self, fence: FenceRows, text: str) -> None:
         self._found.fatal.append(f"fence {fence.row.name!r}: {text}")
+
+
+def _begins(number: int, first: int, stored: object) -> bool:
+    try:
+        return checksum(b"", number, first) == stored
+    except (TypeError, struct.error):
+        return False
 
 
 def _whole(number: int, consumer: Consumer, stored: object) -> bool:

@@ -2,12 +2,16 @@
 
 from array import array
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
 
 from ...state.changes import FenceChange
+from ...state.fences.event_block import EventBlock, joined
 from ...state.fences.records import (
     AddFence,
     AppendEvents,
@@ -23,11 +27,12 @@ from ...state.fences.records import (
     PutDelays,
     Subject,
 )
-from ..port import NotCommittedError
+from ..port import NEWEST, NotCommittedError
 from .encoding import checksum, weight
-from .event_rows import encode_delay, encode_events, encode_inside
+from .event_blocks import encode_block
+from .event_rows import encode_delay, encode_inside
 from .fence_rows import consumer_values, values
-from .schema import INSERT_CONSUMER, INSERT_DELAY, INSERT_EVENTS, INSERT_FENCE, INSERT_INSIDE
+from .schema import INSERT_CONSUMER, INSERT_DELAY, INSERT_EVENTS, INSERT_FENCE, INSERT_INSIDE, INSERT_START, MANY
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -35,6 +40,9 @@ if TYPE_CHECKING:
 Statement = tuple[str, tuple[Any, ...]]
 # Keys in a row of those who are inside: about half a megabyte, a commit that delays later ones only briefly.
 KEYS_A_ROW = 16_384
+# Events in a row: whoever reads those of one fence reads all of them.
+EVENTS_A_ROW = 1024
+MISSING = -1  # the sequence of no event
 
 
 @dataclass(slots=True)
@@ -59,6 +67,26 @@ class InsideRows:
         return len(self.places) == self.parts
 
 
+class Start(NamedTuple):
+    """Where the events of a fence begin of which some have been dropped.
+
+    Attributes:
+        first: the sequence of the oldest event.
+        place: the row number.
+        weight: the weight of the row.
+    """
+
+    first: int
+    place: int
+    weight: int
+
+    @classmethod
+    def at(cls, place: int, fence: int, first: int) -> tuple[Self, int]:
+        """The row of a fence, and its checksum."""
+        stored = checksum(b"", fence, first)
+        return cls(first, place, weight(stored, fence, first)), stored
+
+
 @dataclass(slots=True)
 class FenceRows:
     """The rows of one fence.
@@ -66,11 +94,12 @@ class FenceRows:
     Attributes:
         row: the row of the fence itself.
         weight: its weight.
-        sum: the sum of the weights of all rows of the fence.
-        count: the number of all rows of the fence.
-        firsts: the first sequence in each row of events, ascending.
-        places, weights: the numbers and the weights of these rows.
+        sum: the sum of the weights of all rows of the fence, but those of events.
+        count: the number of these rows.
+        firsts: the first sequence in each run of events, ascending.
+        places: the numbers of the rows that these are in.
         last: the newest sequence.
+        start: where its events begin; None if none has been dropped.
         insides: who was inside, by sequence.
         consumers: each consumer with its row number and weight.
         delays: the row number and weight of each delay.
@@ -82,8 +111,8 @@ class FenceRows:
     count: int = 1
     firsts: "array[int]" = field(default_factory=lambda: array("q"))
     places: "array[int]" = field(default_factory=lambda: array("q"))
-    weights: "array[int]" = field(default_factory=lambda: array("q"))
     last: int = 0
+    start: Start | None = None
     insides: dict[int, InsideRows] = field(default_factory=dict)
     consumers: dict[str, tuple[Consumer, int, int]] = field(default_factory=dict)
     delays: dict[Subject, tuple[int, int]] = field(default_factory=dict)
@@ -91,7 +120,7 @@ class FenceRows:
     @property
     def first(self) -> int:
         """The sequence of the oldest event; that of the next one if there is none."""
-        return self.firsts[0] if self.firsts else self.last + 1
+        return 1 if self.start is None else self.start.first
 
     @property
     def base(self) -> int:
@@ -99,39 +128,31 @@ class FenceRows:
         return max((each.sequence for each in self.insides.values() if each.complete), default=0)
 
     def boundary(self, first: int) -> int:
-        """The sequence at which a row begins that is nearest before `first`, such that the rows before it may go."""
-        limit = min(first, self.base + 1)
-        if limit > self.last:
-            return self.last + 1
-        row = bisect_right(self.firsts, limit) - 1
-        return self.firsts[row] if row >= 0 else self.first
+        """The sequence nearest before `first` such that the events before it may go."""
+        return max(min(first, self.base + 1), self.first)
 
-    def since(self, sequence: int) -> Self:
-        """A copy that has, of the rows of events, only those with events after a sequence."""
+    def since(self, sequence: int, most: int = NEWEST) -> Self:
+        """A copy that has, of the runs of events, only those with the next `most` events after a sequence."""
+        sequence = max(sequence, self.first - 1)
         start = max(bisect_right(self.firsts, sequence + 1) - 1, 0)
+        runs = slice(start, bisect_right(self.firsts, sequence + most))
         insides = {key: replace(each, places=dict(each.places)) for key, each in self.insides.items()}
         return replace(
             self,
-            firsts=self.firsts[start:],
-            places=self.places[start:],
-            weights=array("q"),
+            firsts=self.firsts[runs],
+            places=self.places[runs],
             insides=insides,
             consumers=dict(self.consumers),
             delays=dict(self.delays),
         )
 
-    def append(self, first: int, last: int, place: int, each: int) -> None:
-        """Add a row of events."""
-        self.firsts.append(first)
-        self.places.append(place)
-        self.weights.append(each)
-        self.last = last
-        self._plus(1, each)
-
-    def drop(self, rows: int) -> None:
-        """Remove the oldest rows of events."""
-        self._plus(-rows, -sum(self.weights[:rows]))
-        del self.firsts[:rows], self.places[:rows], self.weights[:rows]
+    def begin(self, start: Start, runs: int) -> None:
+        """Let events begin later, and forget the oldest runs."""
+        if self.start is not None:
+            self._plus(-1, -self.start.weight)
+        self.start = start
+        self._plus(1, start.weight)
+        del self.firsts[:runs], self.places[:runs]
 
     def put_inside(self, sequence: int, parts: int, part: int, place: int, each: int) -> None:
         """Add a row of those who are inside."""
@@ -209,8 +230,8 @@ class _Now:
     Attributes:
         rows: its present state in the ledger.
         count, sum: the number of all its rows, and the sum of their weights.
-        last: the newest sequence.
-        dropped: the number of its oldest rows of events that are deleted.
+        start: where its events begin, None if none has been dropped.
+        dropped: the number of its oldest runs of events that are dropped.
         consumers: the row number and weight of each changed consumer, None for a deleted one.
         delays: the row number and weight of each changed delay, None for one that has ended.
         deleted: whether it is deleted.
@@ -219,7 +240,7 @@ class _Now:
     rows: FenceRows
     count: int
     sum: int
-    last: int
+    start: Start | None = None
     dropped: int = 0
     consumers: dict[str, tuple[int, int] | None] = field(default_factory=dict)
     delays: dict[Subject, tuple[int, int] | None] = field(default_factory=dict)
@@ -251,12 +272,18 @@ class FenceChanges:
         self._statements = statements
         self._effects = effects
         self._now: dict[int, _Now] = {}
+        self._lasts: dict[int, int] = {}  # the last events of fences, where these are new
+        self._blocks: list[EventBlock] = []
+        self._released: Counter[int] = Counter()  # runs by row
         self.rows = self.sum = self.next_number = 0
 
     def take(self, change: FenceChange | FenceStep) -> None:
         """Add a change."""
         if isinstance(change, AddFence):
             self._add(change)
+            return
+        if isinstance(change, AppendEvents):
+            self._append(change.block)
             return
         number = change.row.number if isinstance(change, ChangeFence) else change.number
         now = self._fence(number)
@@ -269,7 +296,7 @@ class FenceChanges:
         """A fence after the changes so far, None if it does not exist."""
         now = self._now.get(number)
         if now is None and (rows := self._ledger.fences.get(number)):
-            now = self._now[number] = _Now(rows, rows.count, rows.sum, rows.last)
+            now = self._now[number] = _Now(rows, rows.count, rows.sum, rows.start)
         return None if now is None or now.deleted else now
 
     def _plus(self, now: _Now, rows: int, weights: int) -> None:
@@ -285,7 +312,8 @@ class FenceChanges:
         *columns, stored = values(row)
         each = weight(stored, row.number)
         rows = FenceRows(row, each, each, last=change.inside.sequence)
-        now = self._now[row.number] = _Now(rows, 0, 0, rows.last)
+        now = self._now[row.number] = _Now(rows, 0, 0)
+        self._lasts[row.number] = rows.last
         self._plus(now, 1, each)
         self.next_number = max(self.next_number, row.number + 1)
         self._statements.append((INSERT_FENCE, (*columns, stored)))
@@ -295,8 +323,6 @@ class FenceChanges:
 
     def _carry_out(self, change: FenceChange | FenceStep, now: _Now) -> None:
         match change:
-            case AppendEvents():
-                self._append(change, now)
             case PutDelays():
                 self._put_delays(change, now)
             case ChangeFence():
@@ -316,20 +342,73 @@ class FenceChanges:
             case DropInside():
                 self._drop_inside(change.sequence, now)
 
-    def _append(self, change: AppendEvents, now: _Now) -> None:
-        first, last = change.events[0].sequence, change.events[-1].sequence
-        if first != now.last + 1 or last - first + 1 != len(change.events):
-            raise NotCommittedError(
-                f"events {first} to {last} of fence {now.rows.row.name} do not follow event {now.last}"
-            )
-        payload = encode_events(change.events, now.rows.row.config.subjects)
-        keys = change.number, first, last
-        stored = checksum(payload, *keys)
-        each, place = weight(stored, *keys), next(self._ledger.event_ids)
-        now.last = last
-        self._plus(now, 1, each)
-        self._statements.append((INSERT_EVENTS, (place, *keys, stored, payload)))
-        self._effects.append(lambda: now.rows.append(first, last, place, each))
+    def _append(self, block: EventBlock) -> None:
+        lasts, runs = self._lasts, zip(block.fences.tolist(), block.firsts.tolist(), block.counts.tolist(), strict=True)
+        for number, first, count in runs:
+            last = lasts.get(number, MISSING)
+            if last == MISSING:
+                rows = self._ledger.fences.get(number)
+                if rows is None or (number in self._now and self._now[number].deleted):
+                    raise NotCommittedError(f"there is no fence {number}")
+                last = rows.last
+            if first != last + 1:
+                name = self._rows(number).row.name
+                raise NotCommittedError(f"event {first} of fence {name} does not follow event {last}")
+            lasts[number] = last + count
+        self._blocks.append(block)
+
+    def finish(self) -> None:
+        """Write all events, after the last change: in one row, or in several if they are many."""
+        if not self._blocks:
+            return
+        block = joined(self._blocks)
+        gone = [number for number, now in self._now.items() if now.deleted]
+        if gone:
+            block = block.runs(~np.isin(block.fences, gone))
+        for start in range(0, len(block), EVENTS_A_ROW):
+            end = min(start + EVENTS_A_ROW, len(block))
+            self._write_events(block if end - start == len(block) else block.rows(start, end))
+
+    def _write_events(self, block: EventBlock) -> None:
+        numbers = block.fences.tolist()
+        payload = encode_block(block, [self._rows(number).row.config.subjects for number in numbers])
+        stored = checksum(payload, *MANY)
+        each, place = weight(stored, *MANY), next(self._ledger.event_ids)
+        self.rows += 1
+        self.sum += each
+        self._statements.append((INSERT_EVENTS, (place, *MANY, stored, payload)))
+
+        def add() -> None:
+            fences = self._ledger.fences
+            runs = zip(numbers, block.firsts.tolist(), block.counts.tolist(), strict=True)
+            for number, first, count in runs:
+                rows = fences[number]
+                rows.firsts.append(first)
+                rows.places.append(place)
+                rows.last = first + count - 1
+            self._ledger.events.add(place, each, len(numbers))
+
+        self._effects.append(add)
+
+    def _rows(self, number: int) -> FenceRows:
+        now = self._now.get(number)
+        return self._ledger.fences[number] if now is None else now.rows
+
+    def _release(self, released: "array[int]") -> tuple[list[int], Callable[[], None]]:
+        """Need some runs no longer, given the rows that they are in. Returns the rows in which nothing is left.
+
+        And the update of the ledger.
+        """
+        places, counts = np.unique(np.frombuffer(released, np.int64), return_counts=True)
+        left, weights = self._ledger.events.left(places)
+        left = left - counts
+        for at, place in enumerate(places.tolist() if self._released else ()):
+            left[at] -= self._released[place]
+        self._released.update(dict(zip(places.tolist(), counts.tolist(), strict=True)))
+        empty = left == 0
+        self.rows -= int(empty.sum())
+        self.sum -= sum(weights[empty].tolist())
+        return places[empty].tolist(), partial(self._ledger.events.release, places, counts)
 
     def _change(self, row: FenceRow, now: _Now) -> None:
         *columns, stored = values(row)
@@ -342,29 +421,47 @@ class FenceChanges:
     def _drop_fence(self, number: int, now: _Now) -> None:
         """Delete the row of the fence. `sweep` drops the rest."""
         now.deleted = True
+        self._lasts.pop(number, None)
         self._plus(now, -now.count, -now.sum)
         self._statements.append(("DELETE FROM fences WHERE id = ?", (number,)))
 
+        rows = now.rows
+        empty, release = self._release(rows.places[now.dropped :])
+
         def bury() -> None:
             gone, dead = self._ledger.fences.pop(number), self._ledger.dead
-            dead["events"] += gone.places
+            release()
+            dead["events"].extend(empty)
             dead["insides"].extend(place for each in gone.insides.values() for place in each.places.values())
             dead["consumers"].extend(place for _, place, _ in gone.consumers.values())
             dead["delays"].extend(place for place, _ in gone.delays.values())
+            dead["starts"].extend([] if gone.start is None else [gone.start.place])
 
         self._effects.append(bury)
 
     def _drop_events(self, first: int, now: _Now) -> None:
-        rows = now.rows
-        limit = min(first, rows.base + 1)
-        count = len(rows.firsts) if limit > rows.last else bisect_right(rows.firsts, limit) - 1
-        places, weights = rows.places[now.dropped : count], rows.weights[now.dropped : count]
-        if not places:
+        rows, before = now.rows, now.start
+        first = rows.boundary(first)
+        if first <= (1 if before is None else before.first):
             return
-        now.dropped = count
-        self._plus(now, -len(places), -sum(weights))
-        self._delete_rows("events", places)
-        self._effects.append(lambda: rows.drop(len(places)))
+        if before is not None:
+            self._plus(now, -1, -before.weight)
+            self._delete_rows("starts", [before.place])
+        start, stored = Start.at(next(self._ledger.start_ids), rows.row.number, first)
+        now.start = start
+        self._plus(now, 1, start.weight)
+        self._statements.append((INSERT_START, (start.place, rows.row.number, first, stored)))
+        count = len(rows.firsts) if first > rows.last else max(bisect_right(rows.firsts, first) - 1, 0)
+        released = rows.places[now.dropped : count]
+        dropped, now.dropped = len(released), max(now.dropped, count)
+        empty, release = self._release(released)
+        self._delete_rows("events", empty)
+
+        def drop() -> None:
+            release()
+            rows.begin(start, dropped)
+
+        self._effects.append(drop)
 
     def _put_consumer(self, consumer: Consumer, number: int, now: _Now) -> None:
         self._drop_consumer(consumer.name, now)

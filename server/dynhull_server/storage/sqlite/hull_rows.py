@@ -88,6 +88,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     4: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
     5: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
     6: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
+    7: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
 }
 
 

@@ -11,6 +11,7 @@ from ...state.changes import Change
 from ...state.records import Append, Create, Delete, HullRow
 from ..port import NotCommittedError
 from .encoding import checksum, encode, weight
+from .event_directory import EventDirectory
 from .fence_ledger import FenceChanges, FenceRows, FenceStep
 from .hull_rows import values
 from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
@@ -27,9 +28,10 @@ DROPPED = {
     "insides": "payload",
     "consumers": "name",
     "delays": "payload",
+    "starts": "first",
 }
 
-IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids", "delay_ids")
+IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids", "delay_ids", "start_ids")
 
 Statement = tuple[str, tuple[Any, ...]]
 
@@ -111,7 +113,8 @@ class Ledger:
         dead: by table, the rows to drop because no hull, fence or snapshot needs them.
         batch_ids, chunk_ids, snapshot_ids: the next numbers. No number is used twice while the storage is open, so a
             row found dead cannot belong to anything else when it is dropped.
-        event_ids, inside_ids, consumer_ids, delay_ids: the same for fences.
+        event_ids, inside_ids, consumer_ids, delay_ids, start_ids: the same for fences.
+        events: the rows of events.
     """
 
     totals: Totals = field(default_factory=Totals)
@@ -125,6 +128,8 @@ class Ledger:
     inside_ids: "count[int]" = field(default_factory=lambda: count(1))
     consumer_ids: "count[int]" = field(default_factory=lambda: count(1))
     delay_ids: "count[int]" = field(default_factory=lambda: count(1))
+    start_ids: "count[int]" = field(default_factory=lambda: count(1))
+    events: EventDirectory = field(default_factory=EventDirectory)
 
     def go_on_from(self, before: "Ledger", under_way: Set[int]) -> None:
         """Replace an earlier ledger; chunks of snapshots that are `under_way` are not dead."""
@@ -209,6 +214,7 @@ class Group:
         for change in changes:
             self._take(change)
         fences = self._fences
+        fences.finish()
         next_number = max(self._totals.next_number, fences.next_number)
         self._totals = self._totals.plus(0, 0, fences.sum, fences.rows)
         self._totals = self._totals._replace(commits=self._totals.commits + 1, next_number=next_number)

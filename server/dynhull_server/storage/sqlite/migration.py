@@ -1,10 +1,12 @@
 """Creation of the tables, and migration from older formats. Each function runs inside a transaction."""
 
 import sqlite3
+from collections.abc import Mapping
 
+from .fence_ledger import Start
 from .hull_rows import values
 from .ledger import Ledger
-from .schema import FENCE_TABLES, INSERT_HULL, SCHEMAS, TABLES, stamp
+from .schema import FENCE_TABLES, INSERT_HULL, INSERT_START, SCHEMAS, TABLES, stamp
 from .totals import Totals, renew_totals
 
 
@@ -16,13 +18,14 @@ def make_tables(connection: sqlite3.Connection) -> None:
     stamp(connection)
 
 
-def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger) -> None:
-    """Migrate a database of an older format. O(number of hulls): batches and snapshots are not rewritten.
+def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger, starts: Mapping[int, int]) -> None:
+    """Migrate a database of an older format. O(hulls and fences): batches, snapshots and events are not rewritten.
 
     Args:
         connection: a connection to the database.
         version: its format.
         ledger: its rows.
+        starts: where the events of fences begin that have dropped some, by number, if the format does not store it.
     """
     if version == 1:
         for index in ("batches_by_revision", "chunks_by_number"):
@@ -34,5 +37,10 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger) -> Non
     connection.execute("DROP TABLE hulls")
     connection.execute(TABLES["hulls"])
     connection.executemany(INSERT_HULL, (values(hull.row) for hull in ledger.hulls.values()))
+    for number, first in starts.items():
+        start, stored = Start.at(next(ledger.start_ids), number, first)
+        connection.execute(INSERT_START, (start.place, number, first, stored))
+        ledger.fences[number].begin(start, 0)
+        ledger.totals = ledger.totals.plus(0, 0, start.weight, 1)
     renew_totals(connection, ledger.totals)
     stamp(connection)

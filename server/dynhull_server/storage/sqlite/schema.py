@@ -3,8 +3,9 @@
 import sqlite3
 
 APPLICATION_ID = 0x64796E68  # "dynh"
-FORMAT = 6
-FENCES_SINCE, DELAYS_SINCE = 4, 6  # the first formats with fences, and with delayed events
+FORMAT = 7
+# The first formats with fences, with delayed events, and with events of many fences in a row.
+FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE = 4, 6, 7
 PAGE_BYTES = 8192  # a large batch spans several pages, and wastes half of one
 
 TABLES = {
@@ -83,11 +84,21 @@ TABLES = {
     checksum INTEGER NOT NULL,
     payload BLOB NOT NULL
 )""",
+    "starts": """CREATE TABLE starts (
+    fence INTEGER NOT NULL,
+    first INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
 }
-FENCE_TABLES = ("fences", "events", "insides", "consumers", "delays")
+FENCE_TABLES = ("fences", "events", "insides", "consumers", "delays", "starts")
+# The fence, and the first and last sequence, of a row with the events of many fences. A row that a format up to 6 has
+# written has events of one fence, and another encoding.
+MANY = (0, 0, 0)
 
+# Up to format 6 the rows of events said where the events of a fence begin.
+FORMAT_6 = {table: sql for table, sql in TABLES.items() if table != "starts"}
 # Format 5 had no fences whose events are delayed.
-FORMAT_5 = {table: sql for table, sql in TABLES.items() if table != "delays"}
+FORMAT_5 = {table: sql for table, sql in FORMAT_6.items() if table != "delays"}
 # Format 3 had no fences.
 FORMAT_3 = {table: sql for table, sql in TABLES.items() if table not in FENCE_TABLES} | {
     "totals": """CREATE TABLE totals (
@@ -133,6 +144,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     3: FORMAT_3,
     4: FORMAT_5,  # it had no centres in batches and snapshots, and no frames of hulls
     5: FORMAT_5,
+    6: FORMAT_6,
     FORMAT: TABLES,
 }
 
@@ -147,6 +159,7 @@ INSERT_INSIDE = (
 )
 INSERT_CONSUMER = "INSERT INTO consumers (rowid, fence, name, acknowledged, lost, checksum) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_DELAY = "INSERT INTO delays (rowid, fence, checksum, payload) VALUES (?, ?, ?, ?)"
+INSERT_START = "INSERT INTO starts (rowid, fence, first, checksum) VALUES (?, ?, ?, ?)"
 UPDATE_TOTALS = (
     "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_number=?, mode=?, fence_rows=?, checksum=?"
 )

@@ -36,7 +36,7 @@ from .disk import Access, Disk
 from .encoding import weight
 from .examine import Findings, examine, format_of, load
 from .fence_ledger import DropInside, inside_steps
-from .fence_reading import read_events, read_fence
+from .fence_reading import read_events, read_fences
 from .folder import Folder
 from .ledger import (
     DROPPED,
@@ -254,23 +254,21 @@ class SQLiteStorage:
             return self._settled().hulls[number].oldest
 
     @_as_storage_errors()
-    def read_fence(self, number: int) -> KeptFence | None:
-        """A fence as last committed."""
+    def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
+        """Fences as last committed."""
         with self._readers.lend() as connection:
             with self._visible:
-                fence = self._settled().fences.get(number)
-                if fence is None:
-                    return None
-                first, fence = fence.first, fence.since(fence.base)
+                found = [self._settled().fences.get(number) for number in numbers]
+                fences = [None if fence is None else fence.since(fence.base) for fence in found]
                 begin(connection)
-            return read_fence(connection, fence, first)
+            return read_fences(connection, fences)
 
     @_as_storage_errors()
     def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
         """Events of a fence."""
         with self._readers.lend() as connection:
             with self._visible:
-                fence = self._settled().fences[number].since(after)
+                fence = self._settled().fences[number].since(after, most)
                 begin(connection)
             return read_events(connection, fence, after, most)
 
@@ -431,7 +429,7 @@ class SQLiteStorage:
         self._ledger = findings.ledger
         connection.execute("BEGIN IMMEDIATE")
         if version < FORMAT:
-            migrate(connection, version, findings.ledger)
+            migrate(connection, version, findings.ledger, findings.starts)
         elif not findings.both_totals:
             renew_totals(connection, findings.ledger.totals)
         connection.execute("COMMIT")

@@ -1,0 +1,248 @@
+"""Blocks of events as bytes: the payload of a row of events.
+
+A payload has the number of events, that of runs, flags, and columns. A column of integers is their least one, the
+number of bytes of a difference to it, and these differences: what all have in common takes almost nothing. Of a
+previous position only the bits that differ from the position are stored, without the zero bytes before them.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull.arrays import Points
+
+from ...state.fences.event_block import Bytes, EventBlock, Integers
+from ...state.fences.records import EventType
+from ...state.records import NO_TIME
+from .columns import Cursor, point_bytes
+from .event_rows import put_members, take_members
+from .varints import put_signed, put_text, put_unsigned, take_signed, take_text, take_unsigned
+
+# The mark of an event: its type, and what it has. A distance without bytes of its own is 0.
+TYPE_BITS = 15
+HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
+PAIRED = EventType.BEGIN, EventType.CEASE  # they have a distance without a position
+# What a block has.
+HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE = 1, 2, 4, 8
+ALL_FLAGS = 15
+WORD = 8
+# The numbers from which on an integer needs one byte more.
+LIMITS = np.array([1 << 8 * size for size in range(WORD)], np.uint64)
+
+Words = npt.NDArray[np.uint64]
+Column = npt.NDArray[np.integer[Any]]
+
+
+class Runs(NamedTuple):
+    """What a payload says of its runs first.
+
+    Attributes:
+        fences: (m,) the numbers of the fences.
+        firsts: (m,) the sequence of the first event of each run.
+        counts: (m,) the number of its events.
+    """
+
+    fences: Integers
+    firsts: Integers
+    counts: Integers
+
+
+def encode_block(block: EventBlock, own: Sequence[str]) -> bytes:
+    """A block as bytes. `own` is for each run the name of the hull whose keys the fence compares, which is left out."""
+    out = bytearray()
+    marks, flags = _marks(block), 0
+    names = dict.fromkeys(hull for hull, other in zip(block.hulls, own, strict=True) if hull != other)
+    timed = block.event_times != NO_TIME
+    if names:
+        flags |= HAS_HULLS
+    if timed.any():
+        flags |= HAS_EVENT_TIMES
+        marks |= np.where(timed, np.uint8(HAS_EVENT_TIME), np.uint8(0))
+    if (block.first_times != NO_TIME).any():
+        flags |= HAS_FIRST_TIMES
+    if block.inside:
+        flags |= HAS_INSIDE
+    put_unsigned(out, len(block))
+    put_unsigned(out, len(block.fences))
+    out.append(flags)
+    put = _put_one if len(block) == 1 else _put_integers
+    put(out, block.fences, block.firsts, block.counts)
+    if names:
+        places = {name: place for place, name in enumerate(names, start=1)}
+        put_unsigned(out, len(names))
+        for name in names:
+            put_text(out, name)
+        of_runs = [0 if hull == other else places[hull] for hull, other in zip(block.hulls, own, strict=True)]
+        put(out, np.array(of_runs))
+    put(out, block.kinds, block.subject_revisions, block.area_revisions, block.times)
+    put(out, marks, block.causes, block.lengths)
+    out += block.keys
+    out += point_bytes(block.points[marks & HAS_POSITION != 0])
+    _put_previous(out, block, marks & HAS_PREVIOUS != 0)
+    out += block.distances[marks & HAS_DISTANCE != 0].astype("<f8", copy=False).tobytes()
+    if flags & HAS_EVENT_TIMES:
+        _put_integers(out, block.event_times[timed])
+    if flags & HAS_FIRST_TIMES:
+        _put_integers(out, block.first_times)
+    if block.inside:
+        put_unsigned(out, len(block.inside))
+        for row, members in block.inside.items():
+            put_unsigned(out, row)
+            put_members(out, members)
+    return bytes(out)
+
+
+def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
+    """The inverse of `encode_block`.
+
+    Args:
+        payload: the bytes.
+        own: the name of the hull whose keys a fence compares, by its number.
+
+    Raises:
+        ValueError: the bytes are no events.
+    """
+    cursor = Cursor(payload)
+    n, m, flags = _counts(cursor)
+    take = _take_one if n == 1 else _take_integers
+    fences, firsts, counts = (take(cursor, m) for _ in range(3))
+    hulls = [own(number) for number in fences.tolist()]
+    if flags & HAS_HULLS:
+        names = [take_text(cursor) for _ in range(take_unsigned(cursor))]
+        of_runs = take(cursor, m).tolist()
+        hulls = [names[place - 1] if place else hull for place, hull in zip(of_runs, hulls, strict=True)]
+    kinds, subject_revisions, area_revisions, times = (take(cursor, m) for _ in range(4))
+    marks, causes, lengths = (take(cursor, n).astype(np.uint8) for _ in range(3))
+    keys = bytes(cursor.take(int(lengths.sum(dtype=np.int64))))
+    types, there = marks & np.uint8(TYPE_BITS), marks & HAS_POSITION != 0
+    points = np.full((n, 2), np.nan)
+    points[there] = cursor.points(int(there.sum()))
+    previous = np.full((n, 2), np.nan)
+    before = marks & HAS_PREVIOUS != 0
+    previous[before] = _take_previous(cursor, points[before])
+    distances = np.where(there | np.isin(types, PAIRED), 0.0, np.nan)
+    far = marks & HAS_DISTANCE != 0
+    distances[far] = np.frombuffer(cursor.take(WORD * int(far.sum())), "<f8")
+    event_times, first_times = np.full(n, NO_TIME), np.full(n, NO_TIME)
+    if flags & HAS_EVENT_TIMES:
+        timed = marks & HAS_EVENT_TIME != 0
+        event_times[timed] = _take_integers(cursor, int(timed.sum()))
+    if flags & HAS_FIRST_TIMES:
+        first_times = _take_integers(cursor, n)
+    inside = {}
+    for _ in range(take_unsigned(cursor) if flags & HAS_INSIDE else 0):
+        row = take_unsigned(cursor)
+        inside[row] = take_members(cursor)
+    if not cursor.at_end:
+        raise ValueError("bytes follow the events")
+    return EventBlock(
+        fences,
+        firsts,
+        counts,
+        hulls,
+        kinds.astype(np.uint8),
+        subject_revisions,
+        area_revisions,
+        times,
+        types,
+        causes,
+        lengths,
+        keys,
+        points,
+        previous,
+        distances,
+        event_times,
+        first_times,
+        inside,
+    )
+
+
+def decode_runs(payload: bytes) -> Runs:
+    """Which fences have which events in a payload. ValueError if the bytes are no events."""
+    cursor = Cursor(payload)
+    n, m, _ = _counts(cursor)
+    take = _take_one if n == 1 else _take_integers
+    fences, firsts, counts = (take(cursor, m) for _ in range(3))
+    return Runs(fences, firsts, counts)
+
+
+def _counts(cursor: Cursor) -> tuple[int, int, int]:
+    n, m = take_unsigned(cursor), take_unsigned(cursor)
+    (flags,) = cursor.take(1)
+    if not 0 < m <= n or flags > ALL_FLAGS:
+        raise ValueError(f"a row has {n} events in {m} runs, and the flags {flags:#x}")
+    return n, m, flags
+
+
+def _marks(block: EventBlock) -> Bytes:
+    there, before = (~np.isnan(points[:, 0]) for points in (block.points, block.previous))
+    far = ~np.isnan(block.distances) & (block.distances != 0)
+    marks: Bytes = block.types | (HAS_POSITION * there + HAS_PREVIOUS * before + HAS_DISTANCE * far).astype(np.uint8)
+    return marks
+
+
+# Columns of integers
+
+
+def _put_one(out: bytearray, *columns: Column) -> None:
+    for column in columns:
+        put_signed(out, int(column[0]))
+
+
+def _take_one(cursor: Cursor, _: int) -> Integers:
+    return np.array([take_signed(cursor)], np.int64)
+
+
+def _put_integers(out: bytearray, *columns: Column) -> None:
+    for column in columns:
+        least = column.min()
+        above = column.astype(np.int64).view(np.uint64) - np.int64(least).view(np.uint64)
+        size = (int(above.max()).bit_length() + 7) // 8
+        put_signed(out, int(least))
+        out.append(size)
+        out += above.astype("<u8", copy=False).view(np.uint8).reshape(-1, WORD)[:, :size].tobytes()
+
+
+def _take_integers(cursor: Cursor, count: int) -> Integers:
+    least = take_signed(cursor)
+    (size,) = cursor.take(1)
+    if size > WORD:
+        raise ValueError(f"an integer of {size} bytes")
+    found = np.zeros((count, WORD), np.uint8)
+    found[:, :size] = np.frombuffer(cursor.take(count * size), np.uint8).reshape(count, size)
+    above = found.view("<u8").ravel().astype(np.uint64, copy=False)
+    return (above + np.array(least, np.int64).view(np.uint64)).view(np.int64)
+
+
+# Positions before
+
+
+def _put_previous(out: bytearray, block: EventBlock, before: npt.NDArray[np.bool_]) -> None:
+    differing = _words(block.previous[before]) ^ _words(block.points[before])
+    sizes = np.searchsorted(LIMITS, differing.ravel(), "right").astype(np.uint8)
+    out += (sizes[::2] << 4 | sizes[1::2]).tobytes()
+    out += differing.astype(">u8").view(np.uint8).reshape(-1, WORD)[_used(sizes)].tobytes()
+
+
+def _take_previous(cursor: Cursor, points: Points) -> Points:
+    both = np.frombuffer(cursor.take(len(points)), np.uint8)
+    sizes = np.column_stack([both >> 4, both & 15]).ravel()
+    if sizes.max(initial=0) > WORD:
+        raise ValueError("a coordinate of more than 8 bytes")
+    used = _used(sizes)
+    found = np.zeros((len(sizes), WORD), np.uint8)
+    found[used] = np.frombuffer(cursor.take(int(sizes.sum(dtype=np.int64))), np.uint8)
+    differing = found.view(">u8").reshape(-1, 2).astype(np.uint64)
+    return (differing ^ _words(points)).view(np.float64)
+
+
+def _words(points: Points) -> Words:
+    """The bits of coordinates; 0 where there is no position."""
+    return np.ascontiguousarray(np.where(np.isnan(points), 0.0, points)).view(np.uint64)
+
+
+def _used(sizes: Bytes) -> npt.NDArray[np.bool_]:
+    """Which bytes of big-endian words are not zero bytes at their beginning."""
+    return np.arange(WORD) >= WORD - sizes[:, None].astype(np.int64)
