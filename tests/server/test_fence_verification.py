@@ -21,6 +21,7 @@ from dynhull_server.engine.fences import LiveFence
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.faults import FenceFault
 from dynhull_server.state.fences.records import AppendEvents, Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME, HullSettings
@@ -167,8 +168,11 @@ def test_a_flipped_event_is_found(change: dict[str, object], complaint: str) -> 
         async with engine_in_memory() as engine:
             fence = await life(engine)
             assert (await verify_events(fence, engine.aside)).equal
-            recent = fence.fence._recent
-            recent[1] = recent[1]._replace(**change)
+            events, recent = await fence.events(0, 100), fence.fence.recent
+            recent.clear()
+            events[1] = events[1]._replace(**change)
+            for sequence, event in enumerate(events, start=1):
+                recent.add(sequence, block_of({fence.fence.number: [event]}), 0)
             return "\n".join(map(str, (await engine.get("fleet").verify())[1].fence_faults))
 
     assert complaint in asyncio.run(found()) + "\n"
@@ -246,7 +250,7 @@ def test_check_compares_stored_fences(tmp_path: Path, key: str, complaint: str) 
     assert run("check", data).returncode == 0
     storage = SQLiteStorage(data)
     (fence,) = storage.open(lambda *_: None).fences
-    storage.commit([AppendEvents(fence.number, [exits(key, 3)])])
+    storage.commit([AppendEvents(block_of({fence.number: [exits(key, 3)]}))])
     storage.close()
     done = run("check", data)
     assert done.returncode == 1

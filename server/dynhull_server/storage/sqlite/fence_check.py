@@ -17,13 +17,12 @@ from ...state.fences.records import KeptFence, Key, Subject
 from ...state.records import Center, Contents
 from ..port import NEWEST
 from .fence_ledger import FenceRows
-from .fence_reading import read_events, read_fence
+from .fence_reading import read_runs, read_settled
 from .ledger import HullRows, Ledger
 from .reading import read_hull
 
 # Faults of a fence, and of a hull, at most.
 MOST_FAULTS = 100
-EVENTS_TOGETHER = 1000
 
 
 @dataclass(slots=True)
@@ -74,7 +73,7 @@ class _Check:
 
     def run(self) -> list[FenceReport]:
         fences = sorted(self._ledger.fences.values(), key=lambda fence: fence.row.name)
-        stored = [self._follow(fence) for fence in fences]
+        stored = self._follow(fences)
         for name in sorted(self._hulls):
             sides = self._sides(name, stored)
             reports = {each.report.name: each.report for each in stored}
@@ -82,25 +81,27 @@ class _Check:
                 reports[fault.fence].faults.append(fault)
         return [each.report for each in stored]
 
-    def _follow(self, fence: FenceRows) -> _Stored:
-        """Read a fence, and follow its events: those since it was stored who is inside, and all that are kept."""
-        name = fence.row.name
-        kept = read_fence(self._connection, fence, fence.first)
-        newest = EventOrder(name, kept.inside.sequence, kept.inside.members)
-        newest.take(kept.events)
-        order = EventOrder(name, kept.first - 1)
-        while order.last < kept.last:
-            events = read_events(self._connection, fence.since(order.last), order.last, EVENTS_TOGETHER)
-            before = order.last
-            order.take(events)
-            if order.last <= before:  # not in order, or missing, which is a fault
-                break
-        inside = set(newest.inside())
-        faults = order.finish(inside, kept.last, kept.consumers.values())
-        faults += [fault for fault in newest.faults if fault not in faults]
-        # Those with a delay are on the other side than is reported.
-        sides = inside ^ kept.delays.keys()
-        return _Stored(kept, sides, FenceReport(name, kept.last, len(inside), faults))
+    def _follow(self, fences: list[FenceRows]) -> list[_Stored]:
+        """Read fences, and follow their events: those since it was stored who is inside, and all that are kept."""
+        kept = {fence.row.number: read_settled(self._connection, fence) for fence in fences}
+        newest = {
+            number: EventOrder(each.row.name, each.inside.sequence, each.inside.members)
+            for number, each in kept.items()
+        }
+        orders = {number: EventOrder(each.row.name, each.first - 1) for number, each in kept.items()}
+        for number, events in read_runs(self._connection, {fence.row.number: (fence, 0) for fence in fences}):
+            orders[number].take(events)
+            newest[number].take(event for event in events if event.sequence > kept[number].inside.sequence)
+        stored = []
+        for fence in fences:
+            number, name = fence.row.number, fence.row.name
+            inside, each = set(newest[number].inside()), kept[number]
+            faults = orders[number].finish(inside, fence.last, each.consumers.values())
+            faults += [fault for fault in newest[number].faults if fault not in faults]
+            # Those with a delay are on the other side than is reported.
+            sides = inside ^ each.delays.keys()
+            stored.append(_Stored(each, sides, FenceReport(name, fence.last, len(inside), faults)))
+        return stored
 
     def _sides(self, name: str, stored: list[_Stored]) -> Sides:
         """What fences have about a hull."""

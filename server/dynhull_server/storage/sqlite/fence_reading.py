@@ -2,8 +2,7 @@
 
 import sqlite3
 from array import array
-from collections.abc import Iterator, Sequence
-from itertools import chain
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from ...state.fences.records import Delay, FenceEvent, Inside, KeptFence, Members, Subject
 from ...state.records import NO_TIME
@@ -26,61 +25,71 @@ def read_fences(connection: sqlite3.Connection, fences: Sequence[FenceRows | Non
         DamagedError: a row is damaged or missing.
     """
     there = [fence for fence in fences if fence is not None]
-    events = _events(connection, there, [fence.base for fence in there])
-    return [None if fence is None else _kept(connection, fence, events[fence.row.number]) for fence in fences]
+    kept = {fence.row.number: read_settled(connection, fence) for fence in there}
+    for number, events in read_runs(connection, {fence.row.number: (fence, fence.base) for fence in there}):
+        kept[number].events += events
+    return [None if fence is None else kept[fence.row.number] for fence in fences]
+
+
+def read_settled(connection: sqlite3.Connection, fence: FenceRows) -> KeptFence:
+    """A fence without its events."""
+    consumers = {name: consumer for name, (consumer, _, _) in fence.consumers.items()}
+    delays = dict(_delays(connection, fence))
+    return KeptFence(fence.row, _inside(connection, fence, fence.base), [], fence.first, consumers, delays)
 
 
 def read_events(connection: sqlite3.Connection, fence: FenceRows, after: int, most: int) -> list[FenceEvent]:
     """At most that many events after a sequence, from the oldest that is kept."""
-    return _events(connection, [fence], [after], most)[fence.row.number]
+    found: list[FenceEvent] = []
+    for _, events in read_runs(connection, {fence.row.number: (fence, after)}, most):
+        found += events
+    return found
 
 
-def _kept(connection: sqlite3.Connection, fence: FenceRows, events: list[FenceEvent]) -> KeptFence:
-    consumers = {name: consumer for name, (consumer, _, _) in fence.consumers.items()}
-    delays = dict(_delays(connection, fence))
-    return KeptFence(fence.row, _inside(connection, fence, fence.base), events, fence.first, consumers, delays)
+def read_runs(
+    connection: sqlite3.Connection, wanted: Mapping[int, tuple[FenceRows, int]], most: int = NEWEST
+) -> Iterator[tuple[int, list[FenceEvent]]]:
+    """Some events of many fences, reading each row once.
 
+    Args:
+        connection: a connection whose transaction was open when the fences were copied.
+        wanted: fences by number, and the sequences after which their events are wanted.
+        most: the number of events of each that are wanted.
 
-def _events(
-    connection: sqlite3.Connection, fences: Sequence[FenceRows], after: Sequence[int], most: int = NEWEST
-) -> dict[int, list[FenceEvent]]:
-    """At most that many events of each fence after a sequence. Each row is read once."""
-    by_number = {fence.row.number: fence for fence in fences}
-    afters = {fence.row.number: max(each, fence.first - 1) for fence, each in zip(fences, after, strict=True)}
-    runs: dict[int, list[list[FenceEvent]]] = {number: [] for number in by_number}
-    places = array("q", sorted({place for fence in fences for place in fence.places}))
+    Yields:
+        The number of a fence, and its next events, in the order in which they were stored.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    last = {number: max(after, fence.first - 1) for number, (fence, after) in wanted.items()}
+    until = {number: min(last[number] + most, fence.last) for number, (fence, _) in wanted.items()}
+    places = array("q", sorted({place for fence, _ in wanted.values() for place in fence.places}))
     columns = "events.rowid, fence, first, last, checksum, payload"
 
     def own(number: int) -> str:
-        return by_number[number].row.config.subjects if number in by_number else ""
+        return wanted[number][0].row.config.subjects if number in wanted else ""
 
-    for place, number, first, last, stored, payload in rows_by_id(connection, columns, "events", places):
-        if checksum(payload, number, first, last) != stored:
-            named = next(fence for fence in fences if place in fence.places)
-            raise _damaged(named, "events are damaged")
-        if number in by_number:
-            runs[number].append(list(decode_events(payload, first, own(number))))
-        elif number == 0:
+    for place, number, first, end, stored, payload in rows_by_id(connection, columns, "events", places):
+        if checksum(payload, number, first, end) != stored:
+            fence = next(fence for fence, _ in wanted.values() if place in fence.places)
+            raise _damaged(fence, f"row {place} of events is damaged")
+        runs: Iterable[tuple[int, list[FenceEvent]]]
+        if number == 0:
             block = decode_block(payload, own)
-            for run, fence in enumerate(block.fences.tolist()):
-                if fence in by_number and block.firsts[run] + block.counts[run] > afters[fence] + 1:
-                    runs[fence].append(block.events(run))
-    return {number: list(_following(by_number[number], found, afters[number], most)) for number, found in runs.items()}
-
-
-def _following(fence: FenceRows, runs: list[list[FenceEvent]], after: int, most: int) -> Iterator[FenceEvent]:
-    """The next events after a sequence; DamagedError if one is missing."""
-    until = min(after + most, fence.last)
-    expected = after
-    in_order: list[list[FenceEvent]] = sorted(runs, key=lambda run: run[0].sequence)
-    for event in chain.from_iterable(in_order):
-        if expected < event.sequence <= until:
-            expected += 1
-            if event.sequence != expected:
-                break
-            yield event
-    if expected < until:
-        raise _damaged(fence, f"event {expected + 1} is missing")
+            runs = ((each, block.events(run)) for run, each in enumerate(block.fences.tolist()) if each in wanted)
+        else:
+            runs = [(number, list(decode_events(payload, first, own(number))))]
+        for each, made in runs:
+            events = [event for event in made if last[each] < event.sequence <= until[each]]
+            if events:
+                if events[0].sequence != last[each] + 1:
+                    raise _damaged(wanted[each][0], f"event {last[each] + 1} is missing")
+                last[each] = events[-1].sequence
+                yield each, events
+    for number, (fence, _) in wanted.items():
+        if last[number] < until[number]:
+            raise _damaged(fence, f"event {last[number] + 1} is missing")
 
 
 def _inside(connection: sqlite3.Connection, fence: FenceRows, base: int) -> Inside:
