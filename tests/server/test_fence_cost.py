@@ -1,0 +1,86 @@
+"""Writes to hulls without fences cost what they did before there were fences: not one instruction of Python more."""
+
+import sys
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+from live_engine import LIMITS
+
+from dynhull import FenceIndex
+from dynhull.keys import PackedKeys
+from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.core import Core
+from dynhull_server.state.events import Birth, Commit, Committed, CreateHull, WriteBatch
+from dynhull_server.state.fences.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.requests import CreateFence, DeleteFence
+from dynhull_server.state.fences.subjects import keyed
+from dynhull_server.state.records import HullSettings
+
+KEYS = PackedKeys.pack(f"k{row:02}" for row in range(64))
+FAR, NEAR = (np.random.default_rng(seed).random((64, 2)) + 10 * seed for seed in (1, 0))
+
+
+def asked(core: Core, request: Any) -> None:
+    """Carry out a request; every commit succeeds at once."""
+    for effect in core.step(request):
+        if isinstance(effect, Commit) and effect.ticket is not None:
+            core.step(Committed(effect.ticket))
+    assert request.error is None
+
+
+def write(points: np.ndarray) -> WriteBatch:
+    request = WriteBatch(64, lambda: KeyedBatch("str", KEYS, points, PackedKeys.pack([])))
+    request.to, request.name, request.rows = None, "fleet", 64
+    return request
+
+
+def instructions(core: Core) -> int:
+    """The bytecodes of two messages of 64 points that move all keys there and back, and the calls out of Python."""
+    count = 0
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal count
+        frame.f_trace_opcodes = True
+        count += event == "opcode"
+        return trace
+
+    def profile(_: FrameType, event: str, __: object) -> None:
+        nonlocal count
+        count += event == "c_call"
+
+    for _ in range(2):  # the first time, more is new than the fences
+        count = 0
+        for points in (FAR, NEAR):
+            before = sys.gettrace(), sys.getprofile()
+            sys.settrace(trace)
+            sys.setprofile(profile)
+            try:
+                asked(core, write(points))
+            finally:
+                sys.setprofile(before[1])
+                sys.settrace(before[0])
+    return count
+
+
+@pytest.mark.parametrize("immediate", [True, False])
+def test_a_hull_without_fences_does_not_pay_for_those_of_others(*, immediate: bool) -> None:
+    core = Core(LIMITS, immediate=immediate)
+    for name in ("fleet", "others"):
+        asked(core, CreateHull(None, name, Birth(name, 1.0), HullSettings("str")))
+
+    def fence(name: str, subjects: str) -> None:
+        config = FenceConfig(CircleArea(0.5, 0.5, 2.0), "hull", subjects)
+        asked(core, CreateFence(None, name, 1, config, Birth(name, 1.0)))
+
+    never = instructions(core)
+    assert never > 500
+    fence("elsewhere", "others")
+    assert instructions(core) == never
+    fence("here", "fleet")
+    assert instructions(core) > never
+    asked(core, DeleteFence(None, "here", 2))
+    assert instructions(core) == never
+    assert not core.busy
+    FenceIndex(keyed(core.get("fleet").state)).detach()  # refused while the kernel keeps a journal for another one
