@@ -4,14 +4,21 @@ from collections.abc import Iterator
 
 import pytest
 import server_process as servers
-from hypothesis import Phase, settings
+from hypothesis import HealthCheck, Phase, settings
 from server_process import SHAPES, server_process
 
 collect_ignore = ["data/make_phases.py", "mutants/run.py"]  # need packages that the tests do not
 
 # A slow moment of the machine is not a failure, and a change does not fail for examples that came up by chance:
 # `make properties` looks for those.
-settings.register_profile("dynhull", deadline=None, print_blob=True, derandomize=True, max_examples=50)
+settings.register_profile(
+    "dynhull",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    print_blob=True,
+    derandomize=True,
+    max_examples=50,
+)
 settings.register_profile("properties", settings.get_profile("dynhull"), derandomize=False, max_examples=1000)
 # Each mutant gets the same examples: none that another one has left in the database, and no time spent on shrinking.
 settings.register_profile(

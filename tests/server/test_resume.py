@@ -99,7 +99,7 @@ def follow(address: str, name: str, manner: Manner, writer: Writer) -> int:
     return resumed
 
 
-@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(st.lists(MANNERS, min_size=2, max_size=4), st.integers(0, 2**32))
 def test_whatever_the_watcher_its_copy_is_exact(address: str, manners: list[Manner], seed: int) -> None:
     name = next(NAMES)
