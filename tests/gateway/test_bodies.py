@@ -112,10 +112,10 @@ def test_compressed_bodies_are_refused(gateway: Gateway, plane: str) -> None:
     assert (refused.status, refused.json["field"]) == (415, "Content-Encoding")
 
 
-def test_a_slow_body_is_given_up(gateway: Gateway, plane: str) -> None:
-    """The gateway of the tests waits one second; what came before is not applied as a part of a batch."""
+def test_a_slow_body_is_given_up(hasty: Gateway, gateway: Gateway, plane: str) -> None:
+    """What came before is not applied as a part of a batch."""
     for path, kind in (("rows", NDJSON), ("points", "application/json"), ("locate", "application/json")):
-        connection = gateway.connection()
+        connection = hasty.connection()
         connection.putrequest("POST", f"/hulls/{plane}/{path}")
         connection.putheader("Content-Type", kind)
         connection.putheader("Content-Length", "100")

@@ -129,14 +129,14 @@ def test_errors_name_field_row_and_value(
     assert gateway.get(f"/hulls/{square}").json["info"]["revision"] == 1
 
 
-def test_refusals_of_the_server_have_their_status_and_reason(gateway: Gateway, square: str) -> None:
+def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gateway: Gateway, square: str) -> None:
     at = f"/hulls/{square}"
     cases = [
         (gateway.post("/hulls", {"name": square}), 409, "HULL_EXISTS"),
         (gateway.get("/hulls/there-is-none"), 404, "HULL_NOT_FOUND"),
         (gateway.post(f"{at}/points", {"delete": [[0, 0], [7, 7]]}), 409, "POINT_MISSING"),
         (gateway.get(f"{at}/entities"), 409, "HULL_UNSUITABLE"),
-        (gateway.get(f"{at}?min_revision=99"), 409, "REVISION_NOT_REACHED"),
+        (hasty.get(f"{at}?min_revision=99"), 409, "REVISION_NOT_REACHED"),
         (gateway.post(f"{at}/points", SQUARE, Idempotency_Key=f"{square}:2"), 409, "SEQUENCE_GAP"),
         (gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number"), 400, "INVALID_FIELD"),
         (gateway.get(f"{at}?min_revision=-1"), 400, "INVALID_FIELD"),
