@@ -28,6 +28,7 @@ from dynhull_server.state.fences.records import (
     FenceEvent,
     FenceRow,
     Members,
+    Origin,
     PutConsumer,
 )
 from dynhull_server.state.limits import FenceLimits
@@ -286,18 +287,19 @@ class FenceModel:
         config = fence.config
         now = at | {name: last for name, (_, last) in step.to.items()}
         area = config.area_hull
-        moved = area in step.to and self._corners(area, at) != self._corners(area, now)
+        area_moved = area in step.to and self._corners(area, at) != self._corners(area, now)
         if config.kind == "other":
             other = config.subjects
             other_moved = other in step.to and self._corners(other, at) != self._corners(other, now)
-            if (moved or other_moved) and self._near(config, now) != state.near:
-                causes = (Cause.AREA if moved else 0) | (Cause.MOVED if other_moved else 0)
+            if (area_moved or other_moved) and self._near(config, now) != state.near:
+                causes = (Cause.AREA if area_moved else 0) | (Cause.MOVED if other_moved else 0)
                 yield self._paired(config, now, near=not state.near, causes=causes)
             return
+        moved = self._transfers(config, step, at) if step.together else {}
         for name, truth in self._subjects(config):
             was = truth.held[at[name]] if name in at else {}
             present = truth.held[now[name]]
-            if not moved and name not in step.to:
+            if not area_moved and name not in step.to:
                 continue
             gone: dict[Key, int] = {}
             for revision in range(at.get(name, 0) + 1, now[name] + 1):
@@ -305,28 +307,64 @@ class FenceModel:
             changes = [
                 (key, was.get(key), present.get(key), gone.get(key, 0))
                 for key in sorted({*was, *present})
-                if moved or config.area == HullArea(name, without_self=True) or was.get(key) is not present.get(key)
+                if area_moved
+                or config.area == HullArea(name, without_self=True)
+                or was.get(key) is not present.get(key)
             ]
-            yield from self._look(config, now, state, name, changes, Cause.AREA if moved else 0)
+            changes = [
+                (key, self._place(moved[name, key], at) if (name, key) in moved else before, place, why)
+                for key, before, place, why in changes
+                if (name, key) not in moved.values()
+            ]
+            yield from self._look(config, now, state, name, changes, Cause.AREA if area_moved else 0, moved)
+
+    def _transfers(self, config: FenceConfig, step: Step, at: dict[str, int]) -> dict[Subject, Subject]:
+        """The subjects that batches which came together have moved to another hull, and who they were before."""
+        found: dict[Subject, Subject] = {}
+        truths = {name: truth for name, truth in self._subjects(config) if name in step.to}
+        for source, truth in truths.items():
+            left = truth.gone[step.to[source][1]]
+            for key in (key for key, why in left.items() if why == Cause.REMOVED):
+                for target, other in truths.items():
+                    new = key not in other.held[at[target]] and key in other.held[step.to[target][1]]
+                    if new and target != source and (target, key) not in found:
+                        found[target, key] = source, key
+                        break
+        return found
+
+    def _place(self, subject: Subject, at: dict[str, int]) -> Entity:
+        hull, key = subject
+        return self._model.alive[hull].held[at[hull]][key]
 
     def _look(
-        self, config: FenceConfig, now: dict[str, int], state: State, name: str, changes: Iterable[Change], cause: int
+        self,
+        config: FenceConfig,
+        now: dict[str, int],
+        state: State,
+        name: str,
+        changes: Iterable[Change],
+        cause: int,
+        moved: dict[Subject, Subject] | None = None,
     ) -> "Iterator[FenceEvent]":
         """The events of one hull's keys; `cause` is why the area is another one, or 0."""
         for key, was, place, gone in changes:
-            inside = (name, key) in state.inside
+            former = (moved or {}).get((name, key), (name, key))
+            origin = Origin(former[0], now[former[0]]) if former[0] != name else None
+            inside = former in state.inside
             shape = self._shape(config, now, key)
-            there = Expected(config, now, name, key, was, place)
+            there = Expected(config, now, name, key, was, place, origin)
             if place is None:
                 if inside:
                     yield there.event(EventType.EXIT, gone | cause)
                 continue
             p = _exact(place)
-            causes = cause | (Cause.APPEARED if was is None else Cause.MOVED if _exact(was) != p else 0)
+            causes = cause | (Cause.APPEARED if was is None else Cause.MOVED if origin or _exact(was) != p else 0)
             causes = causes or Cause.AREA  # only the others have moved, of whom the subject itself is not one
             if inside:
                 if shape.farther(p, _units(config.margin), closed=config.closed):
                     yield there.event(EventType.EXIT, causes)
+                elif origin is not None:
+                    yield there.event(EventType.TRANSFER, causes)
             elif shape.holds(p, closed=config.closed):
                 yield there.event(EventType.ENTER, causes)
             elif config.crosses and was is not None and _exact(was) != p and shape.passed(_exact(was), p):
@@ -340,7 +378,9 @@ class FenceModel:
             case EventType.ENTER:
                 inside[event.hull, event.key] = event.time if config.dwell else None
             case EventType.EXIT:
-                del inside[event.hull, event.key]
+                del inside[event.former]
+            case EventType.TRANSFER:
+                inside[event.hull, event.key] = inside.pop(event.former)
             case EventType.DWELL:
                 inside[event.hull, event.key] = None
 
@@ -516,7 +556,7 @@ class FenceModel:
 
 
 class Expected(NamedTuple):
-    """What an expected event is about: `was` and `place` are the entity before and after."""
+    """What an expected event is about: `was` and `place` are the entity before and after, `origin` where it was."""
 
     config: FenceConfig
     at: dict[str, int]
@@ -524,6 +564,7 @@ class Expected(NamedTuple):
     key: Key | None
     was: Entity | None
     place: Entity | None
+    origin: Origin | None = None
 
     def event(self, kind: EventType, causes: int) -> FenceEvent:
         """The event, without what is only known of the real one."""
@@ -542,6 +583,7 @@ class Expected(NamedTuple):
             None,
             NO_TIME if place is None else place.time,
             0,
+            origin=self.origin,
         )
 
 

@@ -22,7 +22,13 @@ SENTENCES = {
 }
 
 
-EVENTS = {"enter": "{} entered", "exit": "{} left", "cross": "{} passed through", "dwell": "{} stayed"}
+EVENTS = {
+    "enter": "{} entered",
+    "exit": "{} left",
+    "cross": "{} passed through",
+    "dwell": "{} stayed",
+    "transfer": "{} changed hulls",
+}
 
 
 def describe(hulls: Iterable[HullFeed], fences: Iterable[FenceFeed] = ()) -> str:

@@ -1,6 +1,6 @@
 // The list of events, newest first.
-const EVENT_WORDS = {enter: "★ enter", exit: "☆ exit", cross: "⤭ cross", dwell: "⧗ dwell", begin: "★ begin",
-  cease: "☆ cease", snapshot: "≡ snapshot", closed: "✕ closed", lost: "⚠ lost"}
+const EVENT_WORDS = {enter: "★ enter", exit: "☆ exit", cross: "⤭ cross", dwell: "⧗ dwell", transfer: "⇄ transfer",
+  begin: "★ begin", cease: "☆ cease", snapshot: "≡ snapshot", closed: "✕ closed", lost: "⚠ lost"}
 class Events {
   // `look_for` is called with a key that the viewer clicks.
   constructor(look_for) {

@@ -57,9 +57,10 @@ class Marks:
     def take(self, event: FenceEvent) -> None:
         """Mark who enters, and no longer who leaves: sooner than by the next reading."""
         subject = event.hull, str(event.key)
-        if event.type == "exit" and subject in self._marks:
-            del self._marks[subject]
+        former = event.previous_hull or event.hull, str(event.key)
+        if event.type in ("exit", "transfer") and former in self._marks:
+            del self._marks[former]
             self._message = None
-        elif event.type == "enter" and event.position is not None and len(self) < MOST_MARKED:
+        if event.type in ("enter", "transfer") and event.position is not None and len(self) < MOST_MARKED:
             self._marks[subject] = Mark(*subject, *shown_place(*event.position, self.center))
             self._message = None

@@ -13,7 +13,18 @@ from ._times import decode_time
 Boundary = Literal["closed", "open"]
 Initial = Literal["snapshot", "events", "none"]
 EventType = Literal[
-    "enter", "exit", "cross", "dwell", "begin", "cease", "snapshot", "closed", "lost", "progress", "unknown"
+    "enter",
+    "exit",
+    "cross",
+    "dwell",
+    "transfer",
+    "begin",
+    "cease",
+    "snapshot",
+    "closed",
+    "lost",
+    "progress",
+    "unknown",
 ]
 FenceCause = Literal[
     "subject_moved",
@@ -40,6 +51,7 @@ TYPES: dict[int, EventType] = {
     fence_pb2.FENCE_EVENT_TYPE_EXIT: "exit",
     fence_pb2.FENCE_EVENT_TYPE_CROSS: "cross",
     fence_pb2.FENCE_EVENT_TYPE_DWELL: "dwell",
+    fence_pb2.FENCE_EVENT_TYPE_TRANSFER: "transfer",
     fence_pb2.FENCE_EVENT_TYPE_BEGIN: "begin",
     fence_pb2.FENCE_EVENT_TYPE_CEASE: "cease",
     fence_pb2.FENCE_EVENT_TYPE_SNAPSHOT: "snapshot",
@@ -155,7 +167,8 @@ class FenceEvent:
 
     Attributes:
         type: what happened. "enter" and "exit" of a subject, which alternate; "cross": it passed through the area
-            between two positions outside; "dwell": it has been inside for the configured time;
+            between two positions outside; "dwell": it has been inside for the configured time; "transfer": it was
+            inside as a key of `previous_hull` and is inside as a key of `hull`;
             "begin" and "cease": two hulls intersect or are near, or no longer; "snapshot": the subjects that were
             inside at first; "closed": the fence was deleted. "lost": events were dropped before they could be sent;
             "progress": nothing has happened for a while. "unknown": a type that this version of the client does not
@@ -180,6 +193,10 @@ class FenceEvent:
         first: of "lost", the first sequence that was dropped; 0 otherwise.
         last: of "lost", the last sequence that was dropped; 0 otherwise.
         conflated: the number of events left out before this one because they cancel each other.
+        previous_hull: of a subject of a prefix that one batch has moved from another hull, the name of that one, where
+            `previous_position` is; empty otherwise. A list of the subjects inside loses the key of this hull by "exit"
+            and "transfer".
+        previous_hull_revision: the revision of that hull that has removed the key; 0 otherwise.
     """
 
     type: EventType
@@ -201,6 +218,8 @@ class FenceEvent:
     first: int = 0
     last: int = 0
     conflated: int = 0
+    previous_hull: str = ""
+    previous_hull_revision: int = 0
 
 
 def decode_fence(message: fence_pb2.Fence) -> Fence:
@@ -270,6 +289,8 @@ def decode_fence_event(message: fence_pb2.FenceEvent, fence: str, uid: str, conf
         first_time=decode_time(message.first_time) if message.HasField("first_time") else None,
         inside=tuple(map(_subjects_inside, message.inside)),
         conflated=conflated,
+        previous_hull=message.previous_hull,
+        previous_hull_revision=message.previous_hull_revision,
     )
 
 

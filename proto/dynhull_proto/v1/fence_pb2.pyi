@@ -36,6 +36,7 @@ class FenceEventType(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     FENCE_EVENT_TYPE_CEASE: _ClassVar[FenceEventType]
     FENCE_EVENT_TYPE_SNAPSHOT: _ClassVar[FenceEventType]
     FENCE_EVENT_TYPE_CLOSED: _ClassVar[FenceEventType]
+    FENCE_EVENT_TYPE_TRANSFER: _ClassVar[FenceEventType]
 
 class FenceCause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -64,6 +65,7 @@ FENCE_EVENT_TYPE_BEGIN: FenceEventType
 FENCE_EVENT_TYPE_CEASE: FenceEventType
 FENCE_EVENT_TYPE_SNAPSHOT: FenceEventType
 FENCE_EVENT_TYPE_CLOSED: FenceEventType
+FENCE_EVENT_TYPE_TRANSFER: FenceEventType
 FENCE_CAUSE_UNSPECIFIED: FenceCause
 FENCE_CAUSE_SUBJECT_MOVED: FenceCause
 FENCE_CAUSE_AREA_MOVED: FenceCause
@@ -179,7 +181,7 @@ class CircleArea(_message.Message):
     def __init__(self, center_x: _Optional[float] = ..., center_y: _Optional[float] = ..., radius: _Optional[float] = ...) -> None: ...
 
 class FenceEvent(_message.Message):
-    __slots__ = ("sequence", "type", "causes", "subject_hull", "string_key", "integer_key", "subject_revision", "area_revision", "position", "previous_position", "distance", "event_time", "time", "first_time", "inside")
+    __slots__ = ("sequence", "type", "causes", "subject_hull", "string_key", "integer_key", "subject_revision", "area_revision", "position", "previous_position", "distance", "event_time", "time", "first_time", "inside", "previous_hull", "previous_hull_revision")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     TYPE_FIELD_NUMBER: _ClassVar[int]
     CAUSES_FIELD_NUMBER: _ClassVar[int]
@@ -195,6 +197,8 @@ class FenceEvent(_message.Message):
     TIME_FIELD_NUMBER: _ClassVar[int]
     FIRST_TIME_FIELD_NUMBER: _ClassVar[int]
     INSIDE_FIELD_NUMBER: _ClassVar[int]
+    PREVIOUS_HULL_FIELD_NUMBER: _ClassVar[int]
+    PREVIOUS_HULL_REVISION_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     type: FenceEventType
     causes: _containers.RepeatedScalarFieldContainer[FenceCause]
@@ -210,7 +214,9 @@ class FenceEvent(_message.Message):
     time: _timestamp_pb2.Timestamp
     first_time: _timestamp_pb2.Timestamp
     inside: _containers.RepeatedCompositeFieldContainer[FenceSubjects]
-    def __init__(self, sequence: _Optional[int] = ..., type: _Optional[_Union[FenceEventType, str]] = ..., causes: _Optional[_Iterable[_Union[FenceCause, str]]] = ..., subject_hull: _Optional[str] = ..., string_key: _Optional[str] = ..., integer_key: _Optional[int] = ..., subject_revision: _Optional[int] = ..., area_revision: _Optional[int] = ..., position: _Optional[_Union[FencePosition, _Mapping]] = ..., previous_position: _Optional[_Union[FencePosition, _Mapping]] = ..., distance: _Optional[float] = ..., event_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., first_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., inside: _Optional[_Iterable[_Union[FenceSubjects, _Mapping]]] = ...) -> None: ...
+    previous_hull: str
+    previous_hull_revision: int
+    def __init__(self, sequence: _Optional[int] = ..., type: _Optional[_Union[FenceEventType, str]] = ..., causes: _Optional[_Iterable[_Union[FenceCause, str]]] = ..., subject_hull: _Optional[str] = ..., string_key: _Optional[str] = ..., integer_key: _Optional[int] = ..., subject_revision: _Optional[int] = ..., area_revision: _Optional[int] = ..., position: _Optional[_Union[FencePosition, _Mapping]] = ..., previous_position: _Optional[_Union[FencePosition, _Mapping]] = ..., distance: _Optional[float] = ..., event_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., first_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., inside: _Optional[_Iterable[_Union[FenceSubjects, _Mapping]]] = ..., previous_hull: _Optional[str] = ..., previous_hull_revision: _Optional[int] = ...) -> None: ...
 
 class FencePosition(_message.Message):
     __slots__ = ("x", "y")

@@ -96,10 +96,14 @@ def following(after: int, events: list[FenceEvent], first: int) -> Sent | None:
 
 
 def conflated(events: list[FenceEvent]) -> list[FenceEvent]:
-    """The events without pairs of an enter and an exit of one subject, and what was between. O(number of events)."""
+    """The events without pairs of an enter and an exit of one subject, and what was between. O(number of events).
+
+    Those of subjects that change hulls all stay: who has only the last one would not know which subject it is about.
+    """
     last: dict[tuple[str, str | int | None], list[int]] = {}
+    moved = {subject for event in events if event.origin for subject in (event.former, (event.hull, event.key))}
     for row, event in enumerate(events):
-        if event.type in (EventType.ENTER, EventType.EXIT):
+        if event.type in (EventType.ENTER, EventType.EXIT) and (event.hull, event.key) not in moved:
             last.setdefault((event.hull, event.key), []).append(row)
     # Of one subject they alternate: an even number of them is nothing, of an odd one the last one stays.
     left_out = {row for rows in last.values() for row in (rows if len(rows) % 2 == 0 else rows[:-1])}

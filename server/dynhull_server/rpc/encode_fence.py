@@ -35,6 +35,7 @@ TYPES: dict[EventType, fence_pb2.FenceEventType] = {
     EventType.EXIT: fence_pb2.FENCE_EVENT_TYPE_EXIT,
     EventType.CROSS: fence_pb2.FENCE_EVENT_TYPE_CROSS,
     EventType.DWELL: fence_pb2.FENCE_EVENT_TYPE_DWELL,
+    EventType.TRANSFER: fence_pb2.FENCE_EVENT_TYPE_TRANSFER,
     EventType.BEGIN: fence_pb2.FENCE_EVENT_TYPE_BEGIN,
     EventType.CEASE: fence_pb2.FENCE_EVENT_TYPE_CEASE,
     EventType.SNAPSHOT: fence_pb2.FENCE_EVENT_TYPE_SNAPSHOT,
@@ -150,6 +151,8 @@ def encode_fence_event(event: FenceEvent) -> fence_pb2.FenceEvent:
         message.position.x, message.position.y = event.position
     if event.previous is not None:
         message.previous_position.x, message.previous_position.y = event.previous
+    if event.origin is not None:
+        message.previous_hull, message.previous_hull_revision = event.origin
     if event.distance is not None:
         message.distance = event.distance
     message.time.FromMicroseconds(event.time)

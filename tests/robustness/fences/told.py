@@ -15,7 +15,7 @@ from world import GUEST, FenceModel, World, exact
 from dynhull_proto.v1 import fence_pb2
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.events import WriteBatch
-from dynhull_server.state.fences.records import Cause, EventType, FenceEvent, Key
+from dynhull_server.state.fences.records import Cause, EventType, FenceEvent, Key, Origin
 from dynhull_server.state.records import NO_TIME
 
 # Microseconds after which a subject that stays must have made its event, also on a busy machine.
@@ -215,9 +215,13 @@ class Reader:
         elif event.key is not None and event.type is EventType.ENTER:
             must((event.hull, event.key) not in self.since, "inside already:", event)
             self.since[event.hull, event.key] = event.time
+        elif event.key is not None and event.type is EventType.TRANSFER:
+            must(event.former in self.since, "not inside:", event)
+            must((event.hull, event.key) not in self.since, "inside already:", event)
+            self.since[event.hull, event.key] = self.since.pop(event.former)
         elif event.key is not None and event.type is EventType.EXIT:
-            must((event.hull, event.key) in self.since, "not inside:", event)
-            since = self.since.pop((event.hull, event.key))
+            must(event.former in self.since, "not inside:", event)
+            since = self.since.pop(event.former)
             late = self.dwell and since is not None and since and event.time - since > self.dwell + PATIENT
             must(not late, "it has made no event of its stay since", since, event)
 
@@ -285,6 +289,9 @@ def decoded(message: fence_pb2.FenceEvent, prefix: str) -> FenceEvent:
         message.time.ToMicroseconds(),
         times[1],
         tuple(Inside(each.hull.removeprefix(prefix), list(keys_of(each.keys))) for each in message.inside),  # type: ignore[arg-type]
+        Origin(message.previous_hull.removeprefix(prefix), message.previous_hull_revision)
+        if message.previous_hull
+        else None,
     )
 
 

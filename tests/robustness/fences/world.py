@@ -13,7 +13,7 @@ from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Batch, KeyedBatch
 from dynhull_server.state.events import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea, PolygonArea
-from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
+from dynhull_server.state.fences.records import Cause, EventType, FenceEvent, Origin
 from dynhull_server.state.fences.requests import CreateFence, DeleteFence, PassTime, PutConsumer, ReplaceFence
 from dynhull_server.state.records import NO_TIME, HullSettings
 
@@ -82,6 +82,19 @@ class FenceModel:
     last: int = 0
     consumers: dict[str, int] = field(default_factory=dict)
 
+    def take_along(self, source: Subject, to: Subject) -> bool:
+        """A subject has another name. Returns whether it is inside, as the events say."""
+        inside = source in self.inside
+        for known in (self.inside, self.beyond, self.told):
+            if source in known:
+                known.remove(source)
+                known.add(to)
+        if source in self.delays:
+            self.delays[to] = self.delays.pop(source)
+        if source in self.stays:
+            self.stays[to] = self.stays.pop(source)
+        return inside
+
 
 class World:
     """What was committed."""
@@ -95,6 +108,7 @@ class World:
         self.revisions = dict.fromkeys(HULLS, 0)
         self.fences: dict[str, FenceModel] = {}
         self.time = 0  # of the present request
+        self._origin: Origin | None = None  # of the present subject
 
     # Areas
 
@@ -230,15 +244,26 @@ class World:
     ) -> None:
         """Make the events of the difference between two states, given which keys were removed, and which put."""
         places, shapes = before
+        transfers = self._transfers(places, removed or {}, put or {})
         for name, fence in self.fences.items():
             if fence.config.kind == "other":
                 self._look_at_pair(fence, 0)
                 continue
             area = self.shape(fence.config) != shapes[name]
-            for subject in self.subjects(fence.config):
+            compared = self.subjects(fence.config)
+            moved = {to: source for to, source in transfers.items() if to[0] in compared and source[0] in compared}
+            taken = {source: fence.take_along(source, to) for to, source in moved.items()}
+            for subject in compared:
                 was, now = places[subject], self.positions[subject]
                 reports = (put or {}).get(subject, set())
                 for key in sorted(was.keys() | now.keys(), key=str.encode):
+                    source = moved.get((subject, key))
+                    if source is not None:
+                        there, here = places[source[0]][key], now[key]
+                        self._go_over(fence, source, subject, there, here, area=area, inside=taken[source])
+                        continue
+                    if (subject, key) in taken:
+                        continue
                     cause = Cause(0)
                     if key not in was:
                         cause = Cause.APPEARED
@@ -249,6 +274,35 @@ class World:
                     if area or was != now or key in reports:
                         own = key in reports
                         self._look(fence, (subject, key), was.get(key), now.get(key), int(cause), area=area, own=own)
+
+    def _transfers(
+        self, before: Positions, removed: dict[str, set[str]], put: dict[str, set[str]]
+    ) -> dict[Subject, Subject]:
+        """The keys that a batch has moved from one hull to another, with the subjects that they were."""
+        found: dict[Subject, Subject] = {}
+        for source, keys in sorted(removed.items()):
+            for key in keys:
+                for target, new in sorted(put.items()):
+                    there = key in new and key not in before[target] and key in self.positions[target]
+                    if there and target != source and (target, key) not in found:
+                        found[target, key] = source, key
+                        break
+        return found
+
+    def _go_over(
+        self, fence: FenceModel, source: Subject, hull: str, was: Point, now: Point, *, area: bool, inside: bool
+    ) -> None:
+        """A subject has changed hulls; what was known of it went along. `inside`: as the events say, before."""
+        subject = hull, source[1]
+        known = subject in fence.beyond and subject not in fence.delays
+        self._origin = Origin(source[0], self.revisions[source[0]])
+        made = len(fence.events)
+        self._look(fence, subject, was, now, int(Cause.MOVED), area=area, own=True)
+        told = {event.type for event in fence.events[made:]} - {EventType.CROSS}
+        if inside and not told:
+            shown = was if known and subject in fence.beyond else None
+            self._tell(fence, EventType.TRANSFER, subject, shown, now, int(Cause.MOVED))
+        self._origin = None
 
     def _look_at_pair(self, fence: FenceModel, cause: int) -> None:
         if self.near(fence.config) != fence.near:
@@ -358,6 +412,7 @@ class World:
                 NO_TIME,
                 fence.time,
                 first,
+                origin=self._origin,
             )
         )
 
@@ -476,10 +531,29 @@ class Chance:
         return np.array([[self._rng.randrange(-4, 24) / 2 for _ in range(2)] for _ in range(n)]).reshape(-1, 2)
 
     def together(self, time: int, to: Any) -> WriteTogether:
+        if self._rng.random() < 0.4:
+            request = WriteTogether(self._transfer(time, to))
+            request.to = to
+            return request
         names = self._rng.sample(HULLS, self._rng.choice([2, 2, 3]))
         request = WriteTogether([self.batch(name, time, to) for name in names])
         request.to = to
         return request
+
+    def _transfer(self, time: int, to: Any) -> list[WriteBatch]:
+        """Keys that change hulls, and perhaps others that move."""
+        source, target = self._rng.sample(sorted(self._world.there - {ZONE}), 2)
+        there = sorted(self._world.positions[source])
+        keys = self._rng.sample(there, min(len(there), self._rng.choice([1, 1, 2])))
+        points = self._points(len(keys))
+        if self._rng.random() < 0.3:
+            points = np.array([self._world.positions[source][key] for key in keys], float).reshape(-1, 2) / 2
+        parts = [self.batch(source, time, to), self.batch(target, time, to)]
+        parts[0].make = lambda: KeyedBatch("str", NO_KEYS, NONE, PackedKeys.pack(keys))
+        parts[1].make = lambda: KeyedBatch("str", PackedKeys.pack(keys), points, NO_KEYS)
+        if self._rng.random() < 0.3:
+            parts.append(self.batch(ZONE, time, to))
+        return self._rng.sample(parts, len(parts))
 
     def birth(self) -> Birth:
         self._births += 1

@@ -1,6 +1,6 @@
 """What a change of a hull means for a fence whose events are delayed: `confirmations` and `min_dwell`."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Container, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,15 +9,16 @@ from dynhull import Crossings
 from dynhull.keys import key_list, take_keys
 
 from ..contents.live import AnyKeyedHull
-from ..records import KeyRows
+from ..records import NO_TIME, KeyRows
 from .event_log import Swap
-from .fence_leg import FenceLeg, caused
-from .records import Cause, Delay, EventType, Key, Subject
+from .fence_leg import NOBODY, FenceLeg, caused
+from .records import Cause, Delay, EventType, Key, Origin, Subject
 from .subjects import Subjects, keyed
 
 OWN = Cause.MOVED | Cause.APPEARED
 GONE = Cause.REMOVED | Cause.EXPIRED
 NO_ROWS = slice(0)
+TRANSFERRED = 2  # a change, as the index reports it
 
 
 @dataclass(slots=True)
@@ -26,13 +27,13 @@ class KeysChanged:
 
     Attributes:
         rows: the batch; None where keys have only expired.
-        expired: the keys whose deadline had come before the batch, if it is one of several hulls.
-        fewer: whether keys may have left.
+        expired: the keys whose deadline had come, in an expiry or before a batch to one of several hulls.
+        fewer: whether others may have left, too old or too many.
     """
 
     rows: KeyRows | None = None
     expired: Collection[Key] = ()
-    fewer: bool = True
+    fewer: bool = False
     _removed: set[Key] | None = field(default=None, init=False)
 
     def why_gone(self, key: Key) -> Cause:
@@ -41,17 +42,23 @@ class KeysChanged:
             self._removed = set() if self.rows is None else set(key_list(self.rows.removes)) - set(self.expired)
         return Cause.REMOVED if key in self._removed else Cause.EXPIRED
 
-    def reports(self, hull: AnyKeyedHull, asked: Collection[Key]) -> list[Key]:
-        """Those of some keys, all of which were there before or after the batch, whose position it has written."""
+    def gone(self, waiting: Collection[Key]) -> Iterable[Key]:
+        """Those of some keys that may have left. O(rows of the batch), or of all if points are too old or too many."""
+        if self.fewer:
+            return list(waiting)
+        left = () if self.rows is None else key_list(self.rows.removes)
+        return {key for each in (left, self.expired) for key in each if key in waiting}
+
+    def reports(self, hull: AnyKeyedHull, asked: Container[Key], new: Collection[Key] = ()) -> list[Key]:
+        """Those of some keys whose position the batch has written; all but `new` were there before it. O(its rows)."""
         rows = self.rows
-        if rows is None or not asked:
+        if rows is None:
             return []
-        asked = set(asked)
         found = [row for row, key in enumerate(key_list(rows.keys)) if key in asked]
         keys = take_keys(rows.keys, np.array(found, np.intp))
         written = np.ones(len(found), np.bool_)
         if rows.condition == "absent":  # only a key that has expired
-            written &= np.array([key in self.expired for key in key_list(keys)], np.bool_)
+            written &= np.array([key in self.expired or key in new for key in key_list(keys)], np.bool_)
         if hull.ordered and rows.times is not None:
             written &= ~(rows.times[found] < hull.times(keys))
         return [key for key, each in zip(key_list(keys), written.tolist(), strict=True) if each]
@@ -65,6 +72,7 @@ def delay(
     swap: Swap | None,
     now: int,
     changed: KeysChanged | None,
+    origins: Mapping[Key, Origin] = NOBODY,
 ) -> None:
     """Begin and end delays, and make the events for which nothing is missing any more.
 
@@ -76,29 +84,58 @@ def delay(
         swap: a cause, and the one that it stands for.
         now: the time.
         changed: what has happened to the keys; None where only the area has changed.
+        origins: where subjects of this fence come from, with their delays.
     """
     delays, hull = leg.fence.delays, subjects.hull.name
     assert delays is not None  # the caller checks it
     first = len(leg.events)
+    arrived = _reported_inside(delays.of(hull), crossings, rows, origins) if origins else set()
     begun: set[Key] = set()
     if crossings is not None:
         begun = _follow(leg, subjects, crossings, rows, swap, now)
-    waiting = delays.of(hull)
+    waiting = delays.of(hull)  # another one, if there were none before
     touched = set(begun)
     if changed is not None and waiting:
-        if changed.fewer:
-            _leave(leg, subjects, changed, now)
+        _leave(leg, subjects, changed, now)
         if leg.row.config.confirmations:
-            asked = [key for key, each in waiting.items() if not delays.confirmed(each) and key not in begun]
-            for key in changed.reports(keyed(subjects.hull.state), asked):
+            for key in changed.reports(keyed(subjects.hull.state), waiting, origins.keys()):
                 each = waiting[key]
-                leg.put_delay((hull, key), each._replace(reports=each.reports + 1))
-                touched.add(key)
+                if key not in begun and not delays.confirmed(each):
+                    leg.put_delay((hull, key), each._replace(reports=each.reports + 1))
+                    touched.add(key)
     ripe = [(hull, key) for key in touched if key in waiting and delays.ripe(waiting[key], leg.time(now))]
     end_some(leg, subjects, ripe, Cause(0), now)
+    told = {event.key for event in leg.events[first:] if event.type is not EventType.CROSS}
+    if arrived - told:
+        leg.report(subjects, dict.fromkeys(arrived - told, (EventType.TRANSFER, int(Cause.MOVED), NO_TIME)), now)
     ordered = sorted(leg.events[first:], key=lambda event: event.key)  # type: ignore[arg-type, return-value]
     start = leg.events[first].sequence if ordered else 0
-    leg.events[first:] = [event._replace(sequence=start + place) for place, event in enumerate(ordered)]
+    leg.events[first:] = [
+        event._replace(sequence=start + place, origin=origins.get(event.key))  # type: ignore[arg-type]
+        for place, event in enumerate(ordered)
+    ]
+
+
+def take_over(leg: FenceLeg, subjects: Subjects, origins: Mapping[Key, Origin]) -> None:
+    """Let subjects that come from other hulls of the fence bring their delays."""
+    delays = leg.fence.delays
+    assert delays is not None  # the caller checks it
+    for key, origin in origins.items():
+        each = delays.of(origin.hull).get(key)
+        if each is not None:
+            leg.put_delay((origin.hull, key), None)
+            leg.put_delay((subjects.hull.name, key), each)
+
+
+def _reported_inside(
+    waiting: Mapping[Key, Delay], crossings: Crossings | None, rows: slice, origins: Mapping[Key, Origin]
+) -> set[Key]:
+    """Those of the subjects that come from other hulls that were inside, as the events say."""
+    inside: set[Key] = set()
+    if crossings is not None:
+        found = zip(key_list(crossings.keys[rows]), crossings.changes[rows].tolist(), strict=True)
+        inside = {key for key, change in found if change in (-1, 2)}
+    return {key for key in origins if (key in inside) != (key in waiting)}
 
 
 def end_some(leg: FenceLeg, subjects: Subjects, ripe: Collection[Subject], more: Cause, now: int) -> None:
@@ -146,7 +183,10 @@ def _follow(
     )
     for number, key, change, causes in columns:
         waits = key in delays.of(hull)
-        if change == 0 or causes & GONE:
+        if change == TRANSFERRED:
+            if not waits:  # otherwise `delay` knows what the events say
+                at_once.append(number)
+        elif change == 0 or causes & GONE:
             if not waits:
                 at_once.append(number)
             elif change:  # it had not entered
@@ -170,7 +210,10 @@ def _leave(leg: FenceLeg, subjects: Subjects, changed: KeysChanged, now: int) ->
     """Make an exit of each key that is gone while its exit was delayed: it was outside, so it has not crossed."""
     delays, hull = leg.fence.delays, subjects.hull.name
     assert delays is not None  # the caller checks it
-    keys = subjects.keys([key for key, each in delays.of(hull).items() if not each.enters])
+    waiting = delays.of(hull)
+    keys = subjects.keys([key for key in changed.gone(waiting) if not waiting[key].enters])
+    if not len(keys):
+        return
     gone = np.isnan(keyed(subjects.hull.state).positions(keys)[:, 0])
     if gone.any():
         left = subjects.keys([key for key, each in zip(key_list(keys), gone.tolist(), strict=True) if each])

@@ -15,7 +15,7 @@ from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 
 from ..records import Keys, Times
-from .records import EventType, FenceEvent, Key, Members
+from .records import EventType, FenceEvent, Key, Members, Origin
 
 Integers = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
@@ -46,6 +46,7 @@ class EventBlock:
         distances: (n,) distances, NaN where there is none.
         event_times, first_times: (n,) as in `FenceEvent`.
         inside: by row, the subjects that were inside.
+        origins: by row, where subjects come from that have changed hulls.
     """
 
     fences: Integers
@@ -66,6 +67,7 @@ class EventBlock:
     event_times: Times
     first_times: Times
     inside: dict[int, tuple[Members, ...]] = field(default_factory=dict)
+    origins: dict[int, Origin] = field(default_factory=dict)
     _ends: Integers | None = field(default=None, init=False)
     _places: Integers | None = field(default=None, init=False)
 
@@ -122,6 +124,7 @@ class EventBlock:
                 time,
                 first_time,
                 self.inside.get(row, ()),
+                self.origins.get(row),
             )
             for sequence, kind, causes, key, (x, y), (
                 before_x,
@@ -157,12 +160,13 @@ class EventBlock:
             **{name: getattr(self, name)[start:end] for name in OF_EVENTS},
             keys=self.keys[places[start] : places[end]],
             inside={row - start: each for row, each in self.inside.items() if start <= row < end},
+            origins={row - start: each for row, each in self.origins.items() if start <= row < end},
         )
 
     def runs(self, wanted: npt.NDArray[np.bool_]) -> Self:
         """Those runs that are wanted. O(n)."""
         rows = np.repeat(wanted, self.counts)
-        numbers = np.flatnonzero(rows).tolist() if self.inside else []
+        numbers = np.flatnonzero(rows).tolist() if self.inside or self.origins else []
         keys = np.frombuffer(self.keys, np.uint8)[np.repeat(rows, self.lengths)]
         return replace(
             self,
@@ -171,6 +175,7 @@ class EventBlock:
             hulls=[hull for hull, each in zip(self.hulls, wanted.tolist(), strict=True) if each],
             keys=keys.tobytes(),
             inside={new: self.inside[row] for new, row in enumerate(numbers) if row in self.inside},
+            origins={new: self.origins[row] for new, row in enumerate(numbers) if row in self.origins},
         )
 
     def _keys(self, run: int, start: int, end: int) -> Sequence[Key | None]:
@@ -211,6 +216,11 @@ def joined(blocks: Sequence[EventBlock]) -> EventBlock:
             start + row: each
             for start, block in zip(starts, blocks, strict=False)
             for row, each in block.inside.items()
+        },
+        origins={
+            start + row: each
+            for start, block in zip(starts, blocks, strict=False)
+            for row, each in block.origins.items()
         },
     )
 
@@ -254,6 +264,7 @@ def block_of(events: Mapping[int, Iterable[FenceEvent]]) -> EventBlock:
         np.array([event.event_time for event in ordered], np.int64),
         np.array([event.first_time for event in ordered], np.int64),
         {row: event.inside for row, event in enumerate(ordered) if event.inside},
+        {row: event.origin for row, event in enumerate(ordered) if event.origin is not None},
     )
 
 

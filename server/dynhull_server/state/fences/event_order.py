@@ -95,11 +95,16 @@ class EventOrder:
         if event.type is EventType.CLOSED:
             return
         subject = event.hull if event.key is None else (event.hull, event.key)
-        before = self._inside.get(subject, False if self._is_complete else None)
+        former = subject if event.key is None else event.former
+        before = self._inside.get(former, False if self._is_complete else None)
         after = BEGINS.get(event.type)
-        must_be = event.type is EventType.DWELL if after is None else not after
+        must_be = event.type in (EventType.DWELL, EventType.TRANSFER) if after is None else not after
         if before not in (None, must_be):
             self._blame(event, f"a subject that is {WORDS[must_be]}", f"{event.type.name.lower()} of one that is not")
+        if former != subject and (event.type is EventType.TRANSFER or after is not None):
+            if self._inside.get(subject):
+                self._blame(event, f"a subject that is {WORDS[False]}", "a transfer to one that is inside already")
+            self._inside[former], self._inside[subject] = False, event.type is EventType.TRANSFER
         if after is not None:
             self._inside[subject] = after
             if self.balance is not None:

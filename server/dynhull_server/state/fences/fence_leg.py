@@ -1,6 +1,7 @@
 """The part of a trip at one fence."""
 
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ from .records import (
     KeptFence,
     Key,
     Members,
+    Origin,
     PutConsumer,
     PutDelays,
     Subject,
@@ -38,7 +40,8 @@ from .subjects import Subjects, keyed
 
 # Some rows of crossings.
 Rows = slice | npt.NDArray[np.intp]
-TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS}
+TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS, 2: EventType.TRANSFER}
+NOBODY: Mapping[Key, Origin] = MappingProxyType({})
 
 
 class FenceLeg:
@@ -90,8 +93,25 @@ class FenceLeg:
         """The time of an event that is made now: never before the one before it."""
         return max(now, self._time, self.events[-1].time if self.events else NO_TIME)
 
-    def crossed(self, subjects: Subjects, crossings: Crossings, rows: Rows, swap: Swap | None, now: int) -> None:
-        """Make an event of each of some crossings; `swap` is a cause, and the one that it stands for."""
+    def crossed(
+        self,
+        subjects: Subjects,
+        crossings: Crossings,
+        rows: Rows,
+        swap: Swap | None,
+        now: int,
+        origins: Mapping[Key, Origin] = NOBODY,
+    ) -> None:
+        """Make an event of each of some crossings.
+
+        Args:
+            subjects: the keys of a hull.
+            crossings: who has crossed.
+            rows: those that become events.
+            swap: a cause, and the one that it stands for.
+            now: the time.
+            origins: where subjects of this fence come from.
+        """
         sequence, time = self.last, self.time(now)
         hull, area_revision = subjects.hull, self.area_revision
         revision = hull.state.counts.revision
@@ -125,6 +145,7 @@ class FenceLeg:
                     None if gone else distance,
                     event_time,
                     time,
+                    origin=origins.get(key),
                 )
             )
 

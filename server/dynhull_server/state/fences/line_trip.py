@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull import Crossings, FenceIndex, KeyedHull
-from dynhull.keys import take_keys
+from dynhull.keys import key_list, take_keys
 
 from ..batch import Applied
 from ..changes import Change
@@ -33,12 +33,12 @@ from ..limits import FenceLimits
 from ..records import KeyRows, Record
 from ..trip import Leg, Place, Trip, write
 from .config import CircleArea, FenceConfig, PolygonArea
-from .delaying import NO_ROWS, KeysChanged, delay, end_all, end_some
+from .delaying import NO_ROWS, KeysChanged, delay, end_all, end_some, take_over
 from .delays import Delays
 from .event_block import EventBlock, block_of, joined
 from .event_log import EventLog, Swap, first_rows
 from .fence import Fence
-from .fence_leg import FenceLeg, members
+from .fence_leg import NOBODY, FenceLeg, members
 from .line import Line
 from .on_globe import require_frames
 from .pair import Pair
@@ -52,6 +52,7 @@ from .records import (
     Inside,
     KeptFence,
     Key,
+    Origin,
     Subject,
     Waits,
 )
@@ -68,6 +69,7 @@ from .requests import (
     ReplaceFence,
 )
 from .subjects import Subjects, lay
+from .transfers import carry, known_to
 
 POINT_BYTES = 16
 # The hull removes keys whose time has come; the area of a fence that is replaced does not move.
@@ -261,7 +263,7 @@ class LineTrip(Trip):
 
     def _apply(self, request: WriteBatch, hull: Hull, leg: Leg) -> Applied | None:
         def expired() -> None:
-            self._watch([hull], request.arrived, EXPIRY, {hull.name: KeysChanged()})
+            self._watch([hull], request.arrived, EXPIRY, {hull.name: _keys_expired(hull)})
 
         journal = self._journal(leg)
         applied = write(request, hull, self._now, journal, expired)
@@ -269,7 +271,7 @@ class LineTrip(Trip):
             for line in self.lines:
                 line.dismiss(hull.name)
         if applied is not None and not applied.duplicate:
-            self._watch([hull], request.arrived, None, {hull.name: _keys_changed(applied, journal)})
+            self._watch([hull], request.arrived, None, {hull.name: _keys_changed(hull, applied, journal)})
         return applied
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
@@ -285,13 +287,13 @@ class LineTrip(Trip):
     def _write_together(self, request: WriteTogether) -> None:
         self._expired = {}
         super()._write_together(request)
-        hulls = [self._by_name[part.name].after for part in request.parts]
+        hulls = [hull for part in request.parts if (hull := self._by_name[part.name].after) is not None]
         changed = {
-            part.name: _keys_changed(applied, self._journals[part.name], self._expired.get(part.name, ()))
-            for part, applied in zip(request.parts, request.result, strict=True)
+            hull.name: _keys_changed(hull, applied, self._journals[hull.name], self._expired.get(hull.name, ()))
+            for hull, applied in zip(hulls, request.result, strict=True)
             if not applied.duplicate
         }
-        self._watch([hull for hull in hulls if hull is not None], request.parts[0].arrived, None, changed)
+        self._watch(hulls, request.parts[0].arrived, None, changed)
 
     def _journal(self, leg: Leg) -> list[Record]:
         journal = self._journals[leg.name] = [] if leg.records is None else leg.records
@@ -305,7 +307,7 @@ class LineTrip(Trip):
     def _expire(self, request: Expire, leg: Leg) -> int:
         expired = super()._expire(request, leg)
         if expired:
-            self._watch([request.hull], request.time, EXPIRY, {request.name: KeysChanged()})
+            self._watch([request.hull], request.time, EXPIRY, {request.name: _keys_expired(request.hull)})
         return expired
 
     def _watch(
@@ -314,13 +316,16 @@ class LineTrip(Trip):
         """Make the events of a change of these hulls."""
         try:
             for line in self.lines:
+                carried = carry(line.subjects, changed) if len(changed) > 1 else {}
+                for name, origins in carried.items():
+                    self._take_over(line.subjects[name], origins)
                 crossed: dict[str, tuple[Subjects, Crossings | None]] = {
                     name: (line.subjects[name], None) for name in changed if name in line.subjects
                 }
                 crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls)}
                 areas = {name: area.hull.state.counts.revision for name, area in line.areas.items()}
                 for name, (subjects, crossings) in sorted(crossed.items()):
-                    self._cross(subjects, crossings, areas, swap, now, changed.get(name))
+                    self._cross(subjects, crossings, areas, swap, now, changed.get(name), carried.get(name, NOBODY))
                 for fence, pair, causes in line.paired(hulls):
                     self._fence_leg(fence).paired(pair, causes, now)
         except BaseException:  # an index may have lost crossings
@@ -335,6 +340,7 @@ class LineTrip(Trip):
         swap: Swap | None,
         now: int,
         changed: KeysChanged | None = None,
+        origins: Mapping[Key, Origin] = NOBODY,
     ) -> None:
         """Make the events of a change of the keys of a hull, or of the areas of its fences with these revisions."""
         crossed = set()
@@ -344,21 +350,34 @@ class LineTrip(Trip):
             starts = first_rows(crossings.fences)
             fences = [subjects.fences[number] for number in crossings.fences[starts].tolist()]
             apart = [fence.follows_events or fence.number in self.fence_legs for fence in fences]
+            if origins:
+                moved = set(crossings.fences[[key in origins for key in key_list(crossings.keys)]].tolist())
+                apart = [each or fence.number in moved for fence, each in zip(fences, apart, strict=True)]
             runs = zip(fences, apart, starts.tolist(), [*starts[1:].tolist(), len(crossings)], strict=True)
             if any(apart):
                 for fence, _, first, end in (run for run in runs if run[1]):
                     crossed.add(fence)
+                    leg, rows, own = self._fence_leg(fence), slice(first, end), known_to(fence, origins)
                     if fence.delays is None:
-                        self._fence_leg(fence).crossed(subjects, crossings, slice(first, end), swap, now)
+                        leg.crossed(subjects, crossings, rows, swap, now, own)
                     else:
-                        delay(self._fence_leg(fence), subjects, crossings, slice(first, end), swap, now, changed)
+                        delay(leg, subjects, crossings, rows, swap, now, changed, own)
                 counts = np.diff(starts, append=len(crossings))
                 crossings = _some(crossings, np.flatnonzero(np.repeat(np.logical_not(apart), counts)))
             if len(crossings):
                 self.log.add(subjects, crossings, areas, swap, now)
         for fence in () if changed is None else list(subjects.delaying):
             if fence not in crossed:  # subjects may have reported that they stay
-                delay(self._fence_leg(fence), subjects, None, NO_ROWS, None, now, changed)
+                leg = self._fence_leg(fence)
+                delay(leg, subjects, None, NO_ROWS, None, now, changed, known_to(fence, origins))
+
+    def _take_over(self, subjects: Subjects, origins: Mapping[Key, Origin]) -> None:
+        """Let subjects that come from other hulls bring their delays."""
+        for fence in subjects.fences.values():
+            if fence.delays is not None and len(fence.delays):
+                own = known_to(fence, origins)
+                if own:
+                    take_over(self._fence_leg(fence), subjects, own)
 
     def _tear(self, hulls: Iterable[Hull]) -> None:
         self.torn = True
@@ -568,7 +587,7 @@ class LineTrip(Trip):
         self._end_delays(request, fence)
         made = self.fence_legs.get(fence.number)
         # The events of this trip come after those that `dwelling` knows.
-        changed = set() if made is None else {(event.hull, event.key) for event in made.events}
+        changed = set() if made is None else {event.former for event in made.events if event.key is not None}
         waited: dict[str, dict[Key, tuple[EventType, int, int]]] = {}
         due = () if fence.dwelling is None else fence.dwelling.due(request.time - fence.row.config.dwell, MOST_DUE)
         for (hull, key), since in due:
@@ -617,11 +636,20 @@ def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:
     return Waits(sequence, time) if config.dwell else NO_WAITS
 
 
-def _keys_changed(applied: Applied, journal: Sequence[Record], expired: Collection[Key] = ()) -> KeysChanged:
+def _keys_changed(
+    hull: Hull, applied: Applied, journal: Sequence[Record], expired: Collection[Key] = ()
+) -> KeysChanged:
     """What an applied batch, the last one of the journal, has done to keys."""
     rows = journal[-1].rows
-    fewer = applied.deleted or applied.evicted or applied.expired
+    fewer = hull.row.settings.window is not None and (applied.evicted or applied.expired)
     return KeysChanged(rows if isinstance(rows, KeyRows) else None, expired, bool(fewer))
+
+
+def _keys_expired(hull: Hull) -> KeysChanged:
+    """What an expiry has done to keys."""
+    contents = hull.state.contents
+    ended = contents.ended if isinstance(contents, Keyed) else ()
+    return KeysChanged(None, ended, hull.row.settings.window is not None)
 
 
 def _with_expiries(crossings: Crossings, expired: Collection[Key]) -> Crossings:

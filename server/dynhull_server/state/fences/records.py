@@ -26,6 +26,7 @@ class EventType(IntEnum):
     CEASE = 6
     SNAPSHOT = 7
     CLOSED = 8
+    TRANSFER = 9
 
 
 class Cause(IntFlag):
@@ -70,6 +71,13 @@ class Delay(NamedTuple):
     causes: int
 
 
+class Origin(NamedTuple):
+    """The hull that a subject comes from, and the revision that removed it there."""
+
+    hull: str
+    revision: int
+
+
 class FenceEvent(NamedTuple):
     """One event.
 
@@ -87,6 +95,7 @@ class FenceEvent(NamedTuple):
         first_time: since when the subject has been inside, in a dwell event; when it changed its side, in one that was
             delayed; otherwise NO_TIME.
         inside: the subjects that were inside, in a snapshot and at the end.
+        origin: where the subject comes from, if the same batch has moved it from another hull; `previous` is there.
     """
 
     sequence: int
@@ -103,6 +112,13 @@ class FenceEvent(NamedTuple):
     time: int
     first_time: int = NO_TIME
     inside: tuple[Members, ...] = ()
+    origin: Origin | None = None
+
+    @property
+    def former(self) -> Subject:
+        """The subject as it was called before."""
+        assert self.key is not None  # callers ask for those of subjects
+        return self.hull if self.origin is None else self.origin.hull, self.key
 
 
 class Waits(NamedTuple):

@@ -74,10 +74,11 @@ def members_after(kept: KeptFence) -> dict[str, set[Key]]:
     for event in kept.events:
         if event.type is EventType.SNAPSHOT:
             inside = {each.hull: set(key_list(each.keys)) for each in event.inside}
-        elif event.key is not None and event.type is EventType.ENTER:
+        elif event.key is not None and event.type in (EventType.EXIT, EventType.TRANSFER):
+            hull, key = event.former
+            inside[hull].remove(key)
+        if event.key is not None and event.type in (EventType.ENTER, EventType.TRANSFER):
             inside.setdefault(event.hull, set()).add(event.key)
-        elif event.key is not None and event.type is EventType.EXIT:
-            inside[event.hull].remove(event.key)
         elif event.type is EventType.BEGIN:
             inside[event.hull] = set()
         elif event.type is EventType.CEASE:

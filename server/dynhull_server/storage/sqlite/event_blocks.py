@@ -14,7 +14,7 @@ import numpy.typing as npt
 from dynhull.arrays import Points
 
 from ...state.fences.event_block import Bytes, EventBlock, Integers
-from ...state.fences.records import EventType
+from ...state.fences.records import EventType, Origin
 from ...state.records import NO_TIME
 from .columns import Cursor, point_bytes
 from .event_rows import put_members, take_members
@@ -25,8 +25,8 @@ TYPE_BITS = 15
 HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
 PAIRED = EventType.BEGIN, EventType.CEASE  # they have a distance without a position
 # What a block has.
-HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE = 1, 2, 4, 8
-ALL_FLAGS = 15
+HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE, HAS_ORIGINS = 1, 2, 4, 8, 16
+ALL_FLAGS = 31
 WORD = 8
 # The numbers from which on an integer needs one byte more.
 LIMITS = np.array([1 << 8 * size for size in range(WORD)], np.uint64)
@@ -64,6 +64,8 @@ def encode_block(block: EventBlock, own: Sequence[str]) -> bytes:
         flags |= HAS_FIRST_TIMES
     if block.inside:
         flags |= HAS_INSIDE
+    if block.origins:
+        flags |= HAS_ORIGINS
     put_unsigned(out, len(block))
     put_unsigned(out, len(block.fences))
     out.append(flags)
@@ -91,6 +93,12 @@ def encode_block(block: EventBlock, own: Sequence[str]) -> bytes:
         for row, members in block.inside.items():
             put_unsigned(out, row)
             put_members(out, members)
+    if block.origins:
+        put_unsigned(out, len(block.origins))
+        for row, origin in block.origins.items():
+            put_unsigned(out, row)
+            put_text(out, origin.hull)
+            put_unsigned(out, origin.revision)
     return bytes(out)
 
 
@@ -135,6 +143,10 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     for _ in range(take_unsigned(cursor) if flags & HAS_INSIDE else 0):
         row = take_unsigned(cursor)
         inside[row] = take_members(cursor)
+    origins = {}
+    for _ in range(take_unsigned(cursor) if flags & HAS_ORIGINS else 0):
+        row = take_unsigned(cursor)
+        origins[row] = Origin(take_text(cursor), take_unsigned(cursor))
     if not cursor.at_end:
         raise ValueError("bytes follow the events")
     return EventBlock(
@@ -156,6 +168,7 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
         event_times,
         first_times,
         inside,
+        origins,
     )
 
 
