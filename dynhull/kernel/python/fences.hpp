@@ -120,15 +120,17 @@ class FenceIndex {
     const Output<std::uint8_t> causes(count);
     const Output<double, 2> points(count), previous(count);
     const Output<double> distances(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Crossing& row = crossings.rows[i];
-      fences.data()[i] = row.fence;
-      changes.data()[i] = row.change;
-      causes.data()[i] = row.cause;
-      reinterpret_cast<Point*>(points.data())[i] = row.now;
-      reinterpret_cast<Point*>(previous.data())[i] = row.before;
-      distances.data()[i] = row.distance;
-    }
+    beside_others(count, [&] {
+      for (std::size_t i = 0; i < count; ++i) {
+        const Crossing& row = crossings.rows[i];
+        fences.data()[i] = row.fence;
+        changes.data()[i] = row.change;
+        causes.data()[i] = row.cause;
+        reinterpret_cast<Point*>(points.data())[i] = row.now;
+        reinterpret_cast<Point*>(previous.data())[i] = row.before;
+        distances.data()[i] = row.distance;
+      }
+    });
     return nb::make_tuple(fences.array(), changes.array(), causes.array(), packed(crossings), points.array(),
                           previous.array(), distances.array());
   }
@@ -155,8 +157,18 @@ class FenceIndex {
 
   nb::object packed(const Crossings& crossings) const {
     KeyList keys(hull_->strings());
-    for (const Crossing& row : crossings.rows) hull_->strings() ? keys.add(crossings.string(row)) : keys.add(row.key);
+    beside_others(crossings.rows.size(), [&] {
+      for (const Crossing& row : crossings.rows) hull_->strings() ? keys.add(crossings.string(row)) : keys.add(row.key);
+    });
     return keys.packed();
+  }
+
+  // Runs work that needs no Python without the GIL, unless it is little.
+  template <class Work>
+  static void beside_others(std::size_t rows, Work work) {
+    std::optional<nb::gil_scoped_release> released;
+    if (rows > FEW_ROWS) released.emplace();
+    work();
   }
 
   KeyedHull* hull_;  // kept alive by the Python object
