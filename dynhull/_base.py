@@ -305,9 +305,7 @@ class Hull(Live):
             percent: from 0 to 100.
             center: the mean of the points, or the median of each coordinate.
         """
-        share = as_coordinate(percent, "percent")
-        if not 0 <= share <= 100:
-            raise ValueError(f"percent is {share}: must be from 0 to 100")
+        share = as_percent(percent)
         if center not in ("mean", "median"):
             raise ValueError(f'center must be "mean" or "median", got {center!r}')
         points = self.points()
@@ -342,3 +340,11 @@ class Hull(Live):
     def _repr_svg_(self) -> str:
         points = self.points() if len(self) <= MOST_POINTS_DRAWN else None
         return svg(self.vertices(), repr(self), points)
+
+
+def as_percent(percent: float) -> float:
+    """A share, checked."""
+    share = as_coordinate(percent, "percent")
+    if not 0 <= share <= 100:
+        raise ValueError(f"percent is {share}: must be from 0 to 100")
+    return share

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
-from . import _ellipsoid, _flat_map
-from ._base import UNMEASURED, Live
+from . import _ellipsoid, _flat_map, _globe_layers
+from ._base import UNMEASURED, Live, as_percent
 from ._globe import Gnomonic, as_center, as_lonlat, as_place
 from ._globe_tree import GlobeEntities, GlobeTree, GlobeWindowTree
 from ._hull import Multiset
 from ._implementation import kernel
 from ._keyed import Keyed, known_kind
 from ._window import Windowed, checked_limits
+from .arrays import as_count
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -105,6 +106,61 @@ class Globe(Live):
         outside = self.locate(places) < 0
         result[outside] = _ellipsoid.distance(self.vertices(), places[outside])
         return result
+
+    # What a few bad points cannot spoil
+
+    def layers(self, k: int) -> list[Points]:
+        """The (h, 2) vertices of the k outermost convex layers, outermost first, each as `vertices`.
+
+        Exact for the projections: layer i + 1 is the hull of the points left when all points at the vertices of layers
+        1 to i are taken out. Fewer layers where no points are left. O(n log n), and O(log² n) a vertex.
+
+        Raises:
+            ValueError: k is negative.
+        """
+        return [] if (frame := self._frame()) is None else self._peeled(frame, k).layers
+
+    def depth(self, lonlat: npt.ArrayLike, k: int) -> npt.NDArray[np.int64]:
+        """(m,) depths of (m, 2) places: how many of the first k layers' hulls hold each, boundary included.
+
+        Exact for the projections; 0 beyond 85 degrees from the centre. O(n log n), and O(k log n) a place.
+
+        Raises:
+            ValueError: k is negative.
+        """
+        places, frame = as_lonlat(lonlat), self._frame()
+        if frame is None:
+            return np.zeros(len(places), np.int64)
+        return _globe_layers.depth(self._peeled(frame, k), frame, places)
+
+    def influence(self) -> npt.NDArray[np.float64]:
+        """(h,) for each of `vertices` the square metres that the hull loses without it (all points at its place).
+
+        As `area`, of polygons of geodesics: within 0.1 m² for each vertex that goes or comes. O(n log n), and O(h) a
+        vertex.
+        """
+        frame = self._frame()
+        return np.zeros(0) if frame is None else _globe_layers.influence(self._peeled(frame, 2))
+
+    def mcp(self, percent: float) -> Points:
+        """(h, 2) vertices of the hull of the points nearest to the mean direction of all.
+
+        The minimum convex polygon of ecology: of n points, those whose angle from the mean direction is at most the one
+        with index (n - 1) percent / 100, rounded down, of all angles in order (Calenge 2006). Angles are rounded, to a
+        nanometre or so on the ground. No points: shape (0, 2). O(n log n).
+
+        Args:
+            percent: from 0 to 100.
+        """
+        share = as_percent(percent)
+        points = self.points()
+        return GeoHull(_globe_layers.nearest(points, share), self.center).vertices() if len(points) else points
+
+    def _frame(self) -> Gnomonic | None:
+        return None if self.center is None else Gnomonic(self.center)
+
+    def _peeled(self, frame: Gnomonic, k: int) -> _globe_layers.Peeled:
+        return _globe_layers.Peeled(self.points(), frame, as_count(k, "k"))
 
     # Measures, each kept until the hull changes
 
