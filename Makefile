@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server fuzz-gateway properties robustness simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server fuzz-gateway workers properties robustness simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -99,6 +99,9 @@ proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 contract: .venv/.check  ## with a release: the contract that later ones must not break
 	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/buf build --exclude-source-info --output proto/contract.binpb
+
+workers: .venv/.test  ## the tests of the server, run against two gateways and two workers
+	$(BIN)/pytest tests/server tests/cluster --shape workers -n 2
 
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics

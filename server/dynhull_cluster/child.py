@@ -4,6 +4,7 @@ import asyncio
 import gc
 import os
 import socket
+from contextlib import suppress
 from pathlib import Path
 
 from prometheus_client import generate_latest
@@ -38,6 +39,7 @@ async def _run(end: socket.socket) -> None:
         return
     settings = Settings.model_validate(begin["settings"])
     logs.configure(settings.log_level, settings.log_format, begin["process"])
+    _name_process(begin["process"])
     return_large_blocks()
     allow_connections(settings.max_connections)
     role, _, number = begin["process"].partition("-")
@@ -54,6 +56,12 @@ async def _run(end: socket.socket) -> None:
             await server.drain()
             listening.cancel()
     gc.unfreeze()
+
+
+def _name_process(name: str) -> None:
+    """Have the tools of the operating system show the name; without effect where it has no such file."""
+    with suppress(OSError):
+        Path("/proc/self/comm").write_text(name, "utf-8")
 
 
 async def _listen(line: Line, server: Server | Gateway) -> None:

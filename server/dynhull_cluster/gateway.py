@@ -1,6 +1,8 @@
 """A gateway: it takes the calls of the public address, and passes them to the workers."""
 
+import asyncio
 import logging
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -37,6 +39,8 @@ from .worker_link import WorkerLink
 WORKER = "dynhull.v1.worker"
 # Seconds that a worker may be away, as when it is restarted, before the health of the whole says so.
 AWAY_SECONDS = 30.0
+# Seconds that a gateway looks for all workers before it serves some.
+FIRST_SECONDS = 5.0
 WHOLE = ""
 
 SERVING = health_pb2.HealthCheckResponse.SERVING
@@ -78,6 +82,7 @@ class Gateway:
         self._composed = Composed(self._relay, settings.max_fence_corners)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False
+        self._all_well = asyncio.Event()
         self.address = ""
 
     async def start(self) -> None:
@@ -105,6 +110,8 @@ class Gateway:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
             self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
         await self._server.start()
+        with suppress(TimeoutError):  # a gateway that is restarted serves without a worker that is away
+            await asyncio.wait_for(self._all_well.wait(), FIRST_SECONDS)
         log.info("serving", extra={"address": self.address})
 
     async def drain(self) -> None:
@@ -158,6 +165,8 @@ class Gateway:
             well &= self._well(link)
             scrubbed &= link.health[SCRUB] != NOT_SERVING
         self._health.set(SERVING if well else NOT_SERVING, WHOLE, *SERVICES)
+        if well:
+            self._all_well.set()
         self._health.set(SERVING if scrubbed else NOT_SERVING, SCRUB)
 
     def _well(self, link: WorkerLink) -> bool:

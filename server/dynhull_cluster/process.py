@@ -19,7 +19,7 @@ from dynhull_server.settings import Settings
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite.disk import Disk
 from dynhull_server.storage.sqlite.folder import Folder
-from dynhull_server.storage.worker_folders import divide, worker_folder
+from dynhull_server.storage.worker_folders import divide, worker_folder, write_manifest
 
 from .child_process import ChildProcess, StartFailedError
 from .metrics import registry_of
@@ -71,6 +71,8 @@ async def _serve(settings: Settings) -> None:
             opened.callback(page.close)
         try:
             if await processes.start(stop):
+                if not settings.in_memory:
+                    write_manifest(settings.data, workers, complete=True)
                 print(f"dynhull serving on {processes.address}", flush=True)  # noqa: T201  # output of the command
                 if page is not None:
                     print(f"metrics on {page.url}", flush=True)  # noqa: T201  # likewise
@@ -100,8 +102,11 @@ class Processes:
         Raises:
             StartFailedError: one of them has ended before it served.
         """
-        self._tasks = {asyncio.create_task(each.run(), name=each.name) for each in self.all}
-        return await self._wait(stop, *(each.serving for each in self.all))
+        for group in (self._workers, self._gateways):  # a gateway that serves has its workers
+            self._tasks |= {asyncio.create_task(each.run(), name=each.name) for each in group}
+            if not await self._wait(stop, *(each.serving for each in group)):
+                return False
+        return True
 
     async def keep(self, stop: asyncio.Event, again: asyncio.Event) -> None:
         """Keep them alive until `stop`, and restart them, one at a time, whenever `again` is set."""

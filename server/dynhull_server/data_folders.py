@@ -10,21 +10,38 @@ from .exports import WRITERS
 from .failure import code_of, fail, text_of
 from .progress import progress_bar
 from .state.contents import replayed
+from .state.records import HullRow, Kept
 from .storage.port import StorageError
 from .storage.sqlite import copies
+from .storage.worker_folders import parts_of, workers_of, write_manifest
 
 
 def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> None:
-    """Copy a data folder, and print what was lost and how many hulls it has."""
-    with _errors_reported(), progress_bar("pages") as progress:
-        report = copies.copy(source, target, progress, accept_loss=accept_loss)
-    for note in report.notes:
-        typer.echo(note, err=True)
-    typer.echo(f"{target}: {_hulls(report)}")
+    """Copy a data folder, and print what was lost and how many hulls it has; of one with workers, each part."""
+    with _errors_reported():
+        workers = workers_of(source)
+        if workers is not None and target.exists() and any(target.iterdir()):
+            raise StorageError(f"{target} is not empty")
+        for part in parts_of(source):
+            copy = target / part.relative_to(source)
+            with progress_bar("pages") as progress:
+                report = copies.copy(part, copy, progress, accept_loss=accept_loss)
+            for note in report.notes:
+                typer.echo(note, err=True)
+            typer.echo(f"{copy}: {_hulls(report)}")
+        if workers is not None:
+            write_manifest(target, workers, complete=True)  # at the end: without it, the copy is refused
 
 
 def check_folder(data: Path) -> bool:
-    """Examine a data folder and print a report; returns whether everything is intact."""
+    """Examine a data folder and print a report, of one with workers on each part; returns whether all is intact."""
+    with _errors_reported():
+        parts = parts_of(data)
+    whole = [_check_part(part) for part in parts]
+    return all(whole)
+
+
+def _check_part(data: Path) -> bool:
     with _errors_reported(), progress_bar("rows") as progress:
         report = copies.check(data, progress)
     for hull in report.hulls:
@@ -57,13 +74,22 @@ def export_hull(data: Path, name: str, file: Path) -> None:
     if file.suffix not in WRITERS:
         fail(f"{file}: the name must end in {', '.join(WRITERS)}")
     with _errors_reported():
-        row, kept, notes = copies.read(data, name)
+        row, kept, notes = _read(data, name)
         for note in notes:
             typer.echo(note, err=True)
         contents = replayed(kept, row.settings).stored()
         with progress_bar("points") as progress:
             WRITERS[file.suffix](file, contents, progress, geographic=row.settings.geographic)
     typer.echo(f"{file}: {len(contents):,} points of {name} at revision {kept.last_revision}")
+
+
+def _read(data: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
+    """A hull of a folder, in whichever part it is."""
+    *parts, last = parts_of(data)
+    for part in parts:
+        if name in copies.names(part):
+            return copies.read(part, name)
+    return copies.read(last, name)
 
 
 @contextmanager

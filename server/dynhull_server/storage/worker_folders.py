@@ -2,9 +2,12 @@
 
 import json
 import os
+import zlib
 from pathlib import Path
+from typing import Any
 
-from .port import FormatError, StorageError
+from .port import DamagedError, FormatError, StorageError
+from .sqlite.folder import DATABASE
 
 MANIFEST = "workers.json"
 FORMAT = 1
@@ -21,25 +24,26 @@ def workers_of(data: Path) -> int | None:
     """The number of workers that a folder is divided among; None if it is that of a server of one process, or missing.
 
     Raises:
-        FormatError: the manifest cannot be used.
+        DamagedError: the manifest, or the folder of a worker, is damaged or missing.
+        FormatError: this version does not know the format.
     """
-    file = data / MANIFEST
-    try:
-        found = json.loads(file.read_text("utf-8"))
-        version, placement, workers = found["format"], found["placement"], found["workers"]
-    except FileNotFoundError:
-        if any(data.glob("worker-*")):
-            raise FormatError(f"{file} is missing, but {data} has folders of workers: restore a backup") from None
+    manifest = _read(data)
+    if manifest is None:
         return None
-    except NotADirectoryError:
-        return None
-    except (ValueError, KeyError, TypeError):
-        raise FormatError(f"{file} is damaged: restore it from a backup") from None
-    if version != FORMAT or placement != PLACEMENT:
-        raise FormatError(f"{file} is of a format that this version does not know: use the version that wrote it")
-    if not isinstance(workers, int) or workers < 1:
-        raise FormatError(f"{file} is damaged: restore it from a backup")
+    if manifest["format"] != FORMAT or manifest["placement"] != PLACEMENT:
+        raise FormatError(f"{data / MANIFEST} is of a format that this version does not know: use one that does")
+    workers: int = manifest["workers"]
+    if manifest["complete"]:
+        for number in range(workers):
+            if not (worker_folder(data, number) / DATABASE).exists():
+                raise DamagedError(f"{worker_folder(data, number) / DATABASE} is missing: restore a backup")
     return workers
+
+
+def parts_of(data: Path) -> list[Path]:
+    """The folders with a database each: those of the workers, or the folder itself. Raises StorageError."""
+    workers = workers_of(data)
+    return [data] if workers is None else [worker_folder(data, number) for number in range(workers)]
 
 
 def require_one_process(data: Path) -> None:
@@ -55,6 +59,8 @@ def divide(data: Path, workers: int) -> None:
     Raises:
         StorageError: it is the folder of one process, or of another number of workers.
     """
+    if data.is_file():
+        raise StorageError(f"{data} is a file, not a data folder")
     present = workers_of(data)
     if present == workers:
         return
@@ -63,28 +69,51 @@ def divide(data: Path, workers: int) -> None:
             f"{data} is divided among {present} workers: start the server with --workers {present}; to change their "
             "number, load the hulls (dynhull export, dynhull load) into a server with another folder"
         )
-    if data.is_file():
-        raise StorageError(f"{data} is a file, not a data folder")
-    if any(data.glob("dynhull.db*")):
+    if (data / DATABASE).exists():
         raise StorageError(
             f"{data} is the folder of a server of one process: start it without --workers, or load the hulls (dynhull "
             "export, dynhull load) into a server with another folder"
         )
     data.mkdir(parents=True, exist_ok=True)
-    manifest = {"format": FORMAT, "placement": PLACEMENT, "workers": workers}
-    _write(data / MANIFEST, json.dumps(manifest) + "\n")
+    write_manifest(data, workers, complete=False)
 
 
-def _write(file: Path, text: str) -> None:
-    """Write a file that is on the disk whole, or not at all."""
+def write_manifest(data: Path, workers: int, *, complete: bool) -> None:
+    """Write how many workers there are, and whether all have a database: from then on, a missing one is a loss."""
+    content = {"format": FORMAT, "placement": PLACEMENT, "workers": workers, "complete": complete}
+    text = json.dumps({**content, "checksum": _checksum(content)}) + "\n"
+    file = data / MANIFEST
     part = file.with_suffix(".part")
     with part.open("w", encoding="utf-8") as opened:
         opened.write(text)
         opened.flush()
         os.fsync(opened.fileno())
     part.replace(file)
-    folder = os.open(file.parent, os.O_RDONLY)
+    folder = os.open(data, os.O_RDONLY)
     try:
         os.fsync(folder)
     finally:
         os.close(folder)
+
+
+def _read(data: Path) -> dict[str, Any] | None:
+    """The manifest; None if there is neither one nor a folder of a worker."""
+    file = data / MANIFEST
+    try:
+        content: dict[str, Any] = json.loads(file.read_text("utf-8"))
+        checksum = content.pop("checksum")
+    except FileNotFoundError:
+        if any(data.glob("worker-*")):
+            raise DamagedError(f"{file} is missing, but {data} has folders of workers: restore a backup") from None
+        return None
+    except NotADirectoryError:
+        return None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise DamagedError(f"{file} is damaged: restore a backup") from None
+    if checksum != _checksum(content):
+        raise DamagedError(f"{file} is damaged: restore a backup")
+    return content
+
+
+def _checksum(content: dict[str, Any]) -> int:
+    return zlib.crc32(json.dumps(content, sort_keys=True).encode())

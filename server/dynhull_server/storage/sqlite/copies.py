@@ -126,6 +126,12 @@ def read(path: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
         return hull.row, read_hull(opened.connection, hull, NEWEST), opened.notes
 
 
+def names(path: Path) -> set[str]:
+    """The names of the hulls as of the last commit. Raises StorageError."""
+    with _opened(path) as opened:
+        return {hull.row.name for hull in load(opened.connection, opened.version).hulls.values()}
+
+
 @dataclass(frozen=True, slots=True)
 class _Opened:
     """A database with an open read transaction.

@@ -1,0 +1,162 @@
+"""Processes that are killed: what goes on, what comes back, and what is refused."""
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import grpc
+import numpy as np
+import pytest
+from cluster import processes
+from command_line import dynhull
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from patience import PATIENCE, wait_until
+from server_process import Server, server_process
+
+from dynhull_client import HullClient, UnavailableError
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+WORKERS = ("--workers", "2", "--gateways", "2")
+NAMES = ("north/a", "fleet/a")  # of the workers 0 and 1
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("data")
+    with server_process(*WORKERS, "--data", str(folder), complaints="is started again") as server:
+        with HullClient(server.address) as client:
+            for name in NAMES:
+                client.create_hull(name)
+        yield server
+
+
+def again(name: str, server: Server, killed: int) -> None:
+    """Wait until a process is there again, as another one."""
+    wait_until(lambda: processes(server.process.pid).get(name, killed) != killed)
+
+
+def test_a_killed_worker_comes_back_and_the_others_go_on(server: Server) -> None:
+    with HullClient(server.address) as client:
+        worker = processes(server.process.pid)["worker-0"]
+        revision = client.get_hull(NAMES[1]).revision
+        with client.writer(NAMES[0], batch_points=1) as writer:
+            written: list[Any] = []
+            for i in range(200):
+                written.append(writer.put([[i, i * i]]))
+                if i == 100:
+                    written[50].result(PATIENCE)
+                    os.kill(worker, signal.SIGKILL)
+                if i > 100:
+                    client.apply(NAMES[1], insert=[[i, 1]])  # not once refused
+        again("worker-0", server, worker)
+        assert client.get_hull(NAMES[0]).info.points == client.get_hull(NAMES[0]).revision == 200
+        assert client.verify(NAMES[0]).equal
+        assert client.get_hull(NAMES[1]).revision == revision + 99
+
+
+def test_the_health_of_a_worker_that_is_away(server: Server) -> None:
+    with grpc.insecure_channel(server.address) as channel:
+        health = health_pb2_grpc.HealthStub(channel)
+        worker = processes(server.process.pid)["worker-1"]
+        watch = health.Watch(health_pb2.HealthCheckRequest(service="dynhull.v1.worker/1"), timeout=PATIENCE)
+        states = (response.status for response in watch)
+        assert next(states) == health_pb2.HealthCheckResponse.SERVING
+        os.kill(worker, signal.SIGKILL)
+        assert next(states) == health_pb2.HealthCheckResponse.NOT_SERVING
+        assert next(states) == health_pb2.HealthCheckResponse.SERVING
+        assert health.Check(health_pb2.HealthCheckRequest()).status == health_pb2.HealthCheckResponse.SERVING
+        watch.cancel()
+
+
+def test_a_killed_gateway_costs_its_connections_alone(server: Server) -> None:
+    """Each client has one connection. Those of the other gateway do not see anything."""
+    options = [("grpc.use_local_subchannel_pool", 1)]
+    channels = [grpc.insecure_channel(server.address, options=options) for _ in range(12)]
+    watches = []
+    for channel in channels:
+        watch = HullServiceStub(channel).Watch(pb.WatchRequest(name=NAMES[0]), timeout=PATIENCE)
+        next(watch)
+        watches.append(watch)
+    gateway = processes(server.process.pid)["gateway-0"]
+    os.kill(gateway, signal.SIGKILL)
+    again("gateway-0", server, gateway)
+    with HullClient(server.address) as client:
+        wait_until(lambda: reaches(client))
+        client.apply(NAMES[0], insert=[[-1, -1]])
+    assert "event" in {outcome(watch) for watch in watches} <= {"event", grpc.StatusCode.UNAVAILABLE}
+    for channel in channels:
+        channel.close()
+
+
+def outcome(watch: Any) -> Any:
+    """How a watch goes on: with an event, or with the code of its end."""
+    try:
+        next(watch)
+    except grpc.RpcError as error:
+        return error.code()
+    watch.cancel()
+    return "event"
+
+
+def reaches(client: HullClient) -> bool:
+    try:
+        client.get_hull(NAMES[0])
+    except UnavailableError:
+        return False
+    return True
+
+
+def test_all_processes_are_restarted_one_at_a_time(server: Server) -> None:
+    before = processes(server.process.pid)
+    with HullClient(server.address) as client:
+        points = client.get_hull(NAMES[0]).info.points
+        with client.writer(NAMES[0], batch_points=1) as writer:
+            written = 0
+            server.process.send_signal(signal.SIGHUP)
+            while not processes(server.process.pid).items().isdisjoint(before.items()) or written < 50:
+                writer.put([[written, -written]]).result(PATIENCE)
+                written += 1
+        wait_until(lambda: processes(server.process.pid).keys() == before.keys())
+        wait_until(lambda: reaches(client))
+        assert client.get_hull(NAMES[0]).info.points == points + written
+
+
+def test_a_killed_supervisor_takes_all_along_and_the_folder_is_served_again(tmp_path: Path) -> None:
+    data = str(tmp_path / "data")
+    with (
+        server_process(*WORKERS, "--data", data, killed=True) as server,
+        HullClient(server.address) as client,
+    ):
+        for name in NAMES:
+            client.create_hull(name)
+            client.apply(name, insert=np.eye(2))
+        there = processes(server.process.pid)
+        assert set(there) == {"worker-0", "worker-1", "gateway-0", "gateway-1"}
+        server.process.kill()
+        server.process.wait(PATIENCE)
+        wait_until(lambda: not any(Path(f"/proc/{each}/fd").exists() for each in there.values()))
+    other = "is divided among 2 workers: start the server with --workers 2"
+    assert other in refused("--workers", "3", "--data", data)
+    assert other in refused("--data", data)
+    checked = dynhull("check", data).stdout
+    assert all(f"worker-{i}: 1 hull, all whole" in checked for i in range(2))
+    copy = tmp_path / "copy"
+    assert dynhull("backup", copy, "--data", data).exit_code == 0
+    assert dynhull("export", NAMES[1], tmp_path / "points.csv", "--data", copy).exit_code == 0
+    with server_process(*WORKERS, "--data", data) as server, HullClient(server.address) as client:
+        assert {each.name: each.points for each in client.list_hulls()} == dict.fromkeys(NAMES, 2)
+    (copy / "worker-1" / "dynhull.db").unlink()
+    assert "worker-1/dynhull.db is missing: restore a backup" in refused(*WORKERS, "--data", copy)
+    manifest = copy / "workers.json"
+    manifest.write_text(manifest.read_text().replace('"workers": 2', '"workers": 3'))
+    assert "workers.json is damaged: restore a backup" in refused("--workers", "3", "--data", copy)
+    assert "is the folder of a server of one process" in refused(*WORKERS, "--data", copy / "worker-0")
+
+
+def refused(*options: object) -> str:
+    result = dynhull("serve", "--port", "0", *options)
+    assert result.exit_code
+    return result.stderr

@@ -1,0 +1,188 @@
+"""Names on two workers: what is composed, what is refused, and what goes through a gateway unchanged."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import grpc
+import numpy as np
+import pytest
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from metrics import measured, scrape
+from refusal import refusal
+
+from dynhull.margin import max_margin
+from dynhull_client import (
+    Batch,
+    HullClient,
+    HullNotFoundError,
+    HullUnsuitableError,
+    InvalidRequestError,
+    PermissionDeniedError,
+    Prefix,
+    UnauthenticatedError,
+)
+from dynhull_cluster.placement import worker_of
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+# Names of both workers, and two of one worker.
+ZERO, ONE, WITH_ONE = "north/a", "fleet/a", "fleet/b"
+SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
+BEARER = (("authorization", "Bearer all"),)
+SERVING = health_pb2.HealthCheckResponse.SERVING
+
+
+@dataclass(frozen=True)
+class Place:
+    """A server of two workers, with a hull of one and two of the other.
+
+    Attributes:
+        address: its address.
+        metrics: that of its metrics.
+        tokens: its file of tokens: "all" may do everything, "north" what concerns names with this prefix.
+    """
+
+    address: str
+    metrics: str
+    tokens: Path
+
+
+def entry(token: str, prefix: str) -> str:
+    digest = sha256(token.encode()).hexdigest()
+    return f'[[token]]\nsha256 = "{digest}"\nread = ["{prefix}"]\nwrite = ["{prefix}"]\n'
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    tokens = tmp_path_factory.mktemp("tokens") / "tokens.toml"
+    tokens.write_text(entry("all", "") + entry("north", "north/"))
+    options = ("--workers", "2", "--gateways", "2", "--tokens", str(tokens), "--log-level", "error")
+    with measured(*options) as (server, metrics), HullClient(server.address, token="all") as client:
+        for name, shift in ((ZERO, 0.0), (ONE, 10.0), (WITH_ONE, 20.0)):
+            client.create_hull(name)
+            client.apply(name, insert=np.add(SQUARE, [shift, 0.0]))
+        yield Place(server.address, metrics, tokens)
+
+
+@pytest.fixture(scope="module")
+def client(place: Place) -> Iterator[HullClient]:
+    with HullClient(place.address, token="all") as client:
+        yield client
+
+
+def test_names_stay_where_they_are() -> None:
+    """The numbers are part of the format of data folders."""
+    assert [worker_of(name, 2) for name in (ZERO, ONE, WITH_ONE)] == [0, 1, 1]
+    assert [worker_of(name, 7) for name in ("fleet", "fleet/", "fleet/trucks/1", "a", "b")] == [2, 2, 2, 5, 2]
+
+
+def test_hulls_are_listed_in_pages_of_all_workers(place: Place, client: HullClient) -> None:
+    assert [each.name for each in client.list_hulls()] == [ONE, WITH_ONE, ZERO]
+    assert [each.name for each in client.list_hulls("fleet/")] == [ONE, WITH_ONE]
+    with grpc.insecure_channel(place.address) as channel:
+        stub = HullServiceStub(channel)
+        names, token = [], ""
+        while True:
+            page = stub.ListHulls(pb.ListHullsRequest(page_size=1, page_token=token), metadata=BEARER)
+            names += [each.name for each in page.hulls]
+            token = page.next_page_token
+            if not token:
+                break
+        assert names == [ONE, WITH_ONE, ZERO]
+        code, info, _ = refusal(lambda: stub.ListHulls(pb.ListHullsRequest(page_size=-1), metadata=BEARER))
+        assert (code, info.metadata["field"]) == (grpc.StatusCode.INVALID_ARGUMENT, "page_size")
+
+
+@pytest.mark.parametrize(("first", "other"), [(ZERO, ONE), (ONE, ZERO), (ONE, WITH_ONE)])
+def test_hulls_of_any_workers_are_separated(client: HullClient, first: str, other: str) -> None:
+    found = client.separate(first, other)
+    expected = max_margin(client.get_hull(first).vertices, client.get_hull(other).vertices)
+    assert (found.distance, found.revision, found.other_revision) == (expected.margin, 1, 1)
+    assert np.array_equal(found.normal, expected.normal)
+    assert np.array_equal(found.closest, expected.points)
+
+
+def test_hulls_that_cannot_be_separated(client: HullClient) -> None:
+    client.create_hull("north/globe", geographic=True)
+    client.create_hull("north/empty")
+    with pytest.raises(HullUnsuitableError, match="'north/globe' is geographic, and 'fleet/a' is a plane"):
+        client.separate(ONE, "north/globe")
+    with pytest.raises(HullNotFoundError, match="'north/none'"):
+        client.separate(ONE, "north/none")
+    with pytest.raises(ValueError, match="'north/empty' has no points"):
+        client.separate(ONE, "north/empty")
+    for name in ("north/globe", "north/empty"):
+        client.delete_hull(name)
+
+
+def test_what_needs_one_worker_says_so(client: HullClient) -> None:
+    apart = re.escape("another worker has 'north/a'; give both names the same part before the first \"/\"")
+    with pytest.raises(HullUnsuitableError, match=apart) as refused:
+        client.transfer({ZERO: Batch(insert=[[1, 1]]), ONE: Batch(delete=[[10, 0]])})
+    assert (refused.value.reason, refused.value.field) == ("HULLS_APART", "batches[1].name")
+    assert client.get_hull(ZERO).info.points == 4
+    with pytest.raises(HullUnsuitableError, match=apart):
+        client.locate(ZERO, keys=["a"], keys_of=ONE)
+    with pytest.raises(HullUnsuitableError, match=r"config\.subject_hull is 'fleet/a'"):
+        client.create_fence("north/fence", SQUARE, ONE)
+    with pytest.raises(InvalidRequestError, match='with several workers, a prefix has a "/"'):
+        client.create_fence("north/fence", SQUARE, Prefix("north"))
+    applied = client.transfer({ONE: Batch(insert=[[11, 1]]), WITH_ONE: Batch(insert=[[21, 1]])})
+    assert {each.revision for each in applied.values()} == {2}
+    client.transfer({ONE: Batch(delete=[[11, 1]]), WITH_ONE: Batch(delete=[[21, 1]])})
+
+
+def test_fences_of_all_workers(client: HullClient) -> None:
+    for group in ("fleet", "north"):
+        client.create_hull(f"{group}/keyed", keyed="str")
+        client.create_fence(f"{group}/fence", SQUARE, Prefix(f"{group}/"))
+        client.put(f"{group}/keyed", ["k"], [[1, 1]])
+    assert [each.name for each in client.list_fences()] == ["fleet/fence", "north/fence"]
+    assert [each.inside for each in client.list_fences()] == [1, 1]
+
+
+def test_reads_of_all_workers_are_answered_in_order(client: HullClient) -> None:
+    with client.pipeline() as pipeline:
+        counts = [pipeline.get_hull(name) for name in (ZERO, ONE, WITH_ONE) * 50]
+        gap = pipeline.separate(ZERO, ONE)
+        missing = pipeline.get_hull("north/none")
+        last = pipeline.locate(ZERO, [[1, 1]])
+    assert [each.result().info.name for each in counts] == [ZERO, ONE, WITH_ONE] * 50
+    assert gap.result().distance == 6.0
+    assert isinstance(missing.exception(), HullNotFoundError)
+    assert last.result().sides.tolist() == [1]
+
+
+def test_health_of_each_worker_and_metrics_of_all(place: Place) -> None:
+    with grpc.insecure_channel(place.address) as channel:
+        health = health_pb2_grpc.HealthStub(channel)
+        for service in ("", "dynhull.v1.worker/0", "dynhull.v1.worker/1", "dynhull.v1.scrub"):
+            assert health.Check(health_pb2.HealthCheckRequest(service=service)).status == SERVING
+    found = scrape(place.metrics)
+    names = ("worker-0", "worker-1", "gateway-0", "gateway-1")
+    assert [found[f'dynhull_process_serving{{process="{name}"}}'] for name in names] == [1, 1, 1, 1]
+    hulls = [found[f'dynhull_hulls{{process="worker-{i}"}}'] for i in range(2)]
+    assert hulls == [
+        sum(1 for name in found if "dynhull_hull_points" in name and f"worker-{i}" in name) for i in (0, 1)
+    ]
+    assert sum(count for name, count in found.items() if name.startswith("dynhull_calls_total{") and "gateway" in name)
+
+
+def test_tokens_hold_for_calls_through_a_gateway(place: Place, client: HullClient) -> None:
+    with HullClient(place.address, token="north") as some, HullClient(place.address, token="other") as stranger:
+        assert {each.name.partition("/")[0] for each in some.list_hulls()} == {"north"}
+        with pytest.raises(PermissionDeniedError):
+            some.create_hull(ONE)
+        with pytest.raises(PermissionDeniedError):
+            some.separate(ZERO, ONE)
+        with pytest.raises(UnauthenticatedError):
+            stranger.get_hull(ZERO)
+        with some.watch(ZERO) as watch:
+            next(watch)
+            place.tokens.write_text(entry("all", ""))
+            with pytest.raises(UnauthenticatedError):
+                next(watch)
+        assert client.get_hull(ZERO).info.points == 4

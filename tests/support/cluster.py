@@ -1,0 +1,28 @@
+"""The processes of a server of several, seen from outside."""
+
+from pathlib import Path
+
+
+def processes(supervisor: int) -> dict[str, int]:
+    """The numbers of the workers and gateways that run now, by their names as the operating system shows them."""
+    found = {}
+    for process in _descendants(supervisor):
+        try:
+            name = Path(f"/proc/{process}/comm").read_text().strip()
+        except OSError:  # it has just ended
+            continue
+        if name.startswith(("worker-", "gateway-")):
+            found[name] = process
+    return found
+
+
+def _descendants(process: int) -> list[int]:
+    found = []
+    for thread in Path(f"/proc/{process}/task").glob("*/children"):
+        try:
+            children = [int(each) for each in thread.read_text().split()]
+        except OSError:
+            continue
+        for child in children:
+            found += [child, *_descendants(child)]
+    return found
