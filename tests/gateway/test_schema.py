@@ -14,7 +14,7 @@ import pytest
 from gateway_process import Gateway, gateway_process
 from peers import missing
 
-EXAMPLES = os.environ.get("FUZZ_EXAMPLES", "2")
+EXAMPLES = os.environ.get("FUZZ_EXAMPLES", "1")
 NOT_CHECKED = "positive_data_acceptance,ignored_auth,missing_required_header"
 HOOKS = Path(__file__).parents[1] / "support"
 

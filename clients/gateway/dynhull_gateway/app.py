@@ -23,6 +23,7 @@ from .paths import PathsAsSent
 from .problems import RESPONSES, Problem
 from .schemas import Batch, Feature
 from .settings import Settings
+from .small_changes import SmallChanges
 
 DESCRIPTION = """Exact convex hulls of points that are inserted, moved and deleted.
 
@@ -59,6 +60,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.routes = [route for router in routers for route in router.routes]
     app.openapi = lambda: description(app)  # type: ignore[method-assign]
     problems.install(app)
+    app.add_middleware(SmallChanges, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
     if settings.origins:
         app.add_middleware(
