@@ -1,6 +1,7 @@
 """Fences are compared with positions, areas and events: right ones are equal, and one wrong bit is found."""
 
 import asyncio
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from wrong_fences import WRONG_FENCES
 
 from dynhull.keys import PackedKeys, key_list
 from dynhull_client import Circle, HullClient, Polygon, Prefix, Verification
+from dynhull_server.engine import fence_verification
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.fence_verification import verify_events
 from dynhull_server.engine.fences import LiveFence
@@ -163,7 +165,9 @@ def test_a_flipped_side_is_found(key: str, expected: str | None) -> None:
         ({"time": 0}, "event 2: expected a time of"),
     ],
 )
-def test_a_flipped_event_is_found(change: dict[str, object], complaint: str) -> None:
+def test_a_flipped_event_is_found(monkeypatch: pytest.MonkeyPatch, change: dict[str, object], complaint: str) -> None:
+    monkeypatch.setattr(fence_verification, "PUBLISHED_AFTER", 0.1)  # seconds in which it may turn out to be dropped
+
     async def found() -> str:
         async with engine_in_memory() as engine:
             fence = await life(engine)
@@ -228,29 +232,37 @@ def test_health_logs_and_the_command_tell_of_a_wrong_fence() -> None:
 # Rows that are whole, and say what cannot be
 
 
-def exits(key: str, sequence: int) -> FenceEvent:
-    return FenceEvent(
-        sequence, EventType.EXIT, int(Cause.MOVED), "fleet", key, 1, 0, (1.0, 1.0), None, 1.0, NO_TIME, 2**51
-    )
+def event(kind: EventType, hull: str, key: str, sequence: int) -> FenceEvent:
+    return FenceEvent(sequence, kind, int(Cause.MOVED), hull, key, 1, 0, (1.0, 1.0), None, 1.0, NO_TIME, 2**51)
 
 
-@pytest.mark.parametrize(
-    ("key", "complaint"),
-    [
-        ("a", "fence 'depot', key 'a' of hull 'fleet': expected inside, found outside"),
-        ("far", "event 3: expected a subject that is inside, found exit of one that is not"),
-    ],
-)
-def test_check_compares_stored_fences(tmp_path: Path, key: str, complaint: str) -> None:
-    data = tmp_path / "data"
+@pytest.fixture(scope="module")
+def depot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two keys inside of a fence."""
+    data = tmp_path_factory.mktemp("depot") / "data"
     with server_process("--data", str(data)) as server, HullClient(server.address) as client:
         client.create_hull("fleet", keyed="str")
         client.create_fence("depot", area=Circle(0, 0, 5), subjects="fleet", initial="events")
         client.put("fleet", ["a", "b", "far"], [[0, 0], [1, 1], [9, 9]])
-    assert run("check", data).returncode == 0
+    return data
+
+
+@pytest.mark.parametrize(
+    ("made", "complaint"),
+    [
+        ((EventType.EXIT, "fleet", "a"), "fence 'depot', key 'a' of hull 'fleet': expected inside, found outside"),
+        ((EventType.EXIT, "fleet", "far"), "event 3: expected a subject that is inside, found exit of one that is not"),
+        ((EventType.ENTER, "fleet", "c"), "fence 'depot', key 'c' of hull 'fleet': expected no such key, found inside"),
+        ((EventType.ENTER, "gone", "a"), "fence 'depot', hull 'gone': expected nobody of this hull, found 1 inside"),
+    ],
+)
+def test_check_compares_stored_fences(
+    depot: Path, tmp_path: Path, made: tuple[EventType, str, str], complaint: str
+) -> None:
+    data = shutil.copytree(depot, tmp_path / "data")
     storage = SQLiteStorage(data)
     (fence,) = storage.open(lambda *_: None).fences
-    storage.commit([AppendEvents(block_of({fence.number: [exits(key, 3)]}))])
+    storage.commit([AppendEvents(block_of({fence.number: [event(*made, 3)]}))])
     storage.close()
     done = run("check", data)
     assert done.returncode == 1

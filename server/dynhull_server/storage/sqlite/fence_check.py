@@ -1,8 +1,9 @@
 """Comparison of stored fences with positions, areas and events: whole rows can say what cannot be."""
 
 import sqlite3
+from bisect import bisect_left
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
 
 import numpy as np
 
@@ -10,10 +11,11 @@ from dynhull.arrays import Points
 from dynhull.keys import Keys, PackedKeys
 
 from ...state.contents import replayed
+from ...state.fences.config import FenceConfig
 from ...state.fences.event_order import EventOrder
 from ...state.fences.faults import FenceFault
 from ...state.fences.recomputing import Nearness, Side, Sides, wrong_sides
-from ...state.fences.records import KeptFence, Key, Subject
+from ...state.fences.records import KeptFence, Key
 from ...state.records import Center, Contents
 from ..port import NEWEST
 from .fence_ledger import FenceRows
@@ -57,10 +59,10 @@ def check_fences(connection: sqlite3.Connection, ledger: Ledger) -> list[FenceRe
 
 @dataclass(frozen=True, slots=True)
 class _Stored:
-    """A fence as stored: who is on its inner side, keys or a hull as a whole."""
+    """A fence as stored: who is on its inner side, by hull; no keys of a hull that is near as a whole."""
 
     kept: KeptFence
-    sides: set[Subject | str]
+    sides: dict[str, list[Key]]
     report: FenceReport
 
 
@@ -69,17 +71,33 @@ class _Check:
         self._connection = connection
         self._ledger = ledger
         self._hulls = {hull.row.name: hull for hull in ledger.hulls.values()}
+        self._names = sorted(self._hulls)
         self._outlines: dict[str, tuple[Points, Center | None]] = {}
 
     def run(self) -> list[FenceReport]:
         fences = sorted(self._ledger.fences.values(), key=lambda fence: fence.row.name)
         stored = self._follow(fences)
-        for name in sorted(self._hulls):
-            sides = self._sides(name, stored)
-            reports = {each.report.name: each.report for each in stored}
-            for fault in islice(wrong_sides(sides), MOST_FAULTS):
+        reports = {each.report.name: each.report for each in stored}
+        comparing: dict[str, list[_Stored]] = {}
+        for each in stored:
+            names = self._compared(each.kept.row.config)
+            for name in names:
+                comparing.setdefault(name, []).append(each)
+            for hull in sorted(each.sides.keys() - names):
+                where = f"{len(each.sides[hull]) or 1} inside"
+                each.report.faults.append(FenceFault(each.report.name, hull, None, 0, "nobody of this hull", where))
+        for name, found in sorted(comparing.items()):
+            for fault in islice(wrong_sides(self._sides(name, found)), MOST_FAULTS):
                 reports[fault.fence].faults.append(fault)
         return [each.report for each in stored]
+
+    def _compared(self, config: FenceConfig) -> set[str]:
+        """The names of the hulls that a fence compares with its area: by their keys, or as a whole."""
+        if config.kind != "prefix":
+            return {config.subjects}
+        first = bisect_left(self._names, config.subjects)
+        begin_so = takewhile(lambda name: name.startswith(config.subjects), islice(self._names, first, None))
+        return {name for name in begin_so if self._hulls[name].row.settings.identity != "multiset"}
 
     def _follow(self, fences: list[FenceRows]) -> list[_Stored]:
         """Read fences, and follow their events: those since it was stored who is inside, and all that are kept."""
@@ -99,29 +117,35 @@ class _Check:
             faults = orders[number].finish(inside, fence.last, each.consumers.values())
             faults += [fault for fault in newest[number].faults if fault not in faults]
             # Those with a delay are on the other side than is reported.
-            sides = inside ^ each.delays.keys()
+            sides: dict[str, list[Key]] = {}
+            for subject in inside ^ each.delays.keys():
+                if isinstance(subject, str):
+                    sides[subject] = []
+                else:
+                    sides.setdefault(subject[0], []).append(subject[1])
             stored.append(_Stored(each, sides, FenceReport(name, fence.last, len(inside), faults)))
         return stored
 
     def _sides(self, name: str, stored: list[_Stored]) -> Sides:
-        """What fences have about a hull."""
+        """What the fences that compare a hull have about it."""
         found = Sides(name)
         hull = self._hulls[name]
         identity = hull.row.settings.identity
         for each in stored:
             config = each.kept.row.config
             area = config.area_hull
-            if config.kind == "other" and config.subjects == name and area is not None:
+            if config.kind == "other":
+                assert area is not None  # checked when the fence was created
                 (vertices, center), (others, _) = self._outline(area), self._outline(name)
                 pair = Nearness(each.report.name, config.near, vertices, others, center, name in each.sides)
                 found.pairs.append(pair)
-            elif config.compares(name) and identity != "multiset":
-                if found.contents is None:
-                    found.contents, found.center = self._contents(hull)
-                corners = None if area is None else self._outline(area)[0]
-                keys = [subject[1] for subject in each.sides if subject[0] == name]
-                delays = {key: delay for (of, key), delay in each.kept.delays.items() if of == name}
-                found.sides.append(Side(each.report.name, config, corners, _packed(keys, identity), delays))
+                continue
+            if found.contents is None:
+                found.contents, found.center = self._contents(hull)
+            corners = None if area is None else self._outline(area)[0]
+            keys = _packed(each.sides.get(name, []), identity)
+            delays = {key: delay for (of, key), delay in each.kept.delays.items() if of == name}
+            found.sides.append(Side(each.report.name, config, corners, keys, delays))
         return found
 
     def _contents(self, hull: HullRows) -> tuple[Contents, Center | None]:
