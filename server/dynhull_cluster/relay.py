@@ -15,6 +15,8 @@ from .placement import worker_of
 from .worker_link import WorkerLink, relayed
 
 Route = Callable[[bytes], WorkerLink]
+# Writing to a call that has ended.
+ENDED = suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError)
 
 
 class Relay:
@@ -62,7 +64,7 @@ class Relay:
                 message = await call.receive()
             upstream = self.route(message).stream(method, call)
             try:
-                with call.cutoff(), suppress(asyncio.InvalidStateError):  # it has ended: reading raises why
+                with call.cutoff(), ENDED:  # reading raises why
                     await upstream.write(message)
                     await upstream.done_writing()
                 while True:
@@ -98,12 +100,12 @@ class Relay:
     async def _feed(self, call: Call, message: bytes | None, upstream: Any) -> None:
         """Pass on requests until the last, or until the call ends; the worker answers those that it has."""
         try:
-            with call.cutoff(), suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError):
+            with call.cutoff(), ENDED:
                 while message is not None:
                     await upstream.write(message)
                     message = await call.read()
         finally:
-            with suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError):
+            with ENDED:
                 await upstream.done_writing()
 
 
