@@ -82,7 +82,9 @@ class Settings(BaseModel):
     max_fence_event_age: float = Field(
         0.0, ge=0, description="Seconds after which events of fences are dropped; 0 to keep them."
     )
-    fence_history_bytes: int = Field(2**18, ge=0, description="Memory per fence for its recent events.")
+    fence_history_bytes: int = Field(
+        2**18, ge=0, description="Memory for recent events, times the number of fences; 64 MB at most."
+    )
 
     scrub_cpu: float = Field(
         0.05,

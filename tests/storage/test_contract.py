@@ -11,9 +11,11 @@ import pytest
 from folders import appended, event, events, fence_row, fill_fence, read_fence, same
 
 from dynhull.keys import PackedKeys
+from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.records import (
     NO_WAITS,
     AddFence,
+    AppendEvents,
     ChangeFence,
     Consumer,
     Delay,
@@ -594,6 +596,36 @@ def test_a_deleted_fence_leaves_nothing(opened):
         assert read_fence(opened.storage, 10).events == events(1, 1)
         assert opened.contents.next_number in (1, 11)
         opened.reopen()
+
+
+def test_fences_that_share_commits_keep_their_own_events(opened):
+    """Also when some of them are deleted, and others drop events."""
+    for number in (9, 10, 11, 12):
+        opened.commit(
+            *([Create(row(1, "fleet"))] * (number == 9)), AddFence(fence_row(number, f"gate {number}"), Inside())
+        )
+    for first in (1, 3, 5):
+        made = {number: events(first, first + 1) for number in (9, 10, 11, 12)}
+        opened.commit(AppendEvents(block_of(made)))
+    for number in (10, 11):
+        opened.carry_out(opened.storage.inside(number, Inside(6)))
+        opened.commit(DropEvents(number, 4))
+    opened.commit(DropFence(12))
+    for _ in range(2):
+        opened.carry_out(opened.storage.sweep())
+        assert opened.storage.read_events(9, 0, 10) == events(1, 6)
+        assert opened.storage.read_events(9, 3, 2) == events(4, 5)
+        assert opened.storage.read_events(10, 0, 10) == opened.storage.read_events(11, 0, 10) == events(4, 6)
+        kept = opened.storage.read_fences([9, 12, 10])
+        assert [each and (each.first, each.last, each.events) for each in kept] == [
+            (1, 6, events(1, 6)),
+            None,
+            (4, 6, []),
+        ]
+        opened.reopen()
+    opened.commit(DropFence(9), appended(10, events(7, 7)))
+    opened.carry_out(opened.storage.sweep())
+    assert opened.storage.read_events(10, 0, 10) == events(4, 7)
 
 
 @pytest.mark.parametrize(

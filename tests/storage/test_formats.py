@@ -7,12 +7,13 @@ import sqlite3
 import numpy as np
 import pytest
 from command_line import dynhull
-from folders import DATABASE, OLD_FOLDERS, append, opened, read_fence, same, snapshot
+from folders import DATABASE, OLD_FOLDERS, append, event, opened, read_fence, same, snapshot
 from test_faults import FaultyDisk, failure
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
-from dynhull_server.state.fences.records import Delay, PutDelays
+from dynhull_server.state.fences.event_block import block_of
+from dynhull_server.state.fences.records import AppendEvents, Delay, DropEvents, PutDelays
 from dynhull_server.state.fences.restoring import members_after
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError
@@ -229,3 +230,49 @@ def test_a_folder_of_format_4_has_every_fence(folder, name):
         storage.commit([PutDelays(gate, {("vans", f"van é{life}"): Delay(True, 10**15, 1, 1)})])
         storage.close()
         assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
+
+
+# Format 6, written by tests/data/make_folder.py
+
+FORMAT_6 = OLD_FOLDERS / "format6"
+
+
+def as_told(event):
+    """An event as the earlier version told it."""
+    key, position = None if event.key is None else str(event.key), event.position and list(event.position)
+    return [event.sequence, event.type.name.lower(), event.hull, key, position, event.distance]
+
+
+@pytest.mark.parametrize("name", ["stopped", "killed"])
+def test_a_folder_of_format_6_has_every_event(folder, name):
+    """Those of rows for one fence each; the next ones share rows, and are dropped one by one."""
+    shutil.copytree(FORMAT_6 / name, folder)
+    expected = json.loads((FORMAT_6 / f"{name}-fences.json").read_text())
+    for _ in range(2):
+        storage, contents = opened(folder)
+        assert contents.notes == []
+        fences = storage.read_fences([row.number for row in contents.fences])
+        for row, kept in zip(contents.fences, fences, strict=True):
+            told = expected[row.name]
+            assert (kept.first, kept.last, bool(kept.delays)) == (told["first"], told["last"], row.name == "late")
+            found = [as_told(each) for each in storage.read_events(row.number, 0, 1000)]
+            assert len(found) == kept.last - kept.first + 1
+            seen = [each for each in told["events"] if each[1] != "lost"]  # the last one is missing where some are lost
+            assert found[: len(seen)] == seen
+        storage.close()
+        assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
+    storage, contents = opened(folder)
+    short = next(row.number for row in contents.fences if row.name == "short")
+    gate = next(row.number for row in contents.fences if row.name == "gate")
+    lasts = {number: expected[name]["last"] for name, number in (("short", short), ("gate", gate))}
+    made = {number: [event(last + 1)] for number, last in lasts.items()}
+    storage.commit([AppendEvents(block_of(made))])
+    storage.commit([DropEvents(short, lasts[short] + 1)])
+    for _ in range(2):
+        assert storage.read_events(gate, lasts[gate], 10) == made[gate]
+        (kept,) = storage.read_fences([short])
+        assert storage.read_events(short, 0, 10)[-1:] == made[short]
+        assert expected["short"]["first"] <= kept.first <= lasts[short] + 1
+        storage.close()
+        storage, _ = opened(folder)
+    storage.close()

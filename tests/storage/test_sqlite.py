@@ -11,6 +11,8 @@ from folders import (
     DATABASE,
     LOG,
     append,
+    events,
+    fence_row,
     fill,
     fill_fence,
     flip,
@@ -26,7 +28,8 @@ from folders import (
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
-from dynhull_server.state.fences.records import DropEvents, Inside, Members
+from dynhull_server.state.fences.event_block import block_of
+from dynhull_server.state.fences.records import AddFence, AppendEvents, DropEvents, DropFence, Inside, Members
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept, Window
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
@@ -432,3 +435,29 @@ def test_an_unfinished_copy_is_refused(folder):
     (folder / "unfinished.db").write_bytes(b"")
     with pytest.raises(StorageError, match="is an unfinished copy: remove it, and copy again"):
         opened(folder)
+
+
+def test_what_no_fence_needs_of_a_row_of_events_leaves_the_disk(folder):
+    storage, _ = opened(folder)
+    fill(storage, 1)
+    for number in range(10, 20):
+        storage.commit([AddFence(fence_row(number, f"gate {number}"), Inside())])
+    storage.commit([AppendEvents(block_of({number: events(1, 50) for number in range(10, 20)}))])
+
+    def stored():
+        with closing(sqlite3.connect(folder / DATABASE)) as database:
+            return database.execute("SELECT count(*), sum(length(payload)) FROM events").fetchone()
+
+    _, size = stored()
+    storage.commit([DropFence(number) for number in range(10, 19)])
+    for step in storage.sweep():
+        storage.commit([step])
+    rows, left = stored()
+    assert rows == 1
+    assert left < size / 5
+    assert storage.read_events(19, 0, 100) == events(1, 50)
+    storage.commit([DropFence(19)])
+    for step in storage.sweep():
+        storage.commit([step])
+    assert stored() == (0, None)
+    storage.close()

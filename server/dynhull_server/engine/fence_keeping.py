@@ -73,7 +73,7 @@ class FenceKeeping:
         for count, fence in enumerate(stirred, start=1):
             if count % FENCES_A_STEP == 0:
                 await self._clock.sleep(0)
-            if fence.ended or (fence.last < fence.first and not fence.unsaved):
+            if fence.ended or self._rests(fence):
                 continue
             try:
                 await self._keep(fence)
@@ -84,6 +84,26 @@ class FenceKeeping:
                 failure = failure or error
         if failure is not None:
             raise failure
+
+    def _rests(self, fence: Fence) -> bool:
+        """Whether there is nothing to do for a fence. At full load this is asked for every fence every second."""
+        kept = fence.last - fence.first + 1
+        if kept > self._most(fence) or fence.unsaved >= max(LEAST_EVENTS, fence.inside):
+            return False
+        plan = self._plans.get(fence.number)
+        return (
+            not kept or (plan is None and not self._age(fence)) or (plan is not None and plan.age == self._age(fence))
+        )
+
+    def _most(self, fence: Fence) -> int:
+        """The number of events to keep."""
+        most = self._limits.max_fence_events
+        return min(fence.row.config.max_events or most, most)
+
+    def _age(self, fence: Fence) -> int:
+        """The age in microseconds at which events are too old, 0 for none."""
+        ages = [fence.row.config.max_event_age, int(self._limits.max_fence_event_age * MICROSECONDS)]
+        return min((each for each in ages if each), default=0)
 
     async def _keep(self, fence: Fence) -> None:
         first = await self._first(fence)
@@ -100,11 +120,8 @@ class FenceKeeping:
 
     async def _first(self, fence: Fence) -> int:
         """The sequence of the oldest event that the limits let stay."""
-        config, limits = fence.row.config, self._limits
-        most = min(config.max_events or limits.max_fence_events, limits.max_fence_events)
-        first = max(fence.first, fence.last - most + 1)
-        ages = [config.max_event_age, int(limits.max_fence_event_age * MICROSECONDS)]
-        age = min((each for each in ages if each), default=0)
+        first = max(fence.first, fence.last - self._most(fence) + 1)
+        age = self._age(fence)
         plan = self._plans.get(fence.number)
         if not age or (plan is not None and plan.age == age):
             return first

@@ -12,7 +12,7 @@ class FenceLimits:
         max_fence_consumers: the number of consumers per fence.
         max_fence_events: the number of events to keep per fence.
         max_fence_event_age: the seconds for which events are kept, 0 for no limit.
-        fence_history_bytes: the memory per fence for its recent events.
+        fence_history_bytes: the memory for recent events of all fences, divided by their number; 64 MB at most in all.
     """
 
     max_fences: int = 100_000

@@ -138,7 +138,10 @@ class Storage(Protocol):
         """
 
     def sweep(self) -> Iterator["Step"]:
-        """Drop the rows of deleted hulls and unfinished snapshots, in the same way. Run only one sweep at a time."""
+        """Drop what nobody needs of deleted hulls and fences, unfinished snapshots and dropped events, in the same way.
+
+        Run only one sweep at a time.
+        """
 
     def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
         """Fences as last committed, with the events that follow who was inside; None where no fence has that number.

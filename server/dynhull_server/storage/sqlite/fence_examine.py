@@ -135,8 +135,9 @@ class FenceExamination:
 
     def _place(self, place: int, weight: int, runs: Iterable[tuple[int, int, int]]) -> None:
         """Assign the runs of a row to their fences: the number of the fence, the first sequence and the count."""
-        needed = 0
+        needed = stored = 0
         for number, first, many in runs:
+            stored += 1
             fence = self._fences.get(number)
             if fence is not None and first + many > fence.first:
                 fence.firsts.append(first)
@@ -144,7 +145,7 @@ class FenceExamination:
                 self._lasts[number].append(first + many - 1)
                 needed += 1
         if needed:
-            self._ledger.events.add(place, weight, needed)
+            self._ledger.events.add(place, weight, needed, stored)
         else:
             self._ledger.dead["events"].append(place)
 

@@ -32,7 +32,16 @@ from .encoding import checksum, weight
 from .event_blocks import encode_block
 from .event_rows import encode_delay, encode_inside
 from .fence_rows import consumer_values, values
-from .schema import INSERT_CONSUMER, INSERT_DELAY, INSERT_EVENTS, INSERT_FENCE, INSERT_INSIDE, INSERT_START, MANY
+from .schema import (
+    INSERT_CONSUMER,
+    INSERT_DELAY,
+    INSERT_EVENTS,
+    INSERT_FENCE,
+    INSERT_INSIDE,
+    INSERT_START,
+    MANY,
+    SHRINK_EVENTS,
+)
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -220,7 +229,16 @@ class DropInside:
     sequence: int
 
 
-FenceStep = PutInside | DropInside
+@dataclass(frozen=True, slots=True)
+class ShrinkEvents:
+    """Step: leaves of a row of events only those runs that fences need."""
+
+    place: int
+    runs: int
+    payload: bytes
+
+
+FenceStep = PutInside | DropInside | ShrinkEvents
 
 
 @dataclass(slots=True)
@@ -275,6 +293,7 @@ class FenceChanges:
         self._lasts: dict[int, int] = {}  # the last events of fences, where these are new
         self._blocks: list[EventBlock] = []
         self._released: Counter[int] = Counter()  # runs by row
+        self._shrunk: dict[int, int] = {}  # weights by row
         self.rows = self.sum = self.next_number = 0
 
     def take(self, change: FenceChange | FenceStep) -> None:
@@ -284,6 +303,9 @@ class FenceChanges:
             return
         if isinstance(change, AppendEvents):
             self._append(change.block)
+            return
+        if isinstance(change, ShrinkEvents):
+            self._shrink(change)
             return
         number = change.row.number if isinstance(change, ChangeFence) else change.number
         now = self._fence(number)
@@ -386,9 +408,22 @@ class FenceChanges:
                 rows.firsts.append(first)
                 rows.places.append(place)
                 rows.last = first + count - 1
-            self._ledger.events.add(place, each, len(numbers))
+            self._ledger.events.add(place, each, len(numbers), len(numbers))
 
         self._effects.append(add)
+
+    def _shrink(self, step: ShrinkEvents) -> None:
+        place, events = step.place, self._ledger.events
+        if not events.needs(place):
+            return
+        (left,), (before,) = (column.tolist() for column in events.left(np.array([place])))
+        if left == self._released[place]:
+            return
+        stored = checksum(step.payload, *MANY)
+        each = self._shrunk[place] = weight(stored, *MANY)
+        self.sum += each - before
+        self._statements.append((SHRINK_EVENTS, (stored, step.payload, place)))
+        self._effects.append(lambda: events.shrink(place, each, step.runs))
 
     def _rows(self, number: int) -> FenceRows:
         now = self._now.get(number)
@@ -402,8 +437,9 @@ class FenceChanges:
         places, counts = np.unique(np.frombuffer(released, np.int64), return_counts=True)
         left, weights = self._ledger.events.left(places)
         left = left - counts
-        for at, place in enumerate(places.tolist() if self._released else ()):
+        for at, place in enumerate(places.tolist() if self._released or self._shrunk else ()):
             left[at] -= self._released[place]
+            weights[at] = self._shrunk.get(place, weights[at])
         self._released.update(dict(zip(places.tolist(), counts.tolist(), strict=True)))
         empty = left == 0
         self.rows -= int(empty.sum())

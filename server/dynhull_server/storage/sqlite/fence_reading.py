@@ -4,14 +4,19 @@ import sqlite3
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from ...state.fences.records import Delay, FenceEvent, Inside, KeptFence, Members, Subject
 from ...state.records import NO_TIME
 from ..port import NEWEST, DamagedError
 from .encoding import checksum
-from .event_blocks import decode_block
+from .event_blocks import decode_block, encode_block
 from .event_rows import decode_delay, decode_events, decode_inside
-from .fence_ledger import FenceRows
+from .fence_ledger import FenceRows, ShrinkEvents
 from .reading import rows_by_id
+from .schema import MANY
+
+OWN = "\0"  # no name of a hull
 
 
 def read_fences(connection: sqlite3.Connection, fences: Sequence[FenceRows | None]) -> list[KeptFence | None]:
@@ -90,6 +95,30 @@ def read_runs(
     for number, (fence, _) in wanted.items():
         if last[number] < until[number]:
             raise _damaged(fence, f"event {last[number] + 1} is missing")
+
+
+def shrunk(connection: sqlite3.Connection, place: int, starts: Mapping[int, int]) -> ShrinkEvents | None:
+    """The step that leaves of a row of events of many fences what is needed; None if that is nothing.
+
+    Args:
+        connection: a connection.
+        place: the number of the row.
+        starts: where the events of each fence begin, by number.
+
+    Raises:
+        DamagedError: the row is damaged.
+    """
+    query = "SELECT checksum, payload FROM events WHERE rowid = ?"
+    for stored, payload in connection.execute(query, (place,)):
+        if checksum(payload, *MANY) != stored:
+            raise DamagedError(f"row {place} of events is damaged: restore a backup")
+        block = decode_block(payload, lambda _: OWN)
+        ends = (block.firsts + block.counts).tolist()
+        needed = [end > starts.get(number, end) for number, end in zip(block.fences.tolist(), ends, strict=True)]
+        if any(needed):
+            left = block.runs(np.array(needed))
+            return ShrinkEvents(place, len(left.fences), encode_block(left, [OWN] * len(left.fences)))
+    return None
 
 
 def _inside(connection: sqlite3.Connection, fence: FenceRows, base: int) -> Inside:

@@ -154,6 +154,7 @@ INSERT_CHUNK = "INSERT INTO chunks (rowid, snapshot, number, checksum, points) V
 INSERT_SNAPSHOT = "INSERT INTO snapshots (id, hull, revision, chunks, state, checksum) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_FENCE = "INSERT INTO fences (id, name, uid, created, config, checksum) VALUES (?, ?, ?, ?, ?, ?)"
 INSERT_EVENTS = "INSERT INTO events (rowid, fence, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
+SHRINK_EVENTS = "UPDATE events SET checksum = ?, payload = ? WHERE rowid = ?"
 INSERT_INSIDE = (
     "INSERT INTO insides (rowid, fence, sequence, part, parts, checksum, payload) VALUES (?, ?, ?, ?, ?, ?, ?)"
 )

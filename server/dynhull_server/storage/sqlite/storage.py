@@ -35,8 +35,8 @@ from .chunks import chunk, starts, state
 from .disk import Access, Disk
 from .encoding import weight
 from .examine import Findings, examine, format_of, load
-from .fence_ledger import DropInside, inside_steps
-from .fence_reading import read_events, read_fences
+from .fence_ledger import DropInside, ShrinkEvents, inside_steps
+from .fence_reading import read_events, read_fences, shrunk
 from .folder import Folder
 from .ledger import (
     DROPPED,
@@ -323,6 +323,23 @@ class SQLiteStorage:
         self._look_for_dead_chunks()
         for table, column in DROPPED.items():
             yield from self._drop_dead(table, column)
+        for place in self._sparse():
+            step = self._shrunk(place)
+            if step is not None:
+                yield step
+
+    def _sparse(self) -> list[int]:
+        with self._visible:
+            return self._settled().events.sparse()
+
+    @_as_storage_errors()
+    def _shrunk(self, place: int) -> ShrinkEvents | None:
+        """The step that leaves of a row of events what is needed; None if that is nothing."""
+        with self._readers.lend() as connection:
+            with self._visible:
+                starts = {number: fence.first for number, fence in self._settled().fences.items()}
+                begin(connection)
+            return shrunk(connection, place, starts)
 
     def _drop_dead(self, table: str, column: str) -> Iterator[Step]:
         while ids := self._ledger.dead[table][:DROPPED_ROWS]:
