@@ -25,7 +25,7 @@ from dynhull_server.rpc.methods import (
     health_handlers,
     reflection_handlers,
 )
-from dynhull_server.rpc.metrics import Metrics
+from dynhull_server.rpc.metrics import CallCollector, Metrics
 from dynhull_server.rpc.places import Places
 from dynhull_server.settings import Settings
 
@@ -68,7 +68,7 @@ class Gateway:
         self._supervisor = Supervisor(self._clock, lambda _: self._update_health(), end_process)
         self._tokens = token_file(settings)
         self._entrance = PublicEntrance(settings, shared_port=True)
-        metrics = Metrics()
+        metrics = self._metrics = Metrics()
         self.registry = metrics.registry
         streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
         self._calls = Calls(self._entrance.authenticator(self._tokens), metrics, settings.max_message_bytes, streams)
@@ -100,6 +100,7 @@ class Gateway:
         )
         self._server.add_generic_rpc_handlers(handlers)
         self.address = await self._entrance.listen(self._server, handlers)
+        self.registry.register(CallCollector(self._metrics, asyncio.get_running_loop()))
         self._health.set(NOT_SERVING, WHOLE, *SERVICES, SCRUB)
         self._calls.ready()
         self._serving = True

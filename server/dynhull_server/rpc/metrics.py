@@ -115,6 +115,18 @@ class Metrics:
         return max((now - since for since in self._watchers.values() if since is not None), default=0.0)
 
 
+class CallCollector(Collector):
+    """Collects the counts of calls on the event loop, for a process without hulls."""
+
+    def __init__(self, metrics: Metrics, loop: asyncio.AbstractEventLoop) -> None:
+        self._metrics = metrics
+        self._loop = loop
+
+    def collect(self) -> Iterator[Metric]:
+        """The counts."""
+        yield from _on(self._loop, lambda: list(self._metrics.calls.families()))
+
+
 class StateCollector(Collector):
     """Collects hulls, watchers and counts of calls and batches on the event loop, when called from another thread."""
 
