@@ -191,6 +191,10 @@ class _Frames(Frames):
             self._lost.set_result(None)
 
 
+# What gRPC itself makes of a connection that breaks; a worker gives its own errors details.
+BROKEN = grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN
+
+
 def lost_status() -> Status:
     """The status of a call whose worker has ended: without a reason, as that of a lost connection."""
     return Status(code=grpc.StatusCode.UNAVAILABLE.value[0], message="the worker has ended; the outcome is unknown")
@@ -199,6 +203,8 @@ def lost_status() -> Status:
 def relayed(error: "grpc.aio.AioRpcError") -> RelayedError:
     """The error of a worker, as the caller gets it."""
     status = rpc_status.from_call(_Finished(error))
+    if status is None and error.code() in BROKEN:
+        status = lost_status()
     return RelayedError(status or Status(code=error.code().value[0], message=error.details() or ""))
 
 

@@ -8,7 +8,6 @@ from html import escape
 from dynhull_client import Verification
 
 from .advice import about_hull
-from .degrees import SQUARE_KILOMETRE
 from .feed import HullFeed, Verified
 from .looks import Look
 
@@ -55,8 +54,8 @@ def _figures(feed: HullFeed) -> tuple[str, ...]:
 
 
 def _area(feed: HullFeed) -> str:
-    """The area; of a geographic hull in square kilometres, whatever the unit of the others."""
-    return _number(feed.area) if feed.center is None else f"{_number(feed.area / SQUARE_KILOMETRE)} km²"
+    """The area; of a geographic hull with its own unit, whatever that of the others."""
+    return _number(feed.shown_area) + ("" if feed.center is None else " km²")
 
 
 def symbol(look: Look) -> str:

@@ -20,7 +20,7 @@ from dynhull_client import (
     Verification,
 )
 
-from .degrees import Center, outline, poles, shown
+from .degrees import SQUARE_KILOMETRE, Center, outline, poles, shown
 from .drawing import Drawing, points_of, vertices_of
 from .history import History
 from .outline import Box, apart, box_around, drawn
@@ -171,6 +171,11 @@ class HullFeed:
         keys = None if copy.vertex_keys is None else copy.vertex_keys[rows]
         self._outline = Drawing(vertices_of(self.name), event.revision, corners, keys, rings)
 
+    @property
+    def shown_area(self) -> float:
+        """The area as it is shown: of a geographic hull in square kilometres."""
+        return self.area if self.center is None else self.area / SQUARE_KILOMETRE
+
     async def _count(self) -> None:
         """Add a row to the history every second."""
         before, then = self.revision, time.monotonic()
@@ -182,7 +187,7 @@ class HullFeed:
             self.rate = (revision - before) / (now - then) if steady else math.nan
             before, then = (revision if self.live else 0), now
             if self.live:
-                self.history.append(time.time() * 1000, self.points, self.vertices, self.area, self.rate)
+                self.history.append(time.time() * 1000, self.points, self.vertices, self.shown_area, self.rate)
             else:
                 self.history.append(time.time() * 1000, math.nan, math.nan, math.nan, math.nan)
 

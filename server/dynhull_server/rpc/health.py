@@ -13,9 +13,9 @@ from .places import Places
 from .status import ServiceUnknownError
 
 # A request is a name. gRPC reads a whole message into memory before its size is known. Therefore only one request per
-# address is read at a time, and a request that does not arrive at once is refused.
+# address is read at a time, and a request that does not arrive soon is refused: a probe on a busy machine may be late.
 MAX_BYTES = 4096
-READ_SECONDS = 0.025
+READ_SECONDS = 0.5
 # A delayed event loop may not have read a message that has arrived: it gets the time again, at most this many times.
 LATE = 20
 
