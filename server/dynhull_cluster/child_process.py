@@ -88,7 +88,8 @@ class ChildProcess:
                 pause = FIRST_PAUSE
                 continue
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._stop.wait(), pause)
+                async with asyncio.timeout(pause):
+                    await self._stop.wait()
             pause = min(2 * pause, LONGEST_PAUSE)
 
     async def restart(self) -> None:

@@ -112,7 +112,8 @@ class Gateway:
             self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
         await self._server.start()
         with suppress(TimeoutError):  # a gateway that is restarted serves without a worker that is away
-            await asyncio.wait_for(self._all_well.wait(), FIRST_SECONDS)
+            async with asyncio.timeout(FIRST_SECONDS):
+                await self._all_well.wait()
         log.info("serving", extra={"address": self.address})
 
     async def drain(self) -> None:

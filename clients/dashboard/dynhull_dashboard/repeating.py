@@ -34,7 +34,9 @@ async def repeat(
             log.info("%s: %s", name, error)
         took = time.monotonic() - begun
         try:
-            await asyncio.wait_for(at_once.wait(), max(pause(), PAUSE_FACTOR * took))
+            # Not asyncio.wait_for: up to Python 3.11 it loses a cancellation that comes with what it waits for.
+            async with asyncio.timeout(max(pause(), PAUSE_FACTOR * took)):
+                await at_once.wait()
         except TimeoutError:
             continue
         at_once.clear()

@@ -43,7 +43,8 @@ class AsyncFollower(AsyncIterator[Happening]):
         while not self._arrived:
             if self._call is None:
                 with suppress(TimeoutError):
-                    await asyncio.wait_for(self._closed.wait(), self._place.pause)
+                    async with asyncio.timeout(self._place.pause):
+                        await self._closed.wait()
             if self._closed.is_set() or self._place.ended:
                 raise StopAsyncIteration
             if self._call is None or self._call.cancelled():  # gRPC cancels a call when its caller stops waiting

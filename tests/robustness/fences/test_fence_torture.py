@@ -19,6 +19,6 @@ def test_every_event_follows_from_the_positions_and_none_is_missing() -> None:
         "checked": 50,
         "delayed": 5,
         "DWELL": 5,
-        "verified": 50,
+        "verified": 30,
     }
     assert all(counts.get(name, 0) >= number for name, number in least.items()), counts

@@ -301,7 +301,8 @@ class World:
         told = {event.type for event in fence.events[made:]} - {EventType.CROSS}
         if inside and not told:
             shown = was if known and subject in fence.beyond else None
-            self._tell(fence, EventType.TRANSFER, subject, shown, now, int(Cause.MOVED))
+            causes = Cause.MOVED | (Cause.AREA if area and not fence.config.delays else Cause(0))
+            self._tell(fence, EventType.TRANSFER, subject, shown, now, int(causes))
         self._origin = None
 
     def _look_at_pair(self, fence: FenceModel, cause: int) -> None:

@@ -120,7 +120,8 @@ class JetStream:
         if not self._arrived:
             self._news.clear()
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._news.wait(), WAIT)
+                async with asyncio.timeout(WAIT):
+                    await self._news.wait()
         messages: list[Message] = []
         while self._arrived and len(messages) < MOST:
             self._heard = monotonic()

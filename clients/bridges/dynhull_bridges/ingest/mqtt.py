@@ -96,7 +96,8 @@ class Mqtt:
         try:
             await asyncio.to_thread(self._client.connect, self._host, self._port, **options)
             self._client.loop_start()
-            await asyncio.wait_for(self._ready, TIMEOUT)
+            async with asyncio.timeout(TIMEOUT):
+                await self._ready
         except (OSError, TimeoutError) as error:
             raise FeedError(f"MQTT: {type(error).__name__}: {error}") from None
         return 0
@@ -106,7 +107,8 @@ class Mqtt:
         if not self._arrived:
             self._news.clear()
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._news.wait(), WAIT)
+                async with asyncio.timeout(WAIT):
+                    await self._news.wait()
         if self._lost is not None and not self._arrived:
             raise FeedError(f"MQTT: {self._lost}")
         with self._lock:

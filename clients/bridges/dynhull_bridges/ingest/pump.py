@@ -99,7 +99,8 @@ class Pump:
             await self._feed.close()
             pause = FIRST_PAUSE if self.reached > reached else min(2 * pause, LONGEST_PAUSE)
             try:
-                await asyncio.wait_for(stop.wait(), pause)
+                async with asyncio.timeout(pause):
+                    await stop.wait()
             except TimeoutError:
                 continue
 
