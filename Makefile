@@ -111,6 +111,7 @@ fuzz-gateway: .venv/.test  ## many more bad HTTP requests than `make test` sends
 
 robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, leave calls, flip bits, while models check every promise
 	$(BIN)/python tests/robustness/server/torture.py --faults 100
+	$(BIN)/python tests/robustness/server/torture.py --faults 100 --workers
 	$(BIN)/python tests/robustness/server/callers.py --calls 10000 --kills 5
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 	$(BIN)/python tests/robustness/fences/fence_torture.py --steps 1000000

@@ -9,6 +9,7 @@ import grpc
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.calls import Call
+from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import LimitExceededError
 
 from .placement import worker_of
@@ -93,6 +94,11 @@ class Relay:
                 while (response := await next_response(upstream)) is not None:
                     await call.write(response)
                 await feeding  # raises what has ended the requests
+            except RelayedError:
+                # Requests that were cut off, perhaps before the first one, are no fault of the caller.
+                if feeding.done() and not feeding.cancelled() and (cut := feeding.exception()) is not None:
+                    raise cut from None
+                raise
             finally:
                 feeding.cancel()
                 upstream.cancel()

@@ -55,6 +55,7 @@ from actors import (
     last_sequence,
     persist,
 )
+from cluster import processes
 from forked import COMMAND, Process
 from patience import PATIENCE
 from promises import require
@@ -64,15 +65,17 @@ from timed import ModelledHull, Shuttle, TimedWriter, wall
 from timeline import FLEETS, SECOND, TIMED
 
 HULL = "tortured"
+WORKERS = ("--workers", "2", "--gateways", "2")
 DISK = "64m"
 PAGE_BYTES = 8192  # of the database
 
 
 class Server:
-    """`dynhull serve` on a folder; it keeps its port over its lives."""
+    """`dynhull serve` on a folder, with these options; it keeps its port over its lives."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
         self.data = folder / "data"
+        self._options = options
         self._port = 0
         self._log = folder / "server.log"
 
@@ -82,6 +85,7 @@ class Server:
     def starts(self, wrap: Sequence[str] = ()) -> bool:
         command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--data", str(self.data)]
         command += ["--create-on-write", "--snapshot-points", "300", "--log-level", "warning", "--scrub-cpu", "0"]
+        command += self._options
         with self._log.open("ab") as log:
             self.process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
         line = self.process.stdout.readline()
@@ -112,10 +116,10 @@ def killed_at_the_end(server: Server) -> Iterator[None]:
 
 
 class Torture:
-    def __init__(self, folder: Path, seed: int, writers: int) -> None:
+    def __init__(self, folder: Path, seed: int, writers: int, options: Sequence[str] = ()) -> None:
         self._folder = folder
         self._random = random.Random(seed)
-        self.server = Server(folder)
+        self.server = Server(folder, options)
         self.server.start()
         self._started = wall(), time.monotonic()
         self._proxy = Proxy(self.server.address)
@@ -179,6 +183,30 @@ class Torture:
         self.server.process.send_signal(signal.SIGSTOP)
         time.sleep(self._random.uniform(0.1, 1.0))
         self.server.process.send_signal(signal.SIGCONT)
+
+    def _kill_worker(self) -> None:
+        self._kill_one_of("worker")
+
+    def _kill_gateway(self) -> None:
+        self._kill_one_of("gateway")
+
+    def _kill_one_of(self, kind: str) -> None:
+        """A kill of one process of several, which the server starts again."""
+        os.kill(self._one_of(kind), signal.SIGKILL)
+
+    def _pause_worker(self) -> None:
+        worker = self._one_of("worker")
+        os.kill(worker, signal.SIGSTOP)
+        time.sleep(self._random.uniform(0.1, 1.0))
+        os.kill(worker, signal.SIGCONT)
+
+    def _restart(self) -> None:
+        """All processes are restarted, one at a time."""
+        self.server.process.send_signal(signal.SIGHUP)
+
+    def _one_of(self, kind: str) -> int:
+        found = processes(self.server.process.pid)
+        return self._random.choice([number for name, number in sorted(found.items()) if name.startswith(kind)])
 
     def _sever(self) -> None:
         self._proxy.cut()
@@ -355,11 +383,13 @@ class Torture:
         self.server.process.wait()
 
 
-def torture(folder: Path, faults: int, seed: int, writers: int = 2) -> str:
+def torture(folder: Path, faults: int, seed: int, writers: int = 2, *, workers: bool = False) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
-    run = Torture(folder, seed, writers)
+    run = Torture(folder, seed, writers, WORKERS if workers else ())
     clock_back = "clock_back" if shutil.which("faketime") else "kill"
     kinds = ["kill", clock_back, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "kill", "sever"]
+    if workers:
+        kinds = ["kill_worker", "kill_gateway", "restart", "kill_worker", "pause_worker", "full_disk", "sever", "kill"]
     try:
         for i in range(faults):
             run.round(kinds[i % len(kinds)])
@@ -387,6 +417,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Kill, pause, cut off and starve a server while a model watches.")
     parser.add_argument("--faults", type=int, default=50, help="how many (default 50)")
     parser.add_argument("--seed", type=int, default=0, help="what the faults and the batches depend on (default 0)")
+    parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
     parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if not options.mounted:
@@ -394,7 +425,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "none", folder], check=True)
         try:
-            print("\n" + torture(Path(folder), options.faults, options.seed))
+            print("\n" + torture(Path(folder), options.faults, options.seed, workers=options.workers))
         except BaseException:
             print((Path(folder) / "server.log").read_text(), file=sys.stderr)
             raise
