@@ -47,7 +47,7 @@ class ChildProcess:
 
     Args:
         name: its name, as "worker-0".
-        begin: what it is told when it starts.
+        begin: the first message to it.
         grace: the seconds that it has to end its calls.
 
     Attributes:
@@ -108,10 +108,12 @@ class ChildProcess:
         if self._line is None or not self.serving.is_set():
             return None
         number = next(self._numbers)
-        answer = self._asked[number] = asyncio.get_running_loop().create_future()
+        answer: asyncio.Future[str | None] = asyncio.get_running_loop().create_future()
+        self._asked[number] = answer
         self._line.send({"metrics": number})
         try:
-            return await asyncio.wait_for(answer, METRICS_SECONDS)
+            async with asyncio.timeout(METRICS_SECONDS):
+                return await answer
         except TimeoutError:
             return None
         finally:
@@ -160,7 +162,8 @@ class ChildProcess:
             return
         process.terminate()
         try:
-            await asyncio.wait_for(asyncio.shield(ended), self._grace + LAST_SECONDS)
+            async with asyncio.timeout(self._grace + LAST_SECONDS):
+                await asyncio.shield(ended)
         except TimeoutError:
             log.error("a process does not end: it is killed", extra={"killed": self.name})
             process.kill()

@@ -20,5 +20,5 @@ def partition_of(name: str) -> int:
 
 
 def worker_of(name: str, workers: int) -> int:
-    """The number of the worker that has a name, of so many workers."""
+    """The number of the worker that has the hulls of this name, from 0 to less than the number of workers."""
     return partition_of(name) % workers

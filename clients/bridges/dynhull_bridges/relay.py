@@ -132,7 +132,8 @@ async def _end(stop: asyncio.Event, running: Sequence[asyncio.Task[None]], grace
     """After a signal, let deliveries that are under way finish, within the grace period."""
     await stop.wait()
     with suppress(TimeoutError):
-        await asyncio.wait_for(asyncio.shield(asyncio.wait(running)), grace)
+        async with asyncio.timeout(grace):
+            await asyncio.wait(running)
     for each in running:
         each.cancel()
 

@@ -19,7 +19,7 @@ LONGEST_HEAD = 65536
 
 
 class Server(uvicorn.Server):
-    """uvicorn, which ends when it is told to: its own handlers of signals would end the process with the signal."""
+    """uvicorn without its own handlers of signals, which would end the process with the signal."""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

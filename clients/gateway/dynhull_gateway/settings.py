@@ -1,4 +1,4 @@
-"""What `dynhull gateway` is told on its command line."""
+"""The settings of `dynhull gateway`, from its command line."""
 
 from dataclasses import dataclass
 
