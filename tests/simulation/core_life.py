@@ -20,7 +20,7 @@ from dynhull_server.engine.threads import Clock
 from dynhull_server.engine.watch_fence import Sent, following
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
-from dynhull_server.state.core import LOOK_AGAIN, Core
+from dynhull_server.state.core import Core
 from dynhull_server.state.errors import (
     HullNotFoundError,
     HullReplacedError,
@@ -70,6 +70,7 @@ from dynhull_server.state.fences.requests import (
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import NO_TIME, Center, HullSettings
+from dynhull_server.state.schedule import LOOK_AGAIN
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 

@@ -1,0 +1,86 @@
+"""The hulls and fences that are committed, and the numbers and places of new ones."""
+
+from typing import TYPE_CHECKING
+
+from sortedcontainers import SortedDict
+
+from .errors import FenceNotFoundError, HullNotFoundError, LimitExceededError
+from .fences.fence import Fence
+from .hull import Hull
+from .limits import Limits
+from .records import NO_TIME
+from .trip import Place
+
+if TYPE_CHECKING:
+    from .fences.config import FenceConfig
+
+
+class Registry:
+    """What there is by name.
+
+    Args:
+        limits: the limits on the state.
+        next_number: a number greater than that of any hull or fence ever created.
+
+    Attributes:
+        limits: the limits on the state.
+        hulls: the hulls by name.
+        fences: the fences by name.
+    """
+
+    def __init__(self, limits: Limits, next_number: int) -> None:
+        self.limits = limits
+        self.hulls: SortedDict[str, Hull] = SortedDict()
+        self.fences: SortedDict[str, Fence] = SortedDict()
+        self._next_number = next_number
+        self._creating = self._fencing = 0
+
+    def get(self, name: str) -> Hull:
+        """The hull of that name, or raise HullNotFoundError."""
+        hull: Hull | None = self.hulls.get(name)
+        if hull is None:
+            raise HullNotFoundError(name)
+        return hull
+
+    def fence(self, name: str) -> Fence:
+        """The fence of that name, or raise FenceNotFoundError."""
+        fence: Fence | None = self.fences.get(name)
+        if fence is None:
+            raise FenceNotFoundError(name)
+        return fence
+
+    @property
+    def latest_time(self) -> int | None:
+        """The latest time of the server's clock that a hull or fence has recorded, None for none. O(both)."""
+        clocks = [hull.counts.clock for hull in self.hulls.values() if hull.state.contents.follows_server]
+        clocks += [fence.time for fence in self.fences.values() if fence.time != NO_TIME]
+        return max((clock for clock in clocks if clock is not None), default=None)
+
+    def compared(self, config: "FenceConfig") -> list[str]:
+        """The names of the hulls whose keys a fence compares."""
+        if config.kind != "prefix":
+            return [config.subjects] if config.kind == "hull" else []
+        names = [name for name in self.hulls.irange(config.subjects) if name.startswith(config.subjects)]
+        return [name for name in names if self.hulls[name].row.settings.identity != "multiset"]
+
+    def reserve_hull(self) -> Place:
+        """A place for a hull that may be created. Give it back once that is decided."""
+        most = self.limits.max_hulls
+        full = len(self.hulls) + self._creating >= most
+        self._creating += 1
+        return Place(self._new_number(), LimitExceededError("max_hulls", most) if full else None, self.limits)
+
+    def reserve_fence(self) -> int | None:
+        """A number for a fence that may be created, None if it is too many. Give it back once that is decided."""
+        self._fencing += 1
+        return self._new_number() if len(self.fences) + self._fencing <= self.limits.fences.max_fences else None
+
+    def give_back(self, hulls: int, fences: int = 0) -> None:
+        """Give back places that were reserved."""
+        self._creating -= hulls
+        self._fencing -= fences
+
+    def _new_number(self) -> int:
+        number = self._next_number
+        self._next_number += 1
+        return number

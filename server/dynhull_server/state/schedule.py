@@ -1,0 +1,66 @@
+"""When hulls and fences have something to do because time passes."""
+
+from collections.abc import Iterator
+from heapq import heappop, heappush
+
+from .fences.fence import Fence
+from .fences.requests import PREFIX
+from .hull import Hull
+from .registry import Registry
+
+# Microseconds before those who have been inside of a fence for long are looked at again.
+LOOK_AGAIN = 1_000_000
+
+
+class Schedule:
+    """The times at which points leave hulls, and at which subjects have been inside of fences for long enough.
+
+    Args:
+        registry: the hulls and fences.
+    """
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+        # A heap of times, each with the number and name of the hull, or the number of the fence and the name of its
+        # queue. An entry is outdated if its time is not that of the plan of the hull or fence.
+        self._due: list[tuple[int, int, str]] = []
+
+    def plan(self, hull: Hull) -> None:
+        """Plan when points of a hull leave next. No trip of the hull is in progress."""
+        due = hull.state.contents.due
+        if due is not None and (hull.due is None or due < hull.due):
+            hull.due = due
+            heappush(self._due, (due, hull.row.number, hull.name))
+
+    def plan_fence(self, fence: Fence) -> None:
+        """Plan when the next subject has been inside of a fence for long enough."""
+        due = fence.next_due
+        if due is not None and (fence.due is None or due < fence.due):
+            self._push(fence, due)
+
+    def look_again(self, fence: Fence, time: int) -> None:
+        """Plan to look at a fence again a little after a time."""
+        self._push(fence, time + LOOK_AGAIN)
+
+    def _push(self, fence: Fence, due: int) -> None:
+        fence.due = due
+        heappush(self._due, (due, fence.number, PREFIX + fence.name))
+
+    def has(self, time: int) -> bool:
+        """Whether anything is planned for a time or before it."""
+        return bool(self._due) and self._due[0][0] <= time
+
+    def take(self, time: int) -> Iterator[Hull | Fence]:
+        """The hulls and fences with a plan for this time or before it, each without that plan."""
+        while self.has(time):
+            due, number, name = heappop(self._due)
+            if name.startswith(PREFIX):
+                fence = self._registry.fences.get(name.removeprefix(PREFIX))
+                if fence is not None and fence.number == number and fence.due == due:
+                    fence.due = None
+                    yield fence
+                continue
+            hull = self._registry.hulls.get(name)
+            if hull is not None and hull.row.number == number and hull.due == due:
+                hull.due = None
+                yield hull
