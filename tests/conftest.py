@@ -1,6 +1,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import server_process as servers
@@ -50,6 +51,13 @@ def address() -> Iterator[str]:
 def name(request: pytest.FixtureRequest) -> str:
     """A hull name of the test's own. Names that begin with it have a worker in common."""
     return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:] + ("/h" if servers.shape == "workers" else "")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path) -> Iterator[None]:
+    """No docstrings of tests: to look for examples there, every worker would import every file of support twice."""
+    found = yield
+    return [each for each in found if isinstance(each, pytest.Module)]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

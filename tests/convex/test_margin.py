@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn.svm import SVC
 
 from dynhull import DynamicHull
 from dynhull.margin import max_margin
@@ -10,6 +9,8 @@ from dynhull.margin import max_margin
 
 def hard_margin(a, b):
     """Width of the margin, unit normal from a to b, offset."""
+    from sklearn.svm import SVC  # two seconds, which every worker of the tests would spend to find out their names
+
     machine = SVC(kernel="linear", C=1e10, tol=1e-8).fit(np.concatenate([a, b]), [0] * len(a) + [1] * len(b))
     weights = machine.coef_[0]
     size = np.linalg.norm(weights)
