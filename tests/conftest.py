@@ -1,7 +1,6 @@
 import re
 from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Generator, Iterator
 
 import pytest
 import server_process as servers
@@ -54,7 +53,7 @@ def name(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_collect_file(file_path: Path) -> Iterator[None]:
+def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
     """No docstrings of tests: to look for examples there, every worker would import every file of support twice."""
     found = yield
     return [each for each in found if isinstance(each, pytest.Module)]
