@@ -1,11 +1,15 @@
 """Background work on fences: who is inside is stored now and then, and old events are dropped."""
 
+from collections.abc import Iterator
 from functools import partial
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from ..state.errors import FenceNotFoundError
 from ..state.fences.fence import Fence
+from ..state.fences.tallies import Column
 from ..state.limits import FenceLimits
 from ..storage.port import Storage
 from .fences import LiveFence
@@ -62,6 +66,7 @@ class FenceKeeping:
         """Look at the fences that have changed since the last round, and at those whose oldest events are too old."""
         fences = self._engine.fences
         stirred, fences.stirred = fences.stirred, {}
+        stirred |= dict.fromkeys(self._crossed())
         now = self._engine.time()
         while self._due and self._due[0][0] <= now:
             due, number = heappop(self._due)
@@ -85,8 +90,19 @@ class FenceKeeping:
         if failure is not None:
             raise failure
 
+    def _crossed(self) -> Iterator[Fence]:
+        """The fences that subjects have crossed, but those with which there is nothing to do: nearly all, as a rule."""
+        tallies, limits = self._engine.core.tallies, self._limits
+        columns = tallies.columns
+        stirred = tallies.stirred()
+        if not limits.max_fence_event_age:
+            many = columns[Column.LAST] - columns[Column.FIRST] >= limits.max_fence_events
+            many |= columns[Column.UNSAVED] >= np.maximum(columns[Column.INSIDE], LEAST_EVENTS)
+            stirred &= many | (columns[Column.LIMITED] != 0)
+        return (tallies.owners[place] for place in np.flatnonzero(stirred).tolist())
+
     def _rests(self, fence: Fence) -> bool:
-        """Whether there is nothing to do for a fence. At full load this is asked for every fence every second."""
+        """Whether there is nothing to do for a fence."""
         kept = fence.last - fence.first + 1
         if kept > self._most(fence) or fence.unsaved >= max(LEAST_EVENTS, fence.inside):
             return False

@@ -108,11 +108,13 @@ class LiveFence:
         while not self.fence.ended and self.fence.last < sequence:
             if self._moved is None:
                 self._moved = asyncio.Event()
+                self._engine.fences.watched[self.fence.number] = self
             await self._moved.wait()
 
     def moved(self) -> None:
         """Wake the waiting callers."""
         if self._moved is not None:
+            del self._engine.fences.watched[self.fence.number]
             self._moved.set()
             self._moved = None
 
@@ -136,7 +138,9 @@ class Fences:
 
     Attributes:
         events: the number of committed events by type, since the start.
-        stirred: the fences with new events or settings, until their keeping has seen them.
+        stirred: the fences that have changed otherwise than by crossings of subjects, until their keeping has seen
+            them.
+        watched: those whose next event somebody waits for, by number.
     """
 
     def __init__(self, engine: "Engine", storage: Storage) -> None:
@@ -145,6 +149,7 @@ class Fences:
         self._live: dict[Fence, LiveFence] = {}
         self.events: Counter[EventType] = Counter()
         self.stirred: dict[Fence, None] = {}
+        self.watched: dict[int, LiveFence] = {}
 
     def __len__(self) -> int:
         return len(self._engine.core.fences)
@@ -193,11 +198,19 @@ class Fences:
         await self._engine.ask(DeleteFence(Waiter(), name, self._engine.time(), rows=fence.inside))
 
     def stir(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
-        """Count the events of fences, and wake those who watch these."""
+        """Count new events, and wake those who watch their fences.
+
+        Args:
+            fences: those that have changed otherwise than by crossings of subjects.
+            events: the events; None for none.
+        """
         if events is not None:
             for kind, count in enumerate(np.bincount(events.types).tolist()):
                 if count:
                     self.events[EventType(kind)] += count
+            if self.watched:
+                for number in self.watched.keys() & set(events.fences.tolist()):
+                    self.watched[number].moved()
         self.stirred.update(dict.fromkeys(fences))
         for fence in fences:
             live = self._live.get(fence)

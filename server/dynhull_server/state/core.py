@@ -58,7 +58,6 @@ from .fences.components import SPANNING
 from .fences.fence import Fence
 from .fences.line import Line
 from .fences.line_trip import MOST_DUE, Ground, LineTrip
-from .fences.recent import RecentEvents
 from .fences.requests import (
     CreateFence,
     DeleteFence,
@@ -70,6 +69,7 @@ from .fences.requests import (
     ReadFence,
     ReplaceFence,
 )
+from .fences.tallies import Tallies
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
@@ -122,7 +122,6 @@ class Core:
         self._registry = Registry(limits, next_number)
         self._queues = Queues(self._registry)
         self._schedule = Schedule(self._registry)
-        self._recent = RecentEvents(limits.fences.fence_history_bytes)
         self._trips = 0
         self._stopping = False
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
@@ -181,6 +180,11 @@ class Core:
     def fences(self) -> "SortedDict[str, Fence]":
         """The fences by name."""
         return self._registry.fences
+
+    @property
+    def tallies(self) -> Tallies:
+        """What is counted of the fences."""
+        return self._registry.tallies
 
     def fence(self, name: str) -> Fence:
         """The fence of that name, or raise FenceNotFoundError."""
@@ -597,40 +601,36 @@ class Core:
             if name not in self._registry.hulls
         }
         places = {name: self._registry.reserve_hull() for name in sorted(births)}
-        ground = Ground(lines, places, fences, numbers, self._registry.limits.fences)
+        self._registry.tallies.sort()
+        ground = Ground(lines, places, fences, numbers, self._registry.tallies, self._registry.limits.fences)
         legs = [Leg(name, self._registry.hulls.get(name), keeps=self._keeps) for name in names]
         return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)
 
     def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
         """Publish what a trip has committed of fences, and join or part the queues."""
-        events = trip.events
-        fences = {leg.fence.number: leg.fence for leg in trip.fence_legs.values()}
-        stirred = []
-        for fence, told in trip.log.fences():
-            fences[fence.number] = fence
-            fence.told(told)
-            stirred.append(fence)
+        events, stirred = trip.events, []
+        if trip.log.told is not None:
+            self._registry.tallies.take(trip.log.told)
         moved = any(leg.area is not leg.fence.area for leg in trip.fence_legs.values())
         trip.dismiss()
         for leg in trip.fence_legs.values():
             fence = leg.fence
             if leg.created:
-                self._registry.fences[fence.name] = fence
+                self._registry.add_fence(fence)
                 for subjects in fence.subjects.values():
                     subjects.fences[fence.number] = fence
             changed = leg.row is not fence.row
             leg.publish()
             if leg.deleted:
-                del self._registry.fences[fence.name]
                 self._queues.free_prefix(fence.name)
                 for subjects in fence.subjects.values():
                     subjects.dropped(fence)
             if leg.events or changed:
                 stirred.append(fence)
         if events is not None:
-            of_runs = [fences[number] for number in events.fences.tolist()]
-            self._recent.add(events, of_runs, len(self._registry.fences))
-        if stirred:
+            self._registry.recent.add(events, len(self._registry.fences))
+        self._registry.remove_fences([leg.fence for leg in trip.fence_legs.values() if leg.deleted])
+        if stirred or events is not None:
             effects.append(Stir(stirred, events))
         if trip.structural:
             self._queues.rejoin(trip, moved=moved)

@@ -348,11 +348,11 @@ class Reply:
 
 @dataclass(slots=True)
 class Stir:
-    """Wake the watchers of these fences, which have new events or settings.
+    """Wake the watchers of fences that have new events or settings.
 
     Attributes:
-        fences: the fences.
-        events: their new events; None for none.
+        fences: those of them that have changed otherwise than by crossings of subjects.
+        events: all new events; None for none.
     """
 
     fences: "list[Fence]"

@@ -1,11 +1,15 @@
 """The hulls and fences that are committed, and the numbers and places of new ones."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from sortedcontainers import SortedDict
 
 from .errors import FenceNotFoundError, HullNotFoundError, LimitExceededError
 from .fences.fence import Fence
+from .fences.recent import RecentEvents
+from .fences.tallies import Tallies
 from .hull import Hull
 from .limits import Limits
 from .records import NO_TIME
@@ -26,12 +30,16 @@ class Registry:
         limits: the limits on the state.
         hulls: the hulls by name.
         fences: the fences by name.
+        tallies: what is counted of these.
+        recent: their recent events.
     """
 
     def __init__(self, limits: Limits, next_number: int) -> None:
         self.limits = limits
         self.hulls: SortedDict[str, Hull] = SortedDict()
         self.fences: SortedDict[str, Fence] = SortedDict()
+        self.tallies = Tallies()
+        self.recent = RecentEvents(limits.fences.fence_history_bytes)
         self._next_number = next_number
         self._creating = self._fencing = 0
 
@@ -55,6 +63,19 @@ class Registry:
         clocks = [hull.counts.clock for hull in self.hulls.values() if hull.state.contents.follows_server]
         clocks += [fence.time for fence in self.fences.values() if fence.time != NO_TIME]
         return max((clock for clock in clocks if clock is not None), default=None)
+
+    def add_fence(self, fence: Fence) -> None:
+        """Add a fence that is committed."""
+        fence.join(self.tallies, self.recent)
+        self.fences[fence.name] = fence
+
+    def remove_fences(self, fences: Sequence[Fence]) -> None:
+        """Remove fences that are deleted, once their last events are among the recent ones."""
+        if fences:
+            left = self.recent.of(np.array([fence.number for fence in fences]))
+            for fence in fences:
+                fence.part(left)
+                del self.fences[fence.name]
 
     def compared(self, config: "FenceConfig") -> list[str]:
         """The names of the hulls whose keys a fence compares."""

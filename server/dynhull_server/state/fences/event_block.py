@@ -6,7 +6,7 @@ No event needs a Python object before somebody reads it.
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -23,9 +23,10 @@ Bytes = npt.NDArray[np.uint8]
 # The keys of a run: none, strings, or integers of 8 bytes, little-endian.
 NO_KEY, STRING_KEY, INTEGER_KEY = 0, 1, 2
 INTEGER_BYTES = 8
+MANY = 2**62
 TYPES = {kind.value: kind for kind in EventType}
 # Bytes that an event and a run take in memory, about, without keys.
-EVENT_BYTES, RUN_BYTES = 64, 200
+EVENT_BYTES, RUN_BYTES = 67, 57
 
 
 @dataclass(slots=True, eq=False)
@@ -36,7 +37,7 @@ class EventBlock:
         fences: (m,) the numbers of the fences.
         firsts: (m,) the sequence of the first event of each run.
         counts: (m,) the number of its events.
-        hulls: the m names of the hulls of the subjects.
+        hulls: (m,) the places of the names of the hulls of the subjects in `names`.
         kinds: (m,) whether its events have keys, and which.
         subject_revisions, area_revisions, times: (m,) as in `FenceEvent`.
         types, causes: (n,) as in `FenceEvent`.
@@ -45,6 +46,7 @@ class EventBlock:
         points, previous: (n, 2) positions, and those before; NaN where there is none.
         distances: (n,) distances, NaN where there is none.
         event_times, first_times: (n,) as in `FenceEvent`.
+        names: the names of hulls.
         inside: by row, the subjects that were inside.
         origins: by row, where subjects come from that have changed hulls.
     """
@@ -52,7 +54,7 @@ class EventBlock:
     fences: Integers
     firsts: Integers
     counts: Integers
-    hulls: list[str]
+    hulls: Integers
     kinds: Bytes
     subject_revisions: Integers
     area_revisions: Integers
@@ -66,6 +68,7 @@ class EventBlock:
     distances: npt.NDArray[np.float64]
     event_times: Times
     first_times: Times
+    names: tuple[str, ...]
     inside: dict[int, tuple[Members, ...]] = field(default_factory=dict)
     origins: dict[int, Origin] = field(default_factory=dict)
     _ends: Integers | None = field(default=None, init=False)
@@ -88,25 +91,26 @@ class EventBlock:
         members = sum(_bytes_of(each.keys) for found in self.inside.values() for each in found)
         return EVENT_BYTES * len(self) + RUN_BYTES * len(self.fences) + len(self.keys) + members
 
-    def events(self, run: int) -> list[FenceEvent]:
-        """The events of a run, O(their number), and O(n) the first time."""
+    def events(self, run: int, skipped: int = 0, most: int = MANY) -> list[FenceEvent]:
+        """The events of a run after some of them, at most that many: O(their number), and O(n) the first time."""
         end = int(self.ends[run])
-        count, first = int(self.counts[run]), int(self.firsts[run])
-        rows = slice(end - count, end)
+        start, first = end - int(self.counts[run]) + skipped, int(self.firsts[run]) + skipped
+        end = min(end, start + most)
+        rows = slice(start, end)
         columns = zip(
-            range(first, first + count),
+            range(first, first + end - start),
             [TYPES[kind] for kind in self.types[rows].tolist()],
             self.causes[rows].tolist(),
-            self._keys(run, end - count, end),
+            self._keys(run, start, end),
             self.points[rows].tolist(),
             self.previous[rows].tolist(),
             self.distances[rows].tolist(),
             self.event_times[rows].tolist(),
             self.first_times[rows].tolist(),
-            range(end - count, end),
+            range(start, end),
             strict=True,
         )
-        hull, time = self.hulls[run], int(self.times[run])
+        hull, time = self.names[self.hulls[run]], int(self.times[run])
         revision, area_revision = int(self.subject_revisions[run]), int(self.area_revisions[run])
         return [
             FenceEvent(
@@ -172,7 +176,6 @@ class EventBlock:
             self,
             **{name: getattr(self, name)[wanted] for name in OF_RUNS},
             **{name: getattr(self, name)[rows] for name in OF_EVENTS},
-            hulls=[hull for hull, each in zip(self.hulls, wanted.tolist(), strict=True) if each],
             keys=keys.tobytes(),
             inside={new: self.inside[row] for new, row in enumerate(numbers) if row in self.inside},
             origins={new: self.origins[row] for new, row in enumerate(numbers) if row in self.origins},
@@ -198,7 +201,7 @@ class EventBlock:
         return self._places
 
 
-OF_RUNS = ("fences", "firsts", "counts", "kinds", "subject_revisions", "area_revisions", "times")
+OF_RUNS = ("fences", "firsts", "counts", "hulls", "kinds", "subject_revisions", "area_revisions", "times")
 OF_EVENTS = ("types", "causes", "lengths", "points", "previous", "distances", "event_times", "first_times")
 
 
@@ -207,10 +210,10 @@ def joined(blocks: Sequence[EventBlock]) -> EventBlock:
     if len(blocks) == 1:
         return blocks[0]
     starts = np.cumsum([0, *map(len, blocks)]).tolist()
+    columns = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in (*OF_RUNS, *OF_EVENTS)}
     return replace(
         blocks[0],
-        **{name: np.concatenate([getattr(block, name) for block in blocks]) for name in (*OF_RUNS, *OF_EVENTS)},
-        hulls=[hull for block in blocks for hull in block.hulls],
+        **(columns | _hulls(blocks)),
         keys=b"".join(block.keys for block in blocks),
         inside={
             start + row: each
@@ -223,6 +226,16 @@ def joined(blocks: Sequence[EventBlock]) -> EventBlock:
             for row, each in block.origins.items()
         },
     )
+
+
+def _hulls(blocks: Sequence[EventBlock]) -> dict[str, Any]:
+    """The hulls of blocks, among their names together."""
+    names = tuple(dict.fromkeys(name for block in blocks for name in block.names))
+    if all(block.names == names for block in blocks):
+        return {}
+    place = {name: row for row, name in enumerate(names)}
+    hulls = [np.array([place[name] for name in block.names], np.int64)[block.hulls] for block in blocks]
+    return {"hulls": np.concatenate(hulls), "names": names}
 
 
 def block_of(events: Mapping[int, Iterable[FenceEvent]]) -> EventBlock:
@@ -245,11 +258,12 @@ def block_of(events: Mapping[int, Iterable[FenceEvent]]) -> EventBlock:
     nowhere = np.nan, np.nan
     columns = zip(*runs, strict=True) if runs else ((),) * 7
     numbers, firsts, hulls, kinds, subject_revisions, area_revisions, times = columns
+    names = tuple(dict.fromkeys(hulls))
     return EventBlock(
         np.array(numbers, np.int64),
         np.array(firsts, np.int64),
         np.array(counts, np.int64),
-        list(hulls),
+        np.array([names.index(hull) for hull in hulls], np.int64),
         np.array(kinds, np.uint8),
         np.array(subject_revisions, np.int64),
         np.array(area_revisions, np.int64),
@@ -263,6 +277,7 @@ def block_of(events: Mapping[int, Iterable[FenceEvent]]) -> EventBlock:
         np.array([np.nan if event.distance is None else event.distance for event in ordered], np.float64),
         np.array([event.event_time for event in ordered], np.int64),
         np.array([event.first_time for event in ordered], np.int64),
+        names,
         {row: event.inside for row, event in enumerate(ordered) if event.inside},
         {row: event.origin for row, event in enumerate(ordered) if event.origin is not None},
     )

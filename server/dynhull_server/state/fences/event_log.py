@@ -1,8 +1,7 @@
 """The events that a trip makes of crossings, without an object for each."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,9 +9,9 @@ from dynhull import Crossings
 
 from ..records import NO_TIME, Times
 from .event_block import Bytes, EventBlock, Integers, joined, key_columns
-from .fence import Fence
 from .records import Cause, EventType, FenceEvent
 from .subjects import Subjects
+from .tallies import Column, Tallies
 
 # A cause as the index knows it, and what it is here.
 Swap = tuple[Cause, Cause]
@@ -21,23 +20,33 @@ TYPES = np.array([EventType.CROSS, EventType.ENTER, EventType.EXIT], np.uint8)
 
 
 class Told(NamedTuple):
-    """What a trip has said of a fence so far.
+    """What a trip has said so far of k fences, by ascending numbers.
 
     Attributes:
-        last: the sequence of the last event.
-        time: its time.
-        made: the number of events.
-        change: by how many more subjects are inside.
+        fences: (k,) their numbers.
+        places: (k,) where they are counted.
+        lasts: (k,) the sequence of the last event of each.
+        times: (k,) its time.
+        made: (k,) the number of events.
+        changes: (k,) by how many more subjects are inside.
     """
 
-    last: int
-    time: int
-    made: int
-    change: int
+    fences: Integers
+    places: Integers
+    lasts: Integers
+    times: Integers
+    made: Integers
+    changes: Integers
+
+    def of(self, number: int) -> tuple[int, int] | None:
+        """The last sequence of a fence, and the time of that event; None if nothing was said."""
+        row = int(self.fences.searchsorted(number))
+        if row == len(self.fences) or self.fences[row] != number:
+            return None
+        return int(self.lasts[row]), int(self.times[row])
 
 
-@dataclass(frozen=True, slots=True)
-class _Crossed:
+class _Crossed(NamedTuple):
     """Crossings of one revision, whose events have no numbers yet.
 
     Attributes:
@@ -64,15 +73,18 @@ class EventLog:
 
     They get their numbers together, once for a trip as a rule.
 
+    Args:
+        tallies: what is counted of the fences, as of the last commit.
+
     Attributes:
-        told: what has been said of each fence, by its number, as of the last `settle`.
+        told: what has been said, as of the last `settle`; None for nothing.
     """
 
-    def __init__(self) -> None:
-        self.told: dict[int, Told] = {}
+    def __init__(self, tallies: Tallies) -> None:
+        self.told: Told | None = None
+        self._tallies = tallies
         self._waiting: list[_Crossed] = []
         self._blocks: list[EventBlock] = []
-        self._fences: dict[int, Fence] = {}
 
     def add(
         self,
@@ -83,14 +95,16 @@ class EventLog:
         now: int,
     ) -> None:
         """Make an event of each crossing; `swap` is a cause, and the one that it stands for."""
+        if self._waiting and now < self._waiting[-1].now:  # of one fence the time of events never goes back
+            self.settle()
         revision, times = subjects.hull.state.counts.revision, subjects.times(crossings.keys)
         self._waiting.append(_Crossed(subjects, crossings, revision, area_revisions, times, swap, now))
 
     def settle(self) -> None:
-        """Give the events their numbers. O(events)."""
+        """Give the events their numbers. O(n log n) for n events."""
         if self._waiting:
             waiting, self._waiting = self._waiting, []
-            self._blocks += map(self._numbered, waiting)
+            self._blocks.append(self._numbered(waiting))
 
     def block(self) -> EventBlock | None:
         """All events; None if there are none. To be called after `settle`."""
@@ -98,62 +112,125 @@ class EventLog:
             self._blocks = [joined(self._blocks)]
         return self._blocks[0] if self._blocks else None
 
-    def fences(self) -> Sequence[tuple[Fence, Told]]:
-        """The fences with events."""
-        return [(self._fences[number], told) for number, told in self.told.items()]
+    def last(self, number: int) -> tuple[int, int] | None:
+        """The last sequence of a fence, and the time of that event; None if it has no events of crossings."""
+        self.settle()
+        return None if self.told is None else self.told.of(number)
 
-    def events(self, fence: Fence) -> list[FenceEvent]:
+    def events(self, number: int) -> list[FenceEvent]:
         """The events of one fence so far."""
         self.settle()
         found: list[FenceEvent] = []
-        for block in self._blocks if fence.number in self.told else ():
-            for run in np.flatnonzero(block.fences == fence.number).tolist():
+        for block in self._blocks:
+            for run in np.flatnonzero(block.fences == number).tolist():
                 found += block.events(run)
         return found
 
-    def _numbered(self, crossed: _Crossed) -> EventBlock:
-        crossings, told = crossed.crossings, self.told
-        changes, numbers = crossings.changes, crossings.fences
-        starts = first_rows(numbers)
-        counts = np.diff(starts, append=len(numbers))
-        of_runs = numbers[starts]
-        firsts, times, areas = [], [], []
-        moved = np.add.reduceat(changes, starts, dtype=np.int64)
-        for number, count, change in zip(of_runs.tolist(), counts.tolist(), moved.tolist(), strict=True):
-            before = told.get(number)
-            if before is None:
-                fence = self._fences[number] = crossed.subjects.fences[number]
-                before = Told(fence.last, fence.time, 0, 0)
-            else:
-                fence = self._fences[number]
-            time = max(crossed.now, before.time)
-            told[number] = Told(before.last + count, time, before.made + count, before.change + change)
-            firsts.append(before.last + 1)
-            times.append(time)
-            if crossed.area_revisions:
-                areas.append(0 if fence.area is None else crossed.area_revisions[fence.area.name])
-        kind, lengths, keys = key_columns(crossings.keys)
-        event_times = crossed.event_times
-        none = np.full(len(numbers), NO_TIME)
-        return EventBlock(
-            of_runs,
-            np.array(firsts, np.int64),
-            counts,
-            [crossed.subjects.hull.name] * len(starts),
-            np.full(len(starts), kind, np.uint8),
-            np.full(len(starts), crossed.revision),
-            np.array(areas, np.int64) if areas else np.zeros(len(starts), np.int64),
-            np.array(times, np.int64),
-            TYPES[changes],
-            _caused(crossings.causes, crossed.swap),
-            lengths,
-            keys,
-            crossings.points,
-            crossings.previous,
-            np.where(np.isnan(crossings.points[:, 0]), np.nan, crossings.distances),
-            none if event_times is None else event_times,
-            none,
+    def _numbered(self, waiting: list[_Crossed]) -> EventBlock:
+        counts = [len(each.crossings) for each in waiting]
+        n = sum(counts)
+        fences = _column(waiting, "fences")
+        changes = _column(waiting, "changes")
+        points, distances = _column(waiting, "points"), _column(waiting, "distances")
+        # Of each fence the events follow each other.
+        order = np.argsort(fences, kind="stable")
+        ascending = fences[order]
+        groups = first_rows(ascending)
+        made = np.diff(groups, append=n)
+        numbers = ascending[groups]
+        before = self._before(numbers)
+        sequences = np.empty(n, np.int64)
+        sequences[order] = np.arange(1, n + 1) + (before.lasts - groups).repeat(made)
+        times = np.empty(n, np.int64)
+        times[order] = before.times.repeat(made)
+        np.maximum(times, np.repeat([each.now for each in waiting], counts), out=times)
+        ends = np.cumsum(counts)
+        new = np.append(True, fences[1:] != fences[:-1])
+        new[ends[:-1]] = True
+        runs = np.flatnonzero(new)
+        moments = np.searchsorted(ends, runs, "right")  # of each run, which crossings it is part of
+        self._tell(
+            Told(
+                numbers,
+                before.places,
+                before.lasts + made,
+                times[order[groups + made - 1]],
+                before.made + made,
+                before.changes + np.add.reduceat(changes[order], groups, dtype=np.int64),
+            )
         )
+        names = tuple(dict.fromkeys(each.subjects.hull.name for each in waiting))
+        keys = [key_columns(each.crossings.keys) for each in waiting]
+        none = np.full(n, NO_TIME)
+        timed = any(each.event_times is not None for each in waiting)
+        return EventBlock(
+            fences[runs],
+            sequences[runs],
+            np.diff(runs, append=n),
+            np.array([names.index(each.subjects.hull.name) for each in waiting])[moments],
+            np.array([kind for kind, _, _ in keys], np.uint8)[moments],
+            np.array([each.revision for each in waiting])[moments],
+            _area_revisions(waiting, fences[runs], moments),
+            times[runs],
+            TYPES[changes],
+            _joined([_caused(each.crossings.causes, each.swap) for each in waiting]),
+            _joined([lengths for _, lengths, _ in keys]),
+            b"".join(data for _, _, data in keys),
+            points,
+            _column(waiting, "previous"),
+            np.where(np.isnan(points[:, 0]), np.nan, distances),
+            _joined([none[: len(each.crossings)] if each.event_times is None else each.event_times for each in waiting])
+            if timed
+            else none,
+            none,
+            names,
+        )
+
+    def _before(self, numbers: Integers) -> Told:
+        """What is known of fences: as of the last commit, and what the trip has said since."""
+        places = self._tallies.places(numbers)
+        columns = self._tallies.columns
+        nothing = np.zeros(len(numbers), np.int64)
+        before = Told(numbers, places, columns[Column.LAST, places], columns[Column.TIME, places], nothing, nothing)
+        told = self.told
+        if told is None:
+            return before
+        rows = np.minimum(told.fences.searchsorted(numbers), len(told.fences) - 1)
+        known = told.fences[rows] == numbers
+        return Told(
+            numbers,
+            places,
+            *(np.where(known, new[rows], old) for new, old in zip(told[2:], before[2:], strict=True)),
+        )
+
+    def _tell(self, new: Told) -> None:
+        """Add what was said of some fences; nothing else is said of those before."""
+        if self.told is not None:
+            old = ~np.isin(self.told.fences, new.fences)
+            both = [np.concatenate([column[old], more]) for column, more in zip(self.told, new, strict=True)]
+            order = np.argsort(both[0], kind="stable")
+            new = Told(*(column[order] for column in both))
+        self.told = new
+
+
+def _column(waiting: list[_Crossed], name: str) -> Any:
+    return _joined([getattr(each.crossings, name) for each in waiting])
+
+
+def _joined(columns: list[Any]) -> Any:
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+
+def _area_revisions(waiting: list[_Crossed], fences: Integers, moments: Integers) -> Integers:
+    """The revision of the area of each run, 0 where that is no hull."""
+    if not any(each.area_revisions for each in waiting):
+        return np.zeros(len(fences), np.int64)
+    found = []
+    for number, moment in zip(fences.tolist(), moments.tolist(), strict=True):
+        each = waiting[moment]
+        area = each.subjects.fences[number].area
+        found.append(0 if area is None else each.area_revisions.get(area.name, 0))
+    return np.array(found, np.int64)
 
 
 def first_rows(numbers: Integers) -> Integers:

@@ -8,14 +8,29 @@ from dynhull.keys import key_list
 from ..records import NO_TIME, Keys
 from .delays import Delays
 from .dwelling import Dwelling, dwelling_after
-from .recent import RecentRuns
+from .recent import RecentEvents
 from .records import Consumer, FenceEvent, FenceRow, KeptFence
+from .tallies import Column, Tallies
 
 if TYPE_CHECKING:
     from ..hull import Hull
-    from .event_log import Told
     from .pair import Pair
     from .subjects import Subjects
+
+
+class Tally:
+    """An integer of a fence in a column of its tallies."""
+
+    __slots__ = ("_column",)
+
+    def __init__(self, column: Column) -> None:
+        self._column = column
+
+    def __get__(self, fence: "Fence", _: type) -> int:
+        return int(fence.tallies.columns[self._column, fence.place])
+
+    def __set__(self, fence: "Fence", value: int) -> None:
+        fence.tallies.columns[self._column, fence.place] = value
 
 
 class Fence:
@@ -40,25 +55,46 @@ class Fence:
         due: when it is planned to look at those who wait, None if it is not.
         unsaved: the number of events since who is inside was last stored.
         ended: whether it has been deleted.
-        recent: its recent events.
+        tallies, place: where the integers above are: with those of other fences, once it has been created.
     """
 
+    first, last, time = Tally(Column.FIRST), Tally(Column.LAST), Tally(Column.TIME)
+    inside, unsaved = Tally(Column.INSIDE), Tally(Column.UNSAVED)
+
     def __init__(self, row: FenceRow) -> None:
+        self.tallies = Tallies(room=1)
+        self.place = self.tallies.add(row.number)
+        self._recent: RecentEvents | None = None
         self.row = row
         self.delays = Delays(row.config) if row.config.delays else None
         self.area: Hull | None = None
         self.subjects: dict[str, Subjects] = {}
         self.pair: Pair | None = None
-        self.last = 0
         self.first = 1
         self.time = NO_TIME
-        self.inside = 0
         self.consumers: dict[str, Consumer] = {}
         self.dwelling: Dwelling | None = None
         self.due: int | None = None
-        self.unsaved = 0
         self.ended = False
-        self.recent = RecentRuns()
+
+    def join(self, tallies: Tallies, recent: RecentEvents) -> None:
+        """Keep its integers, and read its recent events, where those of others are."""
+        self._move(tallies)
+        tallies.owners[self.place] = self
+        self._recent = recent
+
+    def part(self, recent: RecentEvents) -> None:
+        """Keep its integers for itself, after its deletion, and what is left of its events."""
+        shared, place = self.tallies, self.place
+        self._move(Tallies(room=1))
+        shared.remove(place)
+        self._recent = recent
+
+    def _move(self, tallies: Tallies) -> None:
+        columns = self.tallies.columns[:, self.place]
+        self.tallies, self.place = tallies, tallies.add(self.number)
+        tallies.columns[:, self.place] = columns
+        tallies.ruled += int(columns[Column.RULES])
 
     @property
     def name(self) -> str:
@@ -90,11 +126,6 @@ class Fence:
         """The number of subjects that wait for a time."""
         return (0 if self.dwelling is None else len(self.dwelling)) + (0 if self.delays is None else len(self.delays))
 
-    @property
-    def follows_events(self) -> bool:
-        """Whether it has rules that look at each of its events."""
-        return self.dwelling is not None or self.delays is not None
-
     def keys_inside(self, subjects: "Subjects") -> Keys:
         """The keys of a hull that are inside, ascending, as its events say."""
         keys = subjects.index.inside(self.number)
@@ -123,13 +154,13 @@ class Fence:
             self.time = max(self.time, kept.events[-1].time)
         if self.delays is not None:
             self.time = max(self.time, self.delays.newest)
-        self.recent.clear()
+        self.note_settings()
 
-    def told(self, told: "Told") -> None:
-        """Record that crossings have made events, which are committed."""
-        self.last, self.time = told.last, told.time
-        self.unsaved += told.made
-        self.inside += told.change
+    def note_settings(self) -> None:
+        """Count what its settings ask for."""
+        self.tallies.rule(self.place, rules=self.dwelling is not None or self.delays is not None)
+        limits = self.row.config.max_events or self.row.config.max_event_age
+        self.tallies.columns[Column.LIMITED, self.place] = bool(limits)
 
     def published(self, events: Sequence[FenceEvent]) -> None:
         """Record committed events."""
@@ -142,12 +173,15 @@ class Fence:
     def events(self, after: int, most: int) -> list[FenceEvent] | None:
         """At most that many committed events after a sequence; None if the first of them is not in memory."""
         after = max(after, self.first - 1)
-        return [] if after >= self.last else self.recent.events(after, most)
+        if after >= self.last:
+            return []
+        return None if self._recent is None else self._recent.events(self.number, after, most)
 
     @property
     def oldest_recent(self) -> int:
         """The sequence of the oldest event in memory; that of the next one if there is none."""
-        return self.recent.first or self.last + 1
+        first = None if self._recent is None else self._recent.first(self.number)
+        return self.last + 1 if first is None else first
 
     def backlog(self, consumer: Consumer) -> int:
         """The number of events that are kept and not acknowledged."""

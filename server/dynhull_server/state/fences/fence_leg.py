@@ -12,7 +12,7 @@ from dynhull.keys import PackedKeys, key_list, take_keys
 from ..changes import FenceChange
 from ..records import NO_TIME, Keys
 from .dwelling import Dwelling
-from .event_log import Swap, Told
+from .event_log import Swap
 from .fence import Fence
 from .pair import Pair
 from .records import (
@@ -50,7 +50,7 @@ class FenceLeg:
     Args:
         fence: the fence.
         created: whether the trip creates it.
-        told: what the trip has said of it before; None for nothing.
+        told: the sequence and the time of the last event that the trip has made of it before; None for none.
 
     Attributes:
         fence: the fence.
@@ -64,7 +64,7 @@ class FenceLeg:
         delays: the delays that it changes.
     """
 
-    def __init__(self, fence: Fence, *, created: bool = False, told: Told | None = None) -> None:
+    def __init__(self, fence: Fence, *, created: bool = False, told: tuple[int, int] | None = None) -> None:
         self.fence = fence
         self.row: FenceRow = fence.row
         self.area = fence.area
@@ -76,8 +76,7 @@ class FenceLeg:
         self.first = fence.first
         self.inside = Inside()
         self.delays: dict[Subject, Delay | None] = {}
-        self._last = fence.last if told is None else told.last
-        self._time = fence.time if told is None else told.time
+        self._last, self._time = (fence.last, fence.time) if told is None else told
 
     @property
     def last(self) -> int:
@@ -332,6 +331,7 @@ class FenceLeg:
             if begins:
                 fence.time = max(fence.time, self.row.waits.time)
                 fence.dwelling = Dwelling(self.row.waits, members(fence)) if self.row.config.dwell else None
+        fence.note_settings()
 
 
 def members(fence: Fence, dwelling: Dwelling | None = None) -> Iterator[Members]:

@@ -69,6 +69,7 @@ from .requests import (
     ReplaceFence,
 )
 from .subjects import Subjects, lay
+from .tallies import Column, Tallies
 from .transfers import carry, known_to
 
 POINT_BYTES = 16
@@ -94,6 +95,7 @@ class Ground:
         places: for hulls that the trip may create, by name.
         fences: the fences that its requests name; None for those that do not exist.
         numbers: the numbers of new fences, by name; those without one are too many.
+        tallies: what is counted of fences, as of the last commit.
         limits: the limits on fences.
     """
 
@@ -101,6 +103,7 @@ class Ground:
     places: dict[str, Place]
     fences: dict[str, Fence | None]
     numbers: dict[str, int]
+    tallies: Tallies
     limits: FenceLimits
 
 
@@ -144,7 +147,7 @@ class LineTrip(Trip):
     def __init__(self, legs: list[Leg], requests: list[Request], now: float, pause: float, ground: Ground) -> None:
         super().__init__(legs, requests, now, pause, None)
         self.fence_legs: dict[int, FenceLeg] = {}
-        self.log = EventLog()
+        self.log = EventLog(ground.tallies)
         self.events: EventBlock | None = None
         self._ground = ground
         self._by_name = {leg.name: leg for leg in legs}
@@ -222,9 +225,11 @@ class LineTrip(Trip):
         found = dict(zip(self.examined, fences, strict=True))
         if not super().landed(states, fences):
             return False
-        told = ((found[number], each) for number, each in self.log.told.items() if number not in self.fence_legs)
+        told = self.log.told
+        lasts = {} if told is None else dict(zip(told.fences.tolist(), told.lasts.tolist(), strict=True))
+        kept = ((found[number], last) for number, last in lasts.items() if number not in self.fence_legs)
         return all(leg.landed(found[number]) for number, leg in self.fence_legs.items()) and all(
-            kept is not None and kept.last == each.last for kept, each in told
+            each is not None and each.last == last for each, last in kept
         )
 
     def pairs(self) -> set[int]:
@@ -347,29 +352,37 @@ class LineTrip(Trip):
         if crossings is not None and len(crossings):
             if changed is not None and changed.expired:
                 crossings = _with_expiries(crossings, changed.expired)
-            starts = first_rows(crossings.fences)
-            fences = [subjects.fences[number] for number in crossings.fences[starts].tolist()]
-            apart = [fence.follows_events or fence.number in self.fence_legs for fence in fences]
-            if origins:
-                moved = set(crossings.fences[[key in origins for key in key_list(crossings.keys)]].tolist())
-                apart = [each or fence.number in moved for fence, each in zip(fences, apart, strict=True)]
-            runs = zip(fences, apart, starts.tolist(), [*starts[1:].tolist(), len(crossings)], strict=True)
-            if any(apart):
-                for fence, _, first, end in (run for run in runs if run[1]):
+            apart = self._apart(crossings, origins)
+            if apart is not None:
+                starts = first_rows(crossings.fences)
+                ends = np.append(starts[1:], len(crossings))
+                for first, end in zip(starts[apart[starts]].tolist(), ends[apart[starts]].tolist(), strict=True):
+                    fence = subjects.fences[int(crossings.fences[first])]
                     crossed.add(fence)
                     leg, rows, own = self._fence_leg(fence), slice(first, end), known_to(fence, origins)
                     if fence.delays is None:
                         leg.crossed(subjects, crossings, rows, swap, now, own)
                     else:
                         delay(leg, subjects, crossings, rows, swap, now, changed, own)
-                counts = np.diff(starts, append=len(crossings))
-                crossings = _some(crossings, np.flatnonzero(np.repeat(np.logical_not(apart), counts)))
+                crossings = _some(crossings, np.flatnonzero(~apart))
             if len(crossings):
                 self.log.add(subjects, crossings, areas, swap, now)
         for fence in () if changed is None else list(subjects.delaying):
             if fence not in crossed:  # subjects may have reported that they stay
                 leg = self._fence_leg(fence)
                 delay(leg, subjects, None, NO_ROWS, None, now, changed, known_to(fence, origins))
+
+    def _apart(self, crossings: Crossings, origins: Mapping[Key, Origin]) -> npt.NDArray[np.bool_] | None:
+        """(n,) which crossings are of fences that look at each of their events; None if none is."""
+        tallies, fences = self._ground.tallies, crossings.fences
+        found = tallies.columns[Column.RULES, tallies.places(fences)] != 0 if tallies.ruled else None
+        if self.fence_legs:
+            legs = np.isin(fences, list(self.fence_legs))
+            found = legs if found is None else found | legs
+        if origins:
+            moved = fences[[key in origins for key in key_list(crossings.keys)]]
+            found = np.isin(fences, moved) if found is None else found | np.isin(fences, moved)
+        return found if found is not None and found.any() else None
 
     def _take_over(self, subjects: Subjects, origins: Mapping[Key, Origin]) -> None:
         """Let subjects that come from other hulls bring their delays."""
@@ -387,8 +400,7 @@ class LineTrip(Trip):
     def _fence_leg(self, fence: Fence) -> FenceLeg:
         leg = self.fence_legs.get(fence.number)
         if leg is None:
-            self.log.settle()
-            leg = self.fence_legs[fence.number] = FenceLeg(fence, told=self.log.told.get(fence.number))
+            leg = self.fence_legs[fence.number] = FenceLeg(fence, told=self.log.last(fence.number))
         return leg
 
     def _do(self, request: Request) -> object:
@@ -443,7 +455,7 @@ class LineTrip(Trip):
             raise FenceNotFoundError(request.name)
         match request:
             case ReadFence():
-                leg, made = self.fence_legs.get(fence.number), self.log.events(fence)
+                leg, made = self.fence_legs.get(fence.number), self.log.events(fence.number)
                 return request.function(fence, made if leg is None else [*made, *leg.events])
             case ReplaceFence():
                 return self._replace(request, fence)

@@ -1,94 +1,96 @@
 """Recent events in memory, which watchers read without the storage."""
 
-from bisect import bisect_right
 from collections import deque
-from operator import itemgetter
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
-from .event_block import EventBlock
+import numpy as np
+
+from .event_block import EventBlock, Integers, joined
 from .records import FenceEvent
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .fence import Fence
 
 # The memory for the events of all fences together, whatever is allowed for each.
 MOST_BYTES = 2**26
-SEQUENCE = itemgetter(0)
-
-
-class RecentRuns:
-    """The recent events of one fence: runs of blocks that it shares with others."""
-
-    __slots__ = ("_dropped", "_runs")
-
-    def __init__(self) -> None:
-        self._runs: list[tuple[int, EventBlock, int]] = []
-        self._dropped = 0
-
-    @property
-    def first(self) -> int | None:
-        """The sequence of the oldest event; None if there is none."""
-        return self._runs[self._dropped][0] if self._dropped < len(self._runs) else None
-
-    def events(self, after: int, most: int) -> list[FenceEvent] | None:
-        """At most that many events after a sequence that is not the last; None if the first of them is not there."""
-        at = bisect_right(self._runs, after + 1, lo=self._dropped, key=SEQUENCE) - 1
-        if at < self._dropped:
-            return None
-        found: list[FenceEvent] = []
-        while at < len(self._runs) and len(found) < most:
-            _, block, run = self._runs[at]
-            found += (event for event in block.events(run) if event.sequence > after)
-            at += 1
-        return found[:most]
-
-    def add(self, first: int, block: EventBlock, run: int) -> None:
-        """Add the next run."""
-        self._runs.append((first, block, run))
-
-    def drop(self, block: EventBlock) -> None:
-        """Drop the oldest run, if it is one of a block."""
-        if self._dropped < len(self._runs) and self._runs[self._dropped][1] is block:
-            self._dropped += 1
-            if 2 * self._dropped >= len(self._runs):
-                del self._runs[: self._dropped]
-                self._dropped = 0
-
-    def clear(self) -> None:
-        """Drop all."""
-        self._runs, self._dropped = [], 0
+# Blocks with fewer events are joined: a reader looks into each.
+LEAST_EVENTS = 1024
+MOST_SMALL = 64
 
 
 class RecentEvents:
-    """The recent events of all fences, block by block; the oldest block goes first.
+    """The recent events of all fences, as columns; the oldest go first. Only who reads makes objects of them.
 
     Args:
         bytes_a_fence: the memory for each fence that there is.
     """
 
-    def __init__(self, bytes_a_fence: int) -> None:
+    def __init__(self, bytes_a_fence: int = 0) -> None:
         self._bytes_a_fence = bytes_a_fence
-        self._blocks: deque[tuple[EventBlock, Sequence[Fence]]] = deque()
+        self._blocks: deque[EventBlock] = deque()
+        self._small: list[EventBlock] = []  # newer than the others
+        self._waiting = 0  # events in them
         self._bytes = 0
 
-    def add(self, block: EventBlock, fences: "Sequence[Fence]", number: int) -> None:
-        """Add the events of a trip.
-
-        Args:
-            block: the events.
-            fences: the fence of each run.
-            number: the number of fences that there are.
-        """
-        for run, (fence, first) in enumerate(zip(fences, block.firsts.tolist(), strict=True)):
-            fence.recent.add(first, block, run)
-        self._blocks.append((block, fences))
+    def add(self, block: EventBlock, number: int) -> None:
+        """Add the events of a trip; `number` is the number of fences that there are. O(runs), as a rule O(1)."""
+        self._small.append(block)
+        self._waiting += len(block)
         self._bytes += block.bytes
+        if self._waiting >= LEAST_EVENTS or len(self._small) == MOST_SMALL:
+            self._blocks.append(joined(self._small))
+            self._small, self._waiting = [], 0
         most = min(self._bytes_a_fence * number, MOST_BYTES)
-        while self._bytes > most and len(self._blocks) > 1:
-            oldest, of_runs = self._blocks.popleft()
-            self._bytes -= oldest.bytes
-            for fence in of_runs:
-                if not fence.ended:  # what is left of a deleted fence is nowhere else
-                    fence.recent.drop(oldest)
+        while self._bytes > most and len(self._blocks) + len(self._small) > 1:
+            if not self._blocks:
+                self._blocks.append(self._small.pop(0))
+                self._waiting -= len(self._blocks[0])
+            self._bytes -= self._blocks.popleft().bytes
+
+    def events(self, number: int, after: int, most: int) -> list[FenceEvent] | None:
+        """At most that many events of a fence after a sequence that is not the last; None if the next is not there.
+
+        O(runs that are newer than the first of them + events).
+        """
+        runs: list[tuple[EventBlock, int]] = []
+        oldest = None
+        for block, run in self._newest_first(number):
+            first = int(block.firsts[run])
+            if oldest is not None and first + int(block.counts[run]) != oldest:
+                return None
+            runs.append((block, run))
+            oldest = first
+            if first <= after + 1:
+                break
+        if oldest is None or oldest > after + 1:
+            return None
+        found: list[FenceEvent] = []
+        while runs and len(found) < most:
+            block, run = runs.pop()
+            skipped = max(after + 1 - int(block.firsts[run]), 0)
+            found += block.events(run, skipped, most - len(found))
+        return found
+
+    def first(self, number: int) -> int | None:
+        """The sequence of the oldest event of a fence; None if there is none. O(runs)."""
+        for block in self._all():
+            runs = np.flatnonzero(block.fences == number)
+            if len(runs):
+                return int(block.firsts[runs[0]])
+        return None
+
+    def of(self, numbers: Integers) -> "RecentEvents":
+        """What there is of some fences. O(events)."""
+        found = RecentEvents()
+        wanted = [np.isin(block.fences, numbers) for block in self._all()]
+        parts = [block.runs(each) for block, each in zip(self._all(), wanted, strict=True) if each.any()]
+        if parts:
+            found._blocks.append(joined(parts))
+        return found
+
+    def _newest_first(self, number: int) -> Iterator[tuple[EventBlock, int]]:
+        """The runs of a fence."""
+        for block in (*reversed(self._small), *reversed(self._blocks)):
+            for run in np.flatnonzero(block.fences == number)[::-1].tolist():
+                yield block, run
+
+    def _all(self) -> Iterator[EventBlock]:
+        yield from self._blocks
+        yield from self._small

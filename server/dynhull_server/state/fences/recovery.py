@@ -18,6 +18,7 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
     fences = []
     for each in kept:
         fence = Fence(each.row)
+        registry.add_fence(fence)
         fence.restored(each)
         config = each.row.config
         fence.area = None if config.area_hull is None else registry.get(config.area_hull)
@@ -29,7 +30,6 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
                 subjects[name] = Subjects(registry.get(name))
             subjects[name].fences[fence.number] = fence
             fence.subjects[name] = subjects[name]
-        registry.fences[fence.name] = fence
         fences.append(fence)
     _adopt(restore(subjects.values(), {}, {each.row.number: each for each in kept}), subjects)
     for fence in fences:

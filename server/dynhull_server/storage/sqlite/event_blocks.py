@@ -49,13 +49,13 @@ class Runs(NamedTuple):
     counts: Integers
 
 
-def encode_block(block: EventBlock, own: Sequence[str]) -> bytes:
-    """A block as bytes. `own` is for each run the name of the hull whose keys the fence compares, which is left out."""
+def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
+    """A block as bytes. `own` says of which runs the hull is the one whose keys the fence compares: it is left out."""
     out = bytearray()
     marks, flags = _marks(block), 0
-    names = dict.fromkeys(hull for hull, other in zip(block.hulls, own, strict=True) if hull != other)
     timed = block.event_times != NO_TIME
-    if names:
+    named = not own.all()
+    if named:
         flags |= HAS_HULLS
     if timed.any():
         flags |= HAS_EVENT_TIMES
@@ -71,13 +71,14 @@ def encode_block(block: EventBlock, own: Sequence[str]) -> bytes:
     out.append(flags)
     put = _put_one if len(block) == 1 else _put_integers
     put(out, block.fences, block.firsts, block.counts)
-    if names:
-        places = {name: place for place, name in enumerate(names, start=1)}
-        put_unsigned(out, len(names))
-        for name in names:
-            put_text(out, name)
-        of_runs = [0 if hull == other else places[hull] for hull, other in zip(block.hulls, own, strict=True)]
-        put(out, np.array(of_runs))
+    if named:
+        used, places = np.unique(block.hulls[~own], return_inverse=True)
+        put_unsigned(out, len(used))
+        for place in used.tolist():
+            put_text(out, block.names[place])
+        of_runs = np.zeros(len(block.fences), np.int64)
+        of_runs[~own] = places + 1
+        put(out, of_runs)
     put(out, block.kinds, block.subject_revisions, block.area_revisions, block.times)
     put(out, marks, block.causes, block.lengths)
     out += block.keys
@@ -116,11 +117,13 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     n, m, flags = _counts(cursor)
     take = _take_one if n == 1 else _take_integers
     fences, firsts, counts = (take(cursor, m) for _ in range(3))
-    hulls = [own(number) for number in fences.tolist()]
+    names, of_runs = [], np.zeros(m, np.int64)
     if flags & HAS_HULLS:
         names = [take_text(cursor) for _ in range(take_unsigned(cursor))]
-        of_runs = take(cursor, m).tolist()
-        hulls = [names[place - 1] if place else hull for place, hull in zip(of_runs, hulls, strict=True)]
+        of_runs = take(cursor, m)
+    if of_runs.min() < 0 or of_runs.max() > len(names):
+        raise ValueError(f"a hull is number {of_runs.max()} of {len(names)}")
+    hulls, names = _with_own(of_runs, names, [own(number) for number in fences[of_runs == 0].tolist()])
     kinds, subject_revisions, area_revisions, times = (take(cursor, m) for _ in range(4))
     marks, causes, lengths = (take(cursor, n).astype(np.uint8) for _ in range(3))
     keys = bytes(cursor.take(int(lengths.sum(dtype=np.int64))))
@@ -167,9 +170,20 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
         distances,
         event_times,
         first_times,
+        tuple(names),
         inside,
         origins,
     )
+
+
+def _with_own(of_runs: Integers, names: Sequence[str], own: Sequence[str]) -> tuple[Integers, list[str]]:
+    """The place of the hull of each run among all names, given those of the runs that leave it out."""
+    places = {name: place for place, name in enumerate(dict.fromkeys((*names, *own)))}
+    known = np.array([places[name] for name in names], np.int64)
+    hulls = np.empty(len(of_runs), np.int64)
+    hulls[of_runs > 0] = known[of_runs[of_runs > 0] - 1]
+    hulls[of_runs == 0] = [places[name] for name in own]
+    return hulls, list(places)
 
 
 def decode_runs(payload: bytes) -> Runs:

@@ -18,8 +18,8 @@ from ...state.fences.recomputing import Nearness, Side, Sides, wrong_sides
 from ...state.fences.records import KeptFence, Key
 from ...state.records import Center, Contents
 from ..port import NEWEST
-from .fence_ledger import FenceRows
 from .fence_reading import read_runs, read_settled
+from .fence_runs import FenceRows
 from .ledger import HullRows, Ledger
 from .reading import read_hull
 

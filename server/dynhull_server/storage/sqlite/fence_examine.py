@@ -13,8 +13,9 @@ from ...state.fences.records import Consumer
 from .encoding import checksum, weight
 from .event_blocks import decode_runs
 from .event_rows import decode_delay
-from .fence_ledger import DropInside, FenceRows, FenceStep, Start
+from .fence_ledger import DropInside, FenceStep
 from .fence_rows import consumer_values, found_fences
+from .fence_runs import FenceRows, Start
 from .schema import DELAYS_SINCE, STARTS_SINCE
 
 if TYPE_CHECKING:
@@ -72,8 +73,9 @@ class FenceExamination:
         self._consumers()
         if self._has_delays:
             self._delays()
-        for fence in self._fences.values():
+        for number, fence in self._fences.items():
             self._judge(fence)
+            self._ledger.runs.begin(number)
         found.rows = sum(fence.count for fence in self._fences.values()) + len(self._ledger.events)
         found.sum = sum(fence.sum for fence in self._fences.values()) + self._ledger.events.sum
         found.next_number = max((number + 1 for number in self._fences), default=1)

@@ -1,14 +1,14 @@
 """The rows of fences: which there are, and how changes of fences become statements."""
 
-from array import array
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ...state.changes import FenceChange
 from ...state.fences.event_block import EventBlock, joined
@@ -27,11 +27,12 @@ from ...state.fences.records import (
     PutDelays,
     Subject,
 )
-from ..port import NEWEST, NotCommittedError
+from ..port import NotCommittedError
 from .encoding import checksum, weight
 from .event_blocks import encode_block
 from .event_rows import encode_delay, encode_inside
 from .fence_rows import consumer_values, values
+from .fence_runs import FenceRows, Start
 from .schema import (
     INSERT_CONSUMER,
     INSERT_DELAY,
@@ -44,6 +45,8 @@ from .schema import (
 )
 
 if TYPE_CHECKING:
+    from array import array
+
     from .ledger import Ledger
 
 Statement = tuple[str, tuple[Any, ...]]
@@ -52,161 +55,6 @@ KEYS_A_ROW = 16_384
 # Events in a row: whoever reads those of one fence reads all of them.
 EVENTS_A_ROW = 1024
 MISSING = -1  # the sequence of no event
-
-
-@dataclass(slots=True)
-class InsideRows:
-    """Who was inside after an event, in `parts` rows. It is complete once it has all of them.
-
-    Attributes:
-        sequence: the sequence of the event.
-        parts: the number of rows.
-        places: the row numbers by part.
-        sum: the sum of their weights.
-    """
-
-    sequence: int
-    parts: int
-    places: dict[int, int] = field(default_factory=dict)
-    sum: int = 0
-
-    @property
-    def complete(self) -> bool:
-        """Whether all parts are there."""
-        return len(self.places) == self.parts
-
-
-class Start(NamedTuple):
-    """Where the events of a fence begin of which some have been dropped.
-
-    Attributes:
-        first: the sequence of the oldest event.
-        place: the row number.
-        weight: the weight of the row.
-    """
-
-    first: int
-    place: int
-    weight: int
-
-    @classmethod
-    def at(cls, place: int, fence: int, first: int) -> tuple[Self, int]:
-        """The row of a fence, and its checksum."""
-        stored = checksum(b"", fence, first)
-        return cls(first, place, weight(stored, fence, first)), stored
-
-
-@dataclass(slots=True)
-class FenceRows:
-    """The rows of one fence.
-
-    Attributes:
-        row: the row of the fence itself.
-        weight: its weight.
-        sum: the sum of the weights of all rows of the fence, but those of events.
-        count: the number of these rows.
-        firsts: the first sequence in each run of events, ascending.
-        places: the numbers of the rows that these are in.
-        last: the newest sequence.
-        start: where its events begin; None if none has been dropped.
-        insides: who was inside, by sequence.
-        consumers: each consumer with its row number and weight.
-        delays: the row number and weight of each delay.
-    """
-
-    row: FenceRow
-    weight: int
-    sum: int
-    count: int = 1
-    firsts: "array[int]" = field(default_factory=lambda: array("q"))
-    places: "array[int]" = field(default_factory=lambda: array("q"))
-    last: int = 0
-    start: Start | None = None
-    insides: dict[int, InsideRows] = field(default_factory=dict)
-    consumers: dict[str, tuple[Consumer, int, int]] = field(default_factory=dict)
-    delays: dict[Subject, tuple[int, int]] = field(default_factory=dict)
-
-    @property
-    def first(self) -> int:
-        """The sequence of the oldest event; that of the next one if there is none."""
-        return 1 if self.start is None else self.start.first
-
-    @property
-    def base(self) -> int:
-        """The newest sequence at which it is known who was inside; 0, when nobody was, if no row says so."""
-        return max((each.sequence for each in self.insides.values() if each.complete), default=0)
-
-    def boundary(self, first: int) -> int:
-        """The sequence nearest before `first` such that the events before it may go."""
-        return max(min(first, self.base + 1), self.first)
-
-    def since(self, sequence: int, most: int = NEWEST) -> Self:
-        """A copy that has, of the runs of events, only those with the next `most` events after a sequence."""
-        sequence = max(sequence, self.first - 1)
-        start = max(bisect_right(self.firsts, sequence + 1) - 1, 0)
-        runs = slice(start, bisect_right(self.firsts, sequence + most))
-        insides = {key: replace(each, places=dict(each.places)) for key, each in self.insides.items()}
-        return replace(
-            self,
-            firsts=self.firsts[runs],
-            places=self.places[runs],
-            insides=insides,
-            consumers=dict(self.consumers),
-            delays=dict(self.delays),
-        )
-
-    def begin(self, start: Start, runs: int) -> None:
-        """Let events begin later, and forget the oldest runs."""
-        if self.start is not None:
-            self._plus(-1, -self.start.weight)
-        self.start = start
-        self._plus(1, start.weight)
-        del self.firsts[:runs], self.places[:runs]
-
-    def put_inside(self, sequence: int, parts: int, part: int, place: int, each: int) -> None:
-        """Add a row of those who are inside."""
-        rows = self.insides.setdefault(sequence, InsideRows(sequence, parts))
-        rows.places[part] = place
-        rows.sum += each
-        self._plus(1, each)
-
-    def drop_inside(self, sequence: int) -> None:
-        """Remove who was inside after an event."""
-        rows = self.insides.pop(sequence)
-        self._plus(-len(rows.places), -rows.sum)
-
-    def put_consumer(self, consumer: Consumer, place: int, each: int) -> None:
-        """Add or change a consumer."""
-        self.drop_consumer(consumer.name)
-        self.consumers[consumer.name] = consumer, place, each
-        self._plus(1, each)
-
-    def drop_consumer(self, name: str) -> None:
-        """Remove a consumer, if there is one of that name."""
-        known = self.consumers.pop(name, None)
-        if known is not None:
-            self._plus(-1, -known[2])
-
-    def put_delay(self, subject: Subject, place: int, each: int) -> None:
-        """Add or change the delay of a subject."""
-        self.drop_delay(subject)
-        self.delays[subject] = place, each
-        self._plus(1, each)
-
-    def drop_delay(self, subject: Subject) -> None:
-        """Remove the delay of a subject, if it has one."""
-        known = self.delays.pop(subject, None)
-        if known is not None:
-            self._plus(-1, -known[1])
-
-    def change(self, row: FenceRow, each: int) -> None:
-        """Change the row of the fence itself."""
-        self._plus(0, each - self.weight)
-        self.row, self.weight = row, each
-
-    def _plus(self, rows: int, weights: int) -> None:
-        self.count += rows
-        self.sum += weights
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,7 +187,12 @@ class FenceChanges:
         self._plus(now, 1, each)
         self.next_number = max(self.next_number, row.number + 1)
         self._statements.append((INSERT_FENCE, (*columns, stored)))
-        self._effects.append(lambda: self._ledger.fences.__setitem__(row.number, rows))
+
+        def begin() -> None:
+            self._ledger.fences[row.number] = rows
+            self._ledger.runs.begin(row.number)
+
+        self._effects.append(begin)
         for step in inside_steps(row.number, change.inside, lambda: next(self._ledger.inside_ids)):
             self._put_inside(step, now)
 
@@ -365,19 +218,39 @@ class FenceChanges:
                 self._drop_inside(change.sequence, now)
 
     def _append(self, block: EventBlock) -> None:
+        if not self._lasts and not any(now.deleted for now in self._now.values()) and self._follows(block):
+            ends = (block.firsts + block.counts - 1).tolist()
+            self._lasts.update(zip(block.fences.tolist(), ends, strict=True))
+        else:
+            self._follow(block)
+        self._blocks.append(block)
+
+    def _follows(self, block: EventBlock) -> bool:
+        """Whether the events follow those of the last commit; also False if a fence is not that old."""
+        order = np.argsort(block.fences, kind="stable")
+        fences, firsts, counts = block.fences[order], block.firsts[order], block.counts[order]
+        ends = firsts + counts
+        again = fences[1:] == fences[:-1]
+        starts = np.append(True, ~again)
+        try:
+            lasts = self._ledger.runs.lasts(fences[starts])
+        except KeyError:
+            return False
+        return bool((firsts[starts] == lasts + 1).all() and (firsts[1:] == ends[:-1])[again].all())
+
+    def _follow(self, block: EventBlock) -> None:
+        """Take note of the last events, or raise NotCommittedError if they do not follow."""
         lasts, runs = self._lasts, zip(block.fences.tolist(), block.firsts.tolist(), block.counts.tolist(), strict=True)
         for number, first, count in runs:
             last = lasts.get(number, MISSING)
             if last == MISSING:
-                rows = self._ledger.fences.get(number)
-                if rows is None or (number in self._now and self._now[number].deleted):
+                if number not in self._ledger.fences or (number in self._now and self._now[number].deleted):
                     raise NotCommittedError(f"there is no fence {number}")
-                last = rows.last
+                last = int(self._ledger.runs.lasts(np.array([number]))[0])
             if first != last + 1:
                 name = self._rows(number).row.name
                 raise NotCommittedError(f"event {first} of fence {name} does not follow event {last}")
             lasts[number] = last + count
-        self._blocks.append(block)
 
     def finish(self) -> None:
         """Write all events, after the last change: in one row, or in several if they are many."""
@@ -392,25 +265,27 @@ class FenceChanges:
             self._write_events(block if end - start == len(block) else block.rows(start, end))
 
     def _write_events(self, block: EventBlock) -> None:
-        numbers = block.fences.tolist()
-        payload = encode_block(block, [self._rows(number).row.config.subjects for number in numbers])
+        payload = encode_block(block, self._own(block))
         stored = checksum(payload, *MANY)
-        each, place = weight(stored, *MANY), next(self._ledger.event_ids)
+        each, place, runs = weight(stored, *MANY), next(self._ledger.event_ids), len(block.fences)
         self.rows += 1
         self.sum += each
         self._statements.append((INSERT_EVENTS, (place, *MANY, stored, payload)))
 
         def add() -> None:
-            fences = self._ledger.fences
-            runs = zip(numbers, block.firsts.tolist(), block.counts.tolist(), strict=True)
-            for number, first, count in runs:
-                rows = fences[number]
-                rows.firsts.append(first)
-                rows.places.append(place)
-                rows.last = first + count - 1
-            self._ledger.events.add(place, each, len(numbers), len(numbers))
+            self._ledger.runs.add(block, place)
+            self._ledger.events.add(place, each, runs, runs)
 
         self._effects.append(add)
+
+    def _own(self, block: EventBlock) -> npt.NDArray[np.bool_]:
+        """Of which runs the hull is the one that the fence names."""
+        try:
+            return self._ledger.runs.own(block)
+        except KeyError:  # a fence is new
+            subjects = [self._rows(number).row.config.subjects for number in block.fences.tolist()]
+            names = [block.names[hull] for hull in block.hulls.tolist()]
+            return np.array([name == own for name, own in zip(names, subjects, strict=True)])
 
     def _shrink(self, step: ShrinkEvents) -> None:
         place, events = step.place, self._ledger.events
@@ -462,10 +337,13 @@ class FenceChanges:
         self._statements.append(("DELETE FROM fences WHERE id = ?", (number,)))
 
         rows = now.rows
+        if number in self._ledger.fences:
+            self._ledger.runs.update(rows)
         empty, release = self._release(rows.places[now.dropped :])
 
         def bury() -> None:
             gone, dead = self._ledger.fences.pop(number), self._ledger.dead
+            self._ledger.runs.forget(gone)
             release()
             dead["events"].extend(empty)
             dead["insides"].extend(place for each in gone.insides.values() for place in each.places.values())
@@ -480,6 +358,8 @@ class FenceChanges:
         first = rows.boundary(first)
         if first <= (1 if before is None else before.first):
             return
+        if rows.row.number in self._ledger.fences:
+            self._ledger.runs.update(rows)
         if before is not None:
             self._plus(now, -1, -before.weight)
             self._delete_rows("starts", [before.place])

@@ -12,7 +12,8 @@ from ..port import NEWEST, DamagedError
 from .encoding import checksum
 from .event_blocks import decode_block, encode_block
 from .event_rows import decode_delay, decode_events, decode_inside
-from .fence_ledger import FenceRows, ShrinkEvents
+from .fence_ledger import ShrinkEvents
+from .fence_runs import FenceRows
 from .reading import rows_by_id
 from .schema import MANY
 
@@ -117,7 +118,8 @@ def shrunk(connection: sqlite3.Connection, place: int, starts: Mapping[int, int]
         needed = [end > starts.get(number, end) for number, end in zip(block.fences.tolist(), ends, strict=True)]
         if any(needed):
             left = block.runs(np.array(needed))
-            return ShrinkEvents(place, len(left.fences), encode_block(left, [OWN] * len(left.fences)))
+            own = np.array([name == OWN for name in left.names])[left.hulls]
+            return ShrinkEvents(place, len(left.fences), encode_block(left, own))
     return None
 
 

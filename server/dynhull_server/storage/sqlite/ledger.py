@@ -12,7 +12,8 @@ from ...state.records import Append, Create, Delete, HullRow
 from ..port import NotCommittedError
 from .encoding import checksum, encode, weight
 from .event_directory import EventDirectory
-from .fence_ledger import FenceChanges, FenceRows, FenceStep
+from .fence_ledger import FenceChanges, FenceStep
+from .fence_runs import FenceRows, FenceRuns
 from .hull_rows import values
 from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
 from .totals import Totals
@@ -130,6 +131,10 @@ class Ledger:
     delay_ids: "count[int]" = field(default_factory=lambda: count(1))
     start_ids: "count[int]" = field(default_factory=lambda: count(1))
     events: EventDirectory = field(default_factory=EventDirectory)
+    runs: FenceRuns = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.runs = FenceRuns(self.fences)
 
     def go_on_from(self, before: "Ledger", under_way: Set[int]) -> None:
         """Replace an earlier ledger; chunks of snapshots that are `under_way` are not dead."""

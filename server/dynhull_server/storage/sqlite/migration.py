@@ -3,7 +3,7 @@
 import sqlite3
 from collections.abc import Mapping
 
-from .fence_ledger import Start
+from .fence_runs import Start
 from .hull_rows import values
 from .ledger import Ledger
 from .schema import FENCE_TABLES, INSERT_HULL, INSERT_START, SCHEMAS, TABLES, stamp

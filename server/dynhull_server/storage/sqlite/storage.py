@@ -258,8 +258,9 @@ class SQLiteStorage:
         """Fences as last committed."""
         with self._readers.lend() as connection:
             with self._visible:
-                found = [self._settled().fences.get(number) for number in numbers]
-                fences = [None if fence is None else fence.since(fence.base) for fence in found]
+                ledger = self._settled()
+                found = [ledger.fences.get(number) for number in numbers]
+                fences = [None if fence is None else ledger.runs.since(fence, fence.base) for fence in found]
                 begin(connection)
             return read_fences(connection, fences)
 
@@ -268,7 +269,8 @@ class SQLiteStorage:
         """Events of a fence."""
         with self._readers.lend() as connection:
             with self._visible:
-                fence = self._settled().fences[number].since(after, most)
+                ledger = self._settled()
+                fence = ledger.runs.since(ledger.fences[number], after, most)
                 begin(connection)
             return read_events(connection, fence, after, most)
 
