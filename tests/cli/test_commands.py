@@ -69,6 +69,32 @@ def test_vertices_are_asked_for_without_points(hull):
     assert (done.exit_code, done.stderr) == (2, "error: vertices takes no points, but '1,2' was given\n")
 
 
+def test_layers_and_influence(hull):
+    lines = dynhull("query", hull, "layers").stdout.splitlines()
+    assert lines == ["1\t0.0\t0.0", "1\t4.0\t0.0", "1\t4.0\t4.0", "1\t0.0\t4.0", "2\t1.0\t1.0"]
+    assert len(dynhull("query", hull, "layers", "--layer", 1).stdout.splitlines()) == 4
+    assert dynhull("query", hull, "influence").stdout.splitlines()[0] == "4.0\t0.0\t8.0"
+    assert json.loads(dynhull("query", hull, "layers", "--json").stdout.splitlines()[-1]) == {
+        "layer": 2,
+        "vertex": [1, 1],
+    }
+    assert (
+        dynhull("query", hull, "locate", "--layer", 2, "1,1", "2,2").stdout == "1.0\t1.0\tboundary\n2.0\t2.0\toutside\n"
+    )
+    done = dynhull("query", hull, "count", "--layer", 2, "1,1")
+    assert (done.exit_code, done.stderr) == (2, "error: count is not about a layer, but --layer was given\n")
+    assert dynhull("query", hull, "influence", "--keys").exit_code == 2
+
+
+def test_watch_of_a_layer_and_of_few_vertices(hull):
+    done = dynhull("watch", hull, "--events", 1, "--layer", 2, "--json")
+    assert json.loads(done.stdout)["added"] == [[1, 1]]
+    done = dynhull("watch", hull, "--events", 1, "--max-vertices", 2)
+    assert done.stdout == "1\t6\t2\t16.0\t16.0\t2.828427124746191\n"
+    event = json.loads(dynhull("watch", hull, "--events", 1, "--max-vertices", 4, "--layer", 1, "--json").stdout)
+    assert (event["vertices"], event["error"]) == ([[0, 0], [4, 0], [4, 4], [0, 4]], 0)
+
+
 def test_watch(hull):
     done = dynhull("watch", hull, "--events", 1)
     assert (done.exit_code, done.stdout) == (0, "1\t6\t4\t4\t0\t16.0\t16.0\n")

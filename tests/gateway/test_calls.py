@@ -41,6 +41,9 @@ def test_questions_have_the_answers_of_the_sdk(gateway: Gateway, address: str, s
     shown = gateway.get(f"{at}/measures").json
     assert (shown["diameter"], shown["min_circle"]["radius"]) == (measures.diameter, measures.min_circle[1])
     assert gateway.get(f"{at}/sample?size=2").json["points"] == gateway.get(f"{at}/sample?size=2").json["points"]
+    assert gateway.get(f"{at}/layers?count=2").json == {"revision": 1, "layers": [SQUARE], "keys": None}
+    assert gateway.get(f"{at}/influence").json["areas"] == [8, 8, 8, 8]
+    assert gateway.post(f"{at}/locate?layer=2", points).json["sides"] == [-1, -1, -1]
     assert gateway.get(f"{at}/verification").json["equal"] is True
     assert gateway.get(f"{at}/separation?other={square}").json["intersect"] is True
     hull = gateway.get(at).json

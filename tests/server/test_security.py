@@ -68,6 +68,8 @@ EVERY_CALL = {
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
+    "GetLayers": lambda stub, name: stub.GetLayers(pb.GetLayersRequest(name=name, layer_count=1)),
+    "GetInfluence": lambda stub, name: stub.GetInfluence(pb.GetInfluenceRequest(name=name)),
     "GetMeasures": lambda stub, name: stub.GetMeasures(pb.GetMeasuresRequest(name=name)),
     "Separate": lambda stub, name: stub.Separate(pb.SeparateRequest(name=name, other_name=name)),
     "PhaseDiagram": lambda stub, name: stub.PhaseDiagram(pb.PhaseDiagramRequest(name=name)),

@@ -1,7 +1,7 @@
 """The changes of a hull as a live table, as lines of text or as lines of JSON."""
 
 from collections import deque
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from itertools import islice
 
 import numpy as np
@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Snapshot, Watch
+from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Sketch, Snapshot, Watch
 
 from .closed_pipe import when_pipe_closes
 from .json_lines import json_line
@@ -19,6 +19,36 @@ from .tab_lines import tab_line
 
 SHOWN_EVENTS = 12
 NOTHING = np.empty((0, 2))
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What to follow of a hull.
+
+    Attributes:
+        max_rate: the most events a second, 0 for all.
+        keys: whether to name the vertices.
+        layer: the convex layer, from 1.
+        max_vertices: the most vertices of an event, None for all.
+    """
+
+    max_rate: float
+    keys: bool
+    layer: int
+    max_vertices: int | None
+
+    def watch(self, client: HullClient, name: str, copy: HullCopy) -> Watch:
+        """The watch, which updates the copy. An event with few of the vertices has all of these."""
+        return client.watch(
+            name,
+            max_rate=self.max_rate,
+            measures=True,
+            copy=copy,
+            keys=self.keys,
+            outline=self.max_vertices is not None,
+            layer=self.layer,
+            max_vertices=self.max_vertices,
+        )
 
 
 class Corners:
@@ -30,9 +60,9 @@ class Corners:
         self._copy = copy
         self._keys: tuple[str, ...] | tuple[int, ...] = ()
 
-    def update(self) -> None:
-        """Compare the copy with its state at the last call."""
-        before, self._keys = self._keys, self._copy.vertex_keys or ()
+    def update(self, event: Event) -> None:
+        """Compare the keys after an event with those after the one before."""
+        before, self._keys = self._keys, (event.keys if isinstance(event, Sketch) else self._copy.vertex_keys) or ()
         self.joined = [key for key in self._keys if key not in set(before)]
         self.left = [key for key in before if key not in set(self._keys)]
 
@@ -41,15 +71,15 @@ class Corners:
         return " ".join([*(f"+{key}" for key in self.joined), *(f"-{key}" for key in self.left)])
 
 
-def follow(client: HullClient, name: str, *, max_rate: float, events: int | None, as_json: bool, keys: bool) -> None:
+def follow(client: HullClient, name: str, shown: Shown, *, events: int | None, as_json: bool) -> None:
     """Print the changes of a hull: lines of JSON, a live table on a terminal, or else lines of text.
 
     It returns after that number of events; None for never.
     """
     copy = HullCopy()
-    corners = Corners(copy) if keys else None
+    corners = Corners(copy) if shown.keys else None
     console = Console(highlight=False)
-    with client.watch(name, max_rate=max_rate, measures=True, copy=copy, keys=keys) as stream:
+    with shown.watch(client, name, copy) as stream:
         if not as_json and console.is_terminal:
             _show(console, name, stream, copy, corners, events)
             return
@@ -57,7 +87,7 @@ def follow(client: HullClient, name: str, *, max_rate: float, events: int | None
             when_pipe_closes(stream.close)
         for event in islice(stream, events):
             if corners is not None:
-                corners.update()
+                corners.update(event)
             typer.echo(_json(event, corners) if as_json else _line(event, copy, corners))
 
 
@@ -80,42 +110,53 @@ def _show(
     with Live(get_renderable=table, console=console):
         for event in islice(stream, events):
             if corners is not None:
-                corners.update()
+                corners.update(event)
             recent.append(_cells(event, copy, corners))
 
 
 def _cells(event: Event, copy: HullCopy, corners: Corners | None) -> list[str]:
-    added, removed = _difference(event)
     measures = _measures(event)
     areas = [f"{measures.area:.6g}", f"{measures.perimeter:.6g}"] if measures else []
     names = [] if corners is None else [corners.difference()]
     return [
         f"{event.revision:,}",
         f"{event.points:,}",
-        f"{len(copy.vertices):,}",
-        f"+{len(added):,} -{len(removed):,}",
+        f"{len(event.vertices if isinstance(event, Sketch) else copy.vertices):,}",
+        _change(event),
         *(areas or ([""] * 2 if names else [])),
         *names,
     ]
 
 
-def _line(event: Event, copy: HullCopy, corners: Corners | None) -> str:
+def _change(event: Event) -> str:
+    """The change of the vertices for people; of few of the vertices, how far the hull reaches beyond them."""
+    if isinstance(event, Sketch):
+        return f"within {event.error:.3g}"
     added, removed = _difference(event)
+    return f"+{len(added):,} -{len(removed):,}"
+
+
+def _line(event: Event, copy: HullCopy, corners: Corners | None) -> str:
     measures = _measures(event)
     sizes = ("", "") if measures is None else (measures.area, measures.perimeter)
     named = () if corners is None else (corners.difference(),)
+    if isinstance(event, Sketch):
+        return tab_line(event.revision, event.points, len(event.vertices), *sizes, event.error, *named)
+    added, removed = _difference(event)
     return tab_line(event.revision, event.points, len(copy.vertices), len(added), len(removed), *sizes, *named)
 
 
 def _json(event: Event, corners: Corners | None) -> str:
     added, removed = _difference(event)
     measures = _measures(event)
+    vertices: dict[str, Points | float] = {"added": added, "removed": removed}
+    if isinstance(event, Sketch):
+        vertices = {"vertices": event.vertices, "error": event.error}
     return json_line(
         revision=event.revision,
         points=event.points,
         snapshot=isinstance(event, Snapshot),
-        added=added,
-        removed=removed,
+        **vertices,
         **({} if measures is None else asdict(measures)),
         **({} if corners is None else {"joined": corners.joined, "left": corners.left}),
     )
@@ -129,4 +170,4 @@ def _difference(event: Event) -> tuple[Points, Points]:
 
 
 def _measures(event: Event) -> Measures | None:
-    return event.measures if isinstance(event, Snapshot | Change) else None
+    return event.measures if isinstance(event, Snapshot | Change | Sketch) else None

@@ -10,7 +10,7 @@ from .json_lines import json_line
 from .tab_lines import tab_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
 
     from dynhull_client import HullClient, Points
 
@@ -28,19 +28,29 @@ class Question(StrEnum):
     LINES = "lines"
     POSITIONS = "positions"
     VERTICES = "vertices"
+    LAYERS = "layers"
+    INFLUENCE = "influence"
 
 
-ANSWERS: "dict[Question, Callable[[HullClient, str, Points], list[Any]]]" = {
-    Question.LOCATE: lambda client, name, xy: [SIDES[each] for each in client.locate(name, xy).sides.tolist()],
-    Question.COUNT: lambda client, name, xy: client.count(name, xy).counts.tolist(),
-    Question.DISTANCE: lambda client, name, xy: client.distance(name, xy).distances.tolist(),
-    Question.SUPPORT: lambda client, name, xy: client.support(name, xy).vertices.tolist(),
-    Question.TANGENTS: lambda client, name, xy: client.tangents(name, xy).tangents.tolist(),
-    Question.LINES: lambda client, name, pq: client.intersect_lines(name, pq[:, :2], pq[:, 2:]).crossings.tolist(),
+ANSWERS: "dict[Question, Callable[[HullClient, str, Points, int], list[Any]]]" = {
+    Question.LOCATE: lambda client, name, xy, layer: [
+        SIDES[each] for each in client.locate(name, xy, layer=layer).sides.tolist()
+    ],
+    Question.COUNT: lambda client, name, xy, _: client.count(name, xy).counts.tolist(),
+    Question.DISTANCE: lambda client, name, xy, layer: client.distance(name, xy, layer=layer).distances.tolist(),
+    Question.SUPPORT: lambda client, name, xy, layer: client.support(name, xy, layer=layer).vertices.tolist(),
+    Question.TANGENTS: lambda client, name, xy, layer: client.tangents(name, xy, layer=layer).tangents.tolist(),
+    Question.LINES: lambda client, name, pq, layer: client.intersect_lines(
+        name, pq[:, :2], pq[:, 2:], layer=layer
+    ).crossings.tolist(),
 }
 
 
 ABOUT_KEYS = (Question.LOCATE, Question.DISTANCE)
+WITHOUT_POINTS = (Question.VERTICES, Question.LAYERS, Question.INFLUENCE)
+NAMING = (Question.SUPPORT, *WITHOUT_POINTS)
+WITHOUT_LAYER = (Question.COUNT, Question.POSITIONS, Question.LAYERS, Question.INFLUENCE)
+DEFAULT_LAYERS = 10
 
 
 @connected
@@ -60,12 +70,22 @@ def query(
     keys: Annotated[
         bool,
         typer.Option(
-            "--keys", help="locate, distance: ask about keys in place of points. vertices, support: name the vertices."
+            "--keys",
+            help="locate, distance: ask about keys in place of points. vertices, support, layers, influence: name the "
+            "vertices.",
         ),
     ] = False,
     keys_of: Annotated[
         str, typer.Option(metavar="HULL", help="The keyed hull that has the keys of --keys. Default: the same hull.")
     ] = "",
+    layer: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=1000,
+            help="Ask the hull of this convex layer; 1, the default, is the hull. layers: how many; 10 by default.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Ask a hull about points: one line per point, with its coordinates and the exact answer between tabs.
@@ -73,6 +93,7 @@ def query(
         dynhull query fleet/north locate -73.9,40.7 -74.2,40.6
         dynhull query vehicles vertices --keys
         dynhull query depot locate --keys LH400 --keys-of vehicles
+        dynhull query vehicles locate --layer 2 --keys LH400
 
     * locate: inside, boundary or outside
     * count: how many copies of the point the hull holds
@@ -82,34 +103,68 @@ def query(
     * lines: where the line through two points enters and leaves the hull
     * positions (with keys): where each key is; nan for a missing key
     * vertices (without points): the vertices of the hull, counter-clockwise
+    * layers (without points): the number and a vertex of each convex layer, from the outermost
+    * influence (without points): each vertex, and the area that the hull would lose without it; the greatest first
     """
     if keys_of and not (keys and question in ABOUT_KEYS):
         raise ValueError("--keys-of is given with --keys, to locate or distance")
-    if question is Question.VERTICES:
+    if layer is not None and question in WITHOUT_LAYER and question is not Question.LAYERS:
+        raise ValueError(f"{question} is not about a layer, but --layer was given")
+    if question in WITHOUT_POINTS:
         if points:
-            raise ValueError(f"vertices takes no points, but {points[0]!r} was given")
-        _vertices(client, name, keys, as_json)
+            raise ValueError(f"{question} takes no points, but {points[0]!r} was given")
+        for row in _shape(client, name, question, keys, layer):
+            typer.echo(json_line(**row) if as_json else tab_line(*row.values()))
     elif question is Question.POSITIONS or (keys and question in ABOUT_KEYS):
-        _ask_about_keys(client, name, question, points, keys_of, as_json)
-    elif keys and question is not Question.SUPPORT:
-        raise ValueError(f"{question} is about points: --keys is for locate, distance, positions, support and vertices")
+        _ask_about_keys(client, name, question, points, keys_of, layer or 1, as_json)
+    elif keys and question not in NAMING:
+        names = "locate, distance, positions, support, vertices, layers and influence"
+        raise ValueError(f"{question} is about points: --keys is for {names}")
     else:
-        _ask_about_points(client, name, question, points, keys, as_json)
+        _ask_about_points(client, name, question, points, keys, layer or 1, as_json)
 
 
-def _vertices(client: "HullClient", name: str, named: bool, as_json: bool) -> None:
-    hull = client.get_hull(name)
-    if named and hull.vertex_keys is None:
+def _shape(
+    client: "HullClient", name: str, question: Question, named: bool, layer: int | None
+) -> "Iterator[dict[str, Any]]":
+    """The rows of an answer about the hull as a whole."""
+    rows: list[dict[str, Any]]
+    keys: Sequence[str | int] | None
+    if question is Question.LAYERS:
+        peeled = client.layers(name, layer or DEFAULT_LAYERS, keys=named)
+        rows = [
+            {"layer": number, "vertex": vertex}
+            for number, vertices in enumerate(peeled.layers, start=1)
+            for vertex in vertices.tolist()
+        ]
+        keys = None if peeled.keys is None else [key for of_layer in peeled.keys for key in of_layer]
+    elif question is Question.INFLUENCE:
+        found = client.influence(name, keys=named)
+        vertices, areas = found.vertices.tolist(), found.areas.tolist()
+        order = sorted(range(len(areas)), key=lambda row: -areas[row])
+        rows = [{"vertex": vertices[row], "area": areas[row]} for row in order]
+        keys = None if found.keys is None else [found.keys[row] for row in order]
+    else:
+        hull = client.get_hull(name, layer=layer or 1)
+        rows = [{"vertex": vertex} for vertex in hull.vertices.tolist()]
+        keys = hull.vertex_keys
+    if not named:
+        yield from rows
+        return
+    if keys is None:
         raise ValueError(f"the points of {name!r} have no keys: leave out --keys")
-    for key, vertex in zip(hull.vertex_keys or [None] * len(hull.vertices), hull.vertices.tolist(), strict=True):
-        if as_json:
-            typer.echo(json_line(vertex=vertex, key=key) if named else json_line(vertex=vertex))
-        else:
-            typer.echo(tab_line(vertex, key) if named else tab_line(vertex))
+    for row, key in zip(rows, keys, strict=True):
+        yield {**row, "key": key}
 
 
 def _ask_about_keys(
-    client: "HullClient", name: str, question: Question, arguments: list[str] | None, keys_of: str, as_json: bool
+    client: "HullClient",
+    name: str,
+    question: Question,
+    arguments: list[str] | None,
+    keys_of: str,
+    layer: int,
+    as_json: bool,
 ) -> None:
     from .keyed_rows import given_keys, keys_for
 
@@ -117,25 +172,32 @@ def _ask_about_keys(
     if question is Question.POSITIONS:
         answers = client.positions(name, keys).positions.tolist()
     elif question is Question.DISTANCE:
-        answers = client.distance(name, keys=keys, keys_of=keys_of).distances.tolist()
+        answers = client.distance(name, keys=keys, keys_of=keys_of, layer=layer).distances.tolist()
     else:
-        answers = [SIDES[each] for each in client.locate(name, keys=keys, keys_of=keys_of).sides.tolist()]
+        located = client.locate(name, keys=keys, keys_of=keys_of, layer=layer)
+        answers = [SIDES[each] for each in located.sides.tolist()]
     for key, answer in zip(keys, answers, strict=True):
         typer.echo(json_line(asked=key, answer=answer) if as_json else tab_line(key, answer))
 
 
 def _ask_about_points(
-    client: "HullClient", name: str, question: Question, arguments: list[str] | None, named: bool, as_json: bool
+    client: "HullClient",
+    name: str,
+    question: Question,
+    arguments: list[str] | None,
+    named: bool,
+    layer: int,
+    as_json: bool,
 ) -> None:
     from .rows import given_or_read, number_rows
 
     for rows in number_rows(given_or_read(arguments), 4 if question is Question.LINES else 2):
         answers: list[Any]
         if named:
-            found = client.support(name, rows, keys=True)
+            found = client.support(name, rows, keys=True, layer=layer)
             answers = list(zip(found.vertices.tolist(), found.keys or (), strict=True))
         else:
-            answers = ANSWERS[question](client, name, rows)
+            answers = ANSWERS[question](client, name, rows, layer)
         for row, answer in zip(rows.tolist(), answers, strict=True):
             typer.echo(json_line(asked=row, answer=answer) if as_json else tab_line(row, answer))
 

@@ -10,6 +10,11 @@ from .schemas import HullPath, MinRevision, Name
 
 router = APIRouter(prefix="/hulls/{name}", tags=["questions"])
 Other = Annotated[Name, Query(description="The other hull.")]
+Layer = Annotated[
+    int,
+    Query(ge=1, le=1000, description="The convex layer to ask; 1 is the hull, and a layer without points is empty."),
+]
+LayerCount = Annotated[int, Query(ge=1, le=1000, description="The number of layers, from the outermost.")]
 SampleSize = Annotated[int, Query(ge=1, le=100_000, description="The most points.")]
 WithKeys = Annotated[bool, Query(description="Whether to name the points, in a keyed hull.")]
 OtherRevision = Annotated[int, Query(ge=0, le=schemas.LARGEST, description="A revision of the other hull to wait for.")]
@@ -22,19 +27,19 @@ def _about(question: schemas.AboutPointsOrKeys) -> dict[str, Any]:
 
 @router.post("/locate")
 async def locate(
-    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Located:
     """The side of each point or key: inside, on the boundary or outside. Exact."""
-    answer = await client.locate(name, **_about(question), min_revision=min_revision)
+    answer = await client.locate(name, **_about(question), layer=layer, min_revision=min_revision)
     return schemas.Located.model_validate(answer)
 
 
 @router.post("/distance")
 async def distance(
-    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Distances:
     """The distance of each point or key to the hull; of a geographic hull in metres."""
-    answer = await client.distance(name, **_about(question), min_revision=min_revision)
+    answer = await client.distance(name, **_about(question), layer=layer, min_revision=min_revision)
     return schemas.Distances.model_validate(answer)
 
 
@@ -48,27 +53,31 @@ async def count(
 
 @router.post("/support")
 async def support(
-    client: Caller, name: HullPath, question: schemas.Directions, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.Directions, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Supported:
     """The extreme vertex in each direction. Exact."""
-    answer = await client.support(name, question.directions, keys=question.keys, min_revision=min_revision)
+    answer = await client.support(name, question.directions, keys=question.keys, layer=layer, min_revision=min_revision)
     return schemas.Supported.model_validate(answer)
 
 
 @router.post("/tangents")
 async def tangents(
-    client: Caller, name: HullPath, question: schemas.AboutPoints, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.AboutPoints, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Tangents:
     """The tangent points seen from each point. Exact."""
-    return schemas.Tangents.model_validate(await client.tangents(name, question.points, min_revision=min_revision))
+    return schemas.Tangents.model_validate(
+        await client.tangents(name, question.points, layer=layer, min_revision=min_revision)
+    )
 
 
 @router.post("/intersect-lines")
 async def intersect_lines(
-    client: Caller, name: HullPath, question: schemas.Lines, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.Lines, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Crossings:
     """Where each line enters and leaves the hull."""
-    answer = await client.intersect_lines(name, question.origins, question.targets, min_revision=min_revision)
+    answer = await client.intersect_lines(
+        name, question.origins, question.targets, layer=layer, min_revision=min_revision
+    )
     return schemas.Crossings.model_validate(answer)
 
 
@@ -95,10 +104,28 @@ async def sample_points(
     return schemas.Sampled.model_validate(answer)
 
 
+@router.get("/layers")
+async def layers(
+    client: Caller, name: HullPath, count: LayerCount = 10, keys: WithKeys = False, min_revision: MinRevision = 0
+) -> schemas.Layers:
+    """The outermost convex layers: each is the hull of the points left without the vertices of those before. Exact."""
+    return schemas.Layers.model_validate(await client.layers(name, count, keys=keys, min_revision=min_revision))
+
+
+@router.get("/influence")
+async def influence(
+    client: Caller, name: HullPath, keys: WithKeys = False, min_revision: MinRevision = 0
+) -> schemas.Influence:
+    """The area that the hull would lose without each of its vertices."""
+    return schemas.Influence.model_validate(await client.influence(name, keys=keys, min_revision=min_revision))
+
+
 @router.get("/measures")
-async def get_measures(client: Caller, name: HullPath, min_revision: MinRevision = 0) -> schemas.AllMeasures:
+async def get_measures(
+    client: Caller, name: HullPath, layer: Layer = 1, min_revision: MinRevision = 0
+) -> schemas.AllMeasures:
     """All measures: also diameter, width, smallest boxes and smallest circle."""
-    return schemas.AllMeasures.model_validate(await client.get_measures(name, min_revision=min_revision))
+    return schemas.AllMeasures.model_validate(await client.get_measures(name, layer=layer, min_revision=min_revision))
 
 
 @router.get("/verification")

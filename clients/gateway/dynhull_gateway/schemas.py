@@ -445,6 +445,23 @@ class Sampled(Response):
     keys: list[str] | list[int] | None
 
 
+class Layers(Response):
+    """Convex layers, the outermost first: the vertices of each, and their keys if requested."""
+
+    revision: int
+    layers: list[Rows]
+    keys: list[Keys] | None
+
+
+class Influence(Response):
+    """The vertices of a hull, the area that it would lose without each, and their keys if requested."""
+
+    revision: int
+    vertices: Rows
+    areas: Numbers
+    keys: list[str] | list[int] | None
+
+
 class Separation(Response):
     """The distance or overlap of two hulls, and the line between them."""
 

@@ -54,6 +54,7 @@ from ._errors import (
 from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
 from ._hull_copy import HullCopy
 from ._ingest import Ingest
+from ._layers import Influence, Layers
 from ._messages import (
     Applied,
     Change,
@@ -129,11 +130,13 @@ __all__ = [
     "HullNotFoundError",
     "HullReplacedError",
     "HullUnsuitableError",
+    "Influence",
     "Ingest",
     "Ingested",
     "Inside",
     "InvalidRequestError",
     "KeyMissingError",
+    "Layers",
     "LimitExceededError",
     "Located",
     "Measured",

@@ -6,6 +6,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from . import _calls as calls
 from . import _fences as fences
+from . import _layers as peeling
 from . import _uses as uses
 from ._async_ingest import AsyncIngest
 from ._async_pipeline import AsyncPipeline
@@ -61,6 +62,8 @@ class AsyncHullClient(Client[AsyncConnection]):
     get_hull = _answering(calls.get_hull)
     sample_points = _answering(calls.sample_points)
     verify = _answering(calls.verify)
+    layers = _answering(peeling.layers)
+    influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 import grpc
 
 from . import _calls as calls
+from . import _layers as peeling
 from . import _uses as uses
 from ._errors import DynhullError, error_of
 from ._methods import answer_of, described, documented
@@ -66,6 +67,8 @@ class AsyncPipeline:
     sample_points = _asking(calls.sample_points)
     verify = _asking(calls.verify)
     last_sequence = _asking(calls.last_sequence)
+    layers = _asking(peeling.layers)
+    influence = _asking(peeling.influence)
     get_measures = _asking(uses.get_measures)
     separate = _asking(uses.separate)
     phase_diagram = _asking(uses.phase_diagram)

@@ -240,6 +240,14 @@ def _positive(argument: str, value: int | None) -> int:
     return value or 0
 
 
+def encode_layer(layer: int) -> int:
+    """A convex layer, from 1, in the form of a message."""
+    number = whole("layer", layer, bits=32)
+    if number < 1:
+        raise ValueError(f"layer must be at least 1, got {number}")
+    return number if number > 1 else 0
+
+
 def _as_wanted(existing: HullInfo, wanted: HullInfo) -> HullInfo:
     """The existing hull; HullExistsError if it has other settings than the one to create."""
     for setting in ("keyed", "window", "ordering", "geographic"):
@@ -451,6 +459,7 @@ def locate(
     keys: Any = None,
     keys_of: str = "",
     keys_min_revision: int = 0,
+    layer: int = 1,
     min_revision: int = 0,
     timeout: float | None = None,
 ) -> Call[Located]:
@@ -464,10 +473,11 @@ def locate(
         keys: or keys instead, whose positions are located; a missing one is on side -128.
         keys_of: the keyed hull that has the keys; by default the hull itself, at the same revision.
         keys_min_revision: a revision of that other hull to wait for.
+        layer: the convex layer to ask, as in `layers`; 1 is the hull itself. A layer without points is an empty hull.
         min_revision: a revision of the hull to wait for.
         timeout: seconds, instead of the client's.
     """
-    request = pb.LocateRequest(name=name, min_revision=min_revision)
+    request = pb.LocateRequest(name=name, min_revision=min_revision, layer=encode_layer(layer))
     _ask_about(request, xy, keys, keys_of, keys_min_revision)
 
     def decode(response: pb.LocateResponse) -> Located:
@@ -500,16 +510,25 @@ def count(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float
 
 
 def support(
-    name: str, directions: npt.ArrayLike, *, keys: bool = False, min_revision: int = 0, timeout: float | None = None
+    name: str,
+    directions: npt.ArrayLike,
+    *,
+    keys: bool = False,
+    layer: int = 1,
+    min_revision: int = 0,
+    timeout: float | None = None,
 ) -> Call[Supported]:
     """The extreme vertex in each of (n, 2) directions, which may have any length but 0. Exact.
 
     A direction of a geographic hull is east and north at its centre: (sin b, cos b) for a bearing b.
 
-    With `keys`, also the key of each vertex, in a keyed hull. HullEmptyError if the hull has no points.
+    With `keys`, also the key of each vertex, in a keyed hull. `layer` as for `locate`. HullEmptyError if the hull has
+    no points.
     """
     vectors = encoded(directions, "directions")
-    request = pb.SupportRequest(name=name, min_revision=min_revision, directions=vectors, include_keys=keys)
+    request = pb.SupportRequest(
+        name=name, min_revision=min_revision, directions=vectors, include_keys=keys, layer=encode_layer(layer)
+    )
 
     def decode(response: pb.SupportResponse) -> Supported:
         named = decode_names(response.keys) if keys else None
@@ -518,12 +537,16 @@ def support(
     return Call("Support", request, decode, timeout)
 
 
-def tangents(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Tangents]:
+def tangents(
+    name: str, xy: npt.ArrayLike, *, layer: int = 1, min_revision: int = 0, timeout: float | None = None
+) -> Call[Tangents]:
     """The left and right tangent points of each of (n, 2) points; NaN for points not strictly outside. Exact.
 
-    The points of a question about a geographic hull are within 85 degrees of its centre.
+    The points of a question about a geographic hull are within 85 degrees of its centre. `layer` as for `locate`.
     """
-    request = pb.TangentsRequest(name=name, min_revision=min_revision, points=encoded(xy, "xy"))
+    request = pb.TangentsRequest(
+        name=name, min_revision=min_revision, points=encoded(xy, "xy"), layer=encode_layer(layer)
+    )
 
     def decode(response: pb.TangentsResponse) -> Tangents:
         left, right = messages.decode_points(response.left), messages.decode_points(response.right)
@@ -539,6 +562,7 @@ def distance(
     keys: Any = None,
     keys_of: str = "",
     keys_min_revision: int = 0,
+    layer: int = 1,
     min_revision: int = 0,
     timeout: float | None = None,
 ) -> Call[Distances]:
@@ -548,7 +572,7 @@ def distance(
 
     Arguments as for `locate`; a missing key has the distance NaN.
     """
-    request = pb.DistanceRequest(name=name, min_revision=min_revision)
+    request = pb.DistanceRequest(name=name, min_revision=min_revision, layer=encode_layer(layer))
     _ask_about(request, xy, keys, keys_of, keys_min_revision)
 
     def decode(response: pb.DistanceResponse) -> Distances:
@@ -578,14 +602,25 @@ def _ask_about(
 
 
 def intersect_lines(
-    name: str, p: npt.ArrayLike, q: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None
+    name: str,
+    p: npt.ArrayLike,
+    q: npt.ArrayLike,
+    *,
+    layer: int = 1,
+    min_revision: int = 0,
+    timeout: float | None = None,
 ) -> Call[Crossings]:
     """The points where the line through each of (n, 2) p and q enters and leaves the hull; NaN if it misses.
 
-    Lines of a geographic hull are great circles, through places within 85 degrees of its centre.
+    Lines of a geographic hull are great circles, through places within 85 degrees of its centre. `layer` as for
+    `locate`.
     """
     request = pb.IntersectLinesRequest(
-        name=name, min_revision=min_revision, origins=encoded(p, "p"), targets=encoded(q, "q")
+        name=name,
+        min_revision=min_revision,
+        origins=encoded(p, "p"),
+        targets=encoded(q, "q"),
+        layer=encode_layer(layer),
     )
 
     def decode(response: pb.IntersectLinesResponse) -> Crossings:
@@ -595,9 +630,9 @@ def intersect_lines(
     return Call("IntersectLines", request, decode, timeout)
 
 
-def get_hull(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Hull]:
-    """The vertices with their keys, size, area, perimeter, centroid and bounds."""
-    request = pb.GetHullRequest(name=name, min_revision=min_revision, include_keys=True)
+def get_hull(name: str, *, layer: int = 1, min_revision: int = 0, timeout: float | None = None) -> Call[Hull]:
+    """The vertices with their keys, size, area, perimeter, centroid and bounds; `layer` as for `locate`."""
+    request = pb.GetHullRequest(name=name, min_revision=min_revision, include_keys=True, layer=encode_layer(layer))
     return Call("GetHull", request, messages.decode_hull, timeout)
 
 
@@ -783,6 +818,8 @@ def watch(
     directions: npt.ArrayLike | None = None,
     keys: bool = False,
     outline: bool = False,
+    layer: int = 1,
+    max_vertices: int | None = None,
     follow: bool = False,
     reconnect: bool = True,
     timeout: float | None = None,
@@ -809,10 +846,13 @@ def watch(
         keys: whether events name the vertices, in a keyed hull; `HullCopy.vertex_keys` then has their keys.
         outline: whether there are events only when the vertices change (or, with `keys`, their names), not for every
             revision. A Progress then says that they have not changed up to its revision.
+        layer: the convex layer to follow, as for `locate`. Its watch begins with a Snapshot after each lost connection.
+        max_vertices: send `Sketch` events with at most this many of the vertices, from 1 to 1000, and with how far the
+            hull reaches beyond them, for hulls too large to send. Not in a geographic hull.
         follow: whether the watch survives the deletion of the hull: it returns a `Deleted` event, and a Snapshot when
             there is a new hull of that name. It also waits for a hull that does not exist yet. Without it,
-            HullNotFoundError ends the watch. With `directions`, the watch notices only a deletion that happens while it
-            is connected.
+            HullNotFoundError ends the watch. With `directions`, `layer` or `max_vertices`, the watch notices only a
+            deletion that happens while it is connected.
         reconnect: whether the watch continues after a lost connection, however long that takes, with the changes since
             then, or with a snapshot if the server no longer has them. The first connection must succeed. Without it,
             UnavailableError ends the watch, as does RevisionForgottenError if the server cannot continue from a copy.
@@ -825,11 +865,13 @@ def watch(
         include_measures=measures,
         include_keys=keys,
         outline_only=outline,
+        layer=encode_layer(layer),
+        max_vertices=_positive("max_vertices", max_vertices),
     )
     if copy is not None and resume is not None:
         raise ValueError("give either copy, which the watch updates, or resume, which the caller updates, not both")
     held = copy if copy is not None and copy.uid else resume
-    if held is not None:
+    if held is not None and resumable(request):
         request.resume.uid, request.resume.revision = held.uid, held.revision
     if directions is not None:
         request.directions.CopyFrom(encoded(directions, "directions"))
@@ -839,6 +881,11 @@ def watch(
     if progress_interval is not None:
         request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
     return Watching(request, copy, follow, reconnect, timeout)
+
+
+def resumable(request: pb.WatchRequest) -> bool:
+    """Whether a watch may continue from what it has received, rather than begin anew."""
+    return not (request.HasField("directions") or request.layer or request.max_vertices)
 
 
 def encoded(xy: npt.ArrayLike, name: str) -> points_pb2.Points:

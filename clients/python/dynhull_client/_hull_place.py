@@ -7,7 +7,7 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._calls import Watching
+from ._calls import Watching, resumable
 from ._errors import DynhullError, HullNotFoundError, HullReplacedError, RevisionForgottenError
 from ._messages import Deleted, Event, Progress, Snapshot, decode_event
 from ._place import Place
@@ -38,9 +38,9 @@ class HullPlace(Place[Event]):
         if event is None:
             self._note(message)
             return ()
-        if isinstance(event, Snapshot):
+        if isinstance(event, Snapshot) and resumable(self.request):
             self.request.resume.uid = event.uid
-        if self.request.HasField("resume"):  # without one, each event is a whole sketch
+        if self.request.HasField("resume"):  # without one, each connection begins with the whole state
             self.request.resume.revision = event.revision
         if self._watching.copy is not None:
             self._watching.copy.update(event)

@@ -358,7 +358,11 @@ class Change(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sketch(Value):
-    """The extreme vertex in each requested direction, (k, 2), and its key; (0, 2) if the hull has no points."""
+    """The extreme vertex in each requested direction, (k, 2), or at most `max_vertices` of the vertices and keys.
+
+    `error` is how far the hull reaches beyond these vertices (Hausdorff's distance), the exact value rounded up; 0.0 in
+    a watch with directions. (0, 2) if the hull has no points.
+    """
 
     revision: int
     points: int
@@ -368,6 +372,7 @@ class Sketch(Value):
     cause: Cause = "batch"
     clock: datetime | None = None
     center: tuple[float, float] | None = None
+    error: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -592,7 +597,8 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
         return Snapshot(*head, decode_points(snapshot.vertices), measures, snapshot.uid, named, cause, clock, center)
     if message.HasField("sketch"):
         named = decode_names(message.sketch.keys) if keys else None
-        return Sketch(*head, decode_points(message.sketch.vertices), measures, named, cause, clock, center)
+        vertices, error = decode_points(message.sketch.vertices), message.sketch.error
+        return Sketch(*head, vertices, measures, named, cause, clock, center, error)
     if message.HasField("change"):
         change = message.change
         return Change(

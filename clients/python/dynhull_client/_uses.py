@@ -12,7 +12,7 @@ from dynhull._value import Value
 from dynhull.arrays import as_coordinate
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._calls import Call, encoded
+from ._calls import Call, encode_layer, encoded
 from ._messages import Measures, Points, decode_measures, decode_points
 
 if TYPE_CHECKING:
@@ -110,9 +110,12 @@ class Efficient(Value):
     sharpe_ratios: Doubles
 
 
-def get_measures(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Measured]:
-    """All measures: those of `get_hull`, and the diameter, width, smallest boxes and smallest circle."""
-    request = pb.GetMeasuresRequest(name=name, min_revision=min_revision)
+def get_measures(name: str, *, layer: int = 1, min_revision: int = 0, timeout: float | None = None) -> Call[Measured]:
+    """All measures: those of `get_hull`, and the diameter, width, smallest boxes and smallest circle.
+
+    `layer` as for `locate`.
+    """
+    request = pb.GetMeasuresRequest(name=name, min_revision=min_revision, layer=encode_layer(layer))
 
     def decode(response: pb.GetMeasuresResponse) -> Measured:
         return Measured(

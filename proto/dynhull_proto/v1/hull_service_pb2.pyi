@@ -243,20 +243,22 @@ class GetProducerResponse(_message.Message):
     def __init__(self, last_sequence: _Optional[int] = ...) -> None: ...
 
 class LocateRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     KEYS_OF_FIELD_NUMBER: _ClassVar[int]
     KEYS_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
     keys: _points_pb2.Keys
     keys_of: str
     keys_min_revision: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ...) -> None: ...
 
 class LocateResponse(_message.Message):
     __slots__ = ("revision", "sides", "keys_revision")
@@ -333,18 +335,20 @@ class ReadEntitiesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
 
 class SupportRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys")
+    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     directions: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
     include_keys: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ...) -> None: ...
 
 class SupportResponse(_message.Message):
     __slots__ = ("revision", "vertices", "keys")
@@ -357,16 +361,18 @@ class SupportResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class TangentsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "encoding")
+    __slots__ = ("name", "min_revision", "points", "encoding", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
 
 class TangentsResponse(_message.Message):
     __slots__ = ("revision", "left", "right")
@@ -379,20 +385,22 @@ class TangentsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class DistanceRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     KEYS_OF_FIELD_NUMBER: _ClassVar[int]
     KEYS_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
     keys: _points_pb2.Keys
     keys_of: str
     keys_min_revision: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ...) -> None: ...
 
 class DistanceResponse(_message.Message):
     __slots__ = ("revision", "distances", "keys_revision")
@@ -405,18 +413,20 @@ class DistanceResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class IntersectLinesRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "origins", "targets", "encoding")
+    __slots__ = ("name", "min_revision", "origins", "targets", "encoding", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ORIGINS_FIELD_NUMBER: _ClassVar[int]
     TARGETS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     origins: _points_pb2.Points
     targets: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
 
 class IntersectLinesResponse(_message.Message):
     __slots__ = ("revision", "entries", "exits")
@@ -429,18 +439,20 @@ class IntersectLinesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys")
+    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     VIEW_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     view: HullView
     include_keys: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
     __slots__ = ("hull", "vertices", "measures", "vertex_keys")
@@ -478,15 +490,67 @@ class SamplePointsResponse(_message.Message):
     keys: _points_pb2.Keys
     def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
-class GetMeasuresRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding")
+class GetLayersRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "layer_count", "encoding", "include_keys")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    LAYER_COUNT_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    layer_count: int
+    encoding: _points_pb2.PointEncoding
+    include_keys: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., layer_count: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
+
+class GetLayersResponse(_message.Message):
+    __slots__ = ("revision", "vertex_counts", "vertices", "vertex_keys")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_COUNTS_FIELD_NUMBER: _ClassVar[int]
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_KEYS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    vertex_counts: _containers.RepeatedScalarFieldContainer[int]
+    vertices: _points_pb2.Points
+    vertex_keys: _points_pb2.Keys
+    def __init__(self, revision: _Optional[int] = ..., vertex_counts: _Optional[_Iterable[int]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
+
+class GetInfluenceRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding", "include_keys")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    include_keys: bool
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
+
+class GetInfluenceResponse(_message.Message):
+    __slots__ = ("revision", "vertices", "areas", "vertex_keys")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    AREAS_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_KEYS_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    vertices: _points_pb2.Points
+    areas: _containers.RepeatedScalarFieldContainer[float]
+    vertex_keys: _points_pb2.Keys
+    def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., areas: _Optional[_Iterable[float]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
+
+class GetMeasuresRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding", "layer")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
 
 class GetMeasuresResponse(_message.Message):
     __slots__ = ("revision", "measures", "diameter", "width", "min_box", "min_perimeter_box", "min_circle_x", "min_circle_y", "min_circle_radius")
@@ -613,7 +677,7 @@ class QueryRequest(_message.Message):
     def __init__(self, reads: _Optional[_Iterable[_Union[Read, _Mapping]]] = ...) -> None: ...
 
 class Read(_message.Message):
-    __slots__ = ("locate", "count", "get_positions", "support", "tangents", "distance", "intersect_lines", "get_hull", "sample_points", "get_measures", "separate", "phase_diagram", "frontier", "verify", "get_producer")
+    __slots__ = ("locate", "count", "get_positions", "support", "tangents", "distance", "intersect_lines", "get_hull", "sample_points", "get_measures", "separate", "phase_diagram", "frontier", "verify", "get_producer", "get_layers", "get_influence")
     LOCATE_FIELD_NUMBER: _ClassVar[int]
     COUNT_FIELD_NUMBER: _ClassVar[int]
     GET_POSITIONS_FIELD_NUMBER: _ClassVar[int]
@@ -629,6 +693,8 @@ class Read(_message.Message):
     FRONTIER_FIELD_NUMBER: _ClassVar[int]
     VERIFY_FIELD_NUMBER: _ClassVar[int]
     GET_PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    GET_LAYERS_FIELD_NUMBER: _ClassVar[int]
+    GET_INFLUENCE_FIELD_NUMBER: _ClassVar[int]
     locate: LocateRequest
     count: CountRequest
     get_positions: GetPositionsRequest
@@ -644,7 +710,9 @@ class Read(_message.Message):
     frontier: FrontierRequest
     verify: VerifyRequest
     get_producer: GetProducerRequest
-    def __init__(self, locate: _Optional[_Union[LocateRequest, _Mapping]] = ..., count: _Optional[_Union[CountRequest, _Mapping]] = ..., get_positions: _Optional[_Union[GetPositionsRequest, _Mapping]] = ..., support: _Optional[_Union[SupportRequest, _Mapping]] = ..., tangents: _Optional[_Union[TangentsRequest, _Mapping]] = ..., distance: _Optional[_Union[DistanceRequest, _Mapping]] = ..., intersect_lines: _Optional[_Union[IntersectLinesRequest, _Mapping]] = ..., get_hull: _Optional[_Union[GetHullRequest, _Mapping]] = ..., sample_points: _Optional[_Union[SamplePointsRequest, _Mapping]] = ..., get_measures: _Optional[_Union[GetMeasuresRequest, _Mapping]] = ..., separate: _Optional[_Union[SeparateRequest, _Mapping]] = ..., phase_diagram: _Optional[_Union[PhaseDiagramRequest, _Mapping]] = ..., frontier: _Optional[_Union[FrontierRequest, _Mapping]] = ..., verify: _Optional[_Union[VerifyRequest, _Mapping]] = ..., get_producer: _Optional[_Union[GetProducerRequest, _Mapping]] = ...) -> None: ...
+    get_layers: GetLayersRequest
+    get_influence: GetInfluenceRequest
+    def __init__(self, locate: _Optional[_Union[LocateRequest, _Mapping]] = ..., count: _Optional[_Union[CountRequest, _Mapping]] = ..., get_positions: _Optional[_Union[GetPositionsRequest, _Mapping]] = ..., support: _Optional[_Union[SupportRequest, _Mapping]] = ..., tangents: _Optional[_Union[TangentsRequest, _Mapping]] = ..., distance: _Optional[_Union[DistanceRequest, _Mapping]] = ..., intersect_lines: _Optional[_Union[IntersectLinesRequest, _Mapping]] = ..., get_hull: _Optional[_Union[GetHullRequest, _Mapping]] = ..., sample_points: _Optional[_Union[SamplePointsRequest, _Mapping]] = ..., get_measures: _Optional[_Union[GetMeasuresRequest, _Mapping]] = ..., separate: _Optional[_Union[SeparateRequest, _Mapping]] = ..., phase_diagram: _Optional[_Union[PhaseDiagramRequest, _Mapping]] = ..., frontier: _Optional[_Union[FrontierRequest, _Mapping]] = ..., verify: _Optional[_Union[VerifyRequest, _Mapping]] = ..., get_producer: _Optional[_Union[GetProducerRequest, _Mapping]] = ..., get_layers: _Optional[_Union[GetLayersRequest, _Mapping]] = ..., get_influence: _Optional[_Union[GetInfluenceRequest, _Mapping]] = ...) -> None: ...
 
 class QueryResponse(_message.Message):
     __slots__ = ("answers",)
@@ -653,7 +721,7 @@ class QueryResponse(_message.Message):
     def __init__(self, answers: _Optional[_Iterable[_Union[ReadAnswer, _Mapping]]] = ...) -> None: ...
 
 class ReadAnswer(_message.Message):
-    __slots__ = ("error", "locate", "count", "get_positions", "support", "tangents", "distance", "intersect_lines", "get_hull", "sample_points", "get_measures", "separate", "phase_diagram", "frontier", "verify", "get_producer")
+    __slots__ = ("error", "locate", "count", "get_positions", "support", "tangents", "distance", "intersect_lines", "get_hull", "sample_points", "get_measures", "separate", "phase_diagram", "frontier", "verify", "get_producer", "get_layers", "get_influence")
     ERROR_FIELD_NUMBER: _ClassVar[int]
     LOCATE_FIELD_NUMBER: _ClassVar[int]
     COUNT_FIELD_NUMBER: _ClassVar[int]
@@ -670,6 +738,8 @@ class ReadAnswer(_message.Message):
     FRONTIER_FIELD_NUMBER: _ClassVar[int]
     VERIFY_FIELD_NUMBER: _ClassVar[int]
     GET_PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    GET_LAYERS_FIELD_NUMBER: _ClassVar[int]
+    GET_INFLUENCE_FIELD_NUMBER: _ClassVar[int]
     error: ReadError
     locate: LocateResponse
     count: CountResponse
@@ -686,7 +756,9 @@ class ReadAnswer(_message.Message):
     frontier: FrontierResponse
     verify: VerifyResponse
     get_producer: GetProducerResponse
-    def __init__(self, error: _Optional[_Union[ReadError, _Mapping]] = ..., locate: _Optional[_Union[LocateResponse, _Mapping]] = ..., count: _Optional[_Union[CountResponse, _Mapping]] = ..., get_positions: _Optional[_Union[GetPositionsResponse, _Mapping]] = ..., support: _Optional[_Union[SupportResponse, _Mapping]] = ..., tangents: _Optional[_Union[TangentsResponse, _Mapping]] = ..., distance: _Optional[_Union[DistanceResponse, _Mapping]] = ..., intersect_lines: _Optional[_Union[IntersectLinesResponse, _Mapping]] = ..., get_hull: _Optional[_Union[GetHullResponse, _Mapping]] = ..., sample_points: _Optional[_Union[SamplePointsResponse, _Mapping]] = ..., get_measures: _Optional[_Union[GetMeasuresResponse, _Mapping]] = ..., separate: _Optional[_Union[SeparateResponse, _Mapping]] = ..., phase_diagram: _Optional[_Union[PhaseDiagramResponse, _Mapping]] = ..., frontier: _Optional[_Union[FrontierResponse, _Mapping]] = ..., verify: _Optional[_Union[VerifyResponse, _Mapping]] = ..., get_producer: _Optional[_Union[GetProducerResponse, _Mapping]] = ...) -> None: ...
+    get_layers: GetLayersResponse
+    get_influence: GetInfluenceResponse
+    def __init__(self, error: _Optional[_Union[ReadError, _Mapping]] = ..., locate: _Optional[_Union[LocateResponse, _Mapping]] = ..., count: _Optional[_Union[CountResponse, _Mapping]] = ..., get_positions: _Optional[_Union[GetPositionsResponse, _Mapping]] = ..., support: _Optional[_Union[SupportResponse, _Mapping]] = ..., tangents: _Optional[_Union[TangentsResponse, _Mapping]] = ..., distance: _Optional[_Union[DistanceResponse, _Mapping]] = ..., intersect_lines: _Optional[_Union[IntersectLinesResponse, _Mapping]] = ..., get_hull: _Optional[_Union[GetHullResponse, _Mapping]] = ..., sample_points: _Optional[_Union[SamplePointsResponse, _Mapping]] = ..., get_measures: _Optional[_Union[GetMeasuresResponse, _Mapping]] = ..., separate: _Optional[_Union[SeparateResponse, _Mapping]] = ..., phase_diagram: _Optional[_Union[PhaseDiagramResponse, _Mapping]] = ..., frontier: _Optional[_Union[FrontierResponse, _Mapping]] = ..., verify: _Optional[_Union[VerifyResponse, _Mapping]] = ..., get_producer: _Optional[_Union[GetProducerResponse, _Mapping]] = ..., get_layers: _Optional[_Union[GetLayersResponse, _Mapping]] = ..., get_influence: _Optional[_Union[GetInfluenceResponse, _Mapping]] = ...) -> None: ...
 
 class ReadError(_message.Message):
     __slots__ = ("code", "message", "details")
@@ -699,7 +771,7 @@ class ReadError(_message.Message):
     def __init__(self, code: _Optional[int] = ..., message: _Optional[str] = ..., details: _Optional[_Iterable[_Union[_any_pb2.Any, _Mapping]]] = ...) -> None: ...
 
 class WatchRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys", "outline_only")
+    __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys", "outline_only", "layer", "max_vertices")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -710,6 +782,8 @@ class WatchRequest(_message.Message):
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     OUTLINE_ONLY_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
+    MAX_VERTICES_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
@@ -720,7 +794,9 @@ class WatchRequest(_message.Message):
     directions: _points_pb2.Points
     include_keys: bool
     outline_only: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., include_keys: bool = ..., outline_only: bool = ...) -> None: ...
+    layer: int
+    max_vertices: int
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., include_keys: bool = ..., outline_only: bool = ..., layer: _Optional[int] = ..., max_vertices: _Optional[int] = ...) -> None: ...
 
 class WatchResume(_message.Message):
     __slots__ = ("uid", "revision")
@@ -765,12 +841,14 @@ class HullSnapshot(_message.Message):
     def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., uid: _Optional[str] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class HullSketch(_message.Message):
-    __slots__ = ("vertices", "keys")
+    __slots__ = ("vertices", "keys", "error")
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
+    ERROR_FIELD_NUMBER: _ClassVar[int]
     vertices: _points_pb2.Points
     keys: _points_pb2.Keys
-    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
+    error: float
+    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., error: _Optional[float] = ...) -> None: ...
 
 class HullChange(_message.Message):
     __slots__ = ("removed", "removed_indices", "added", "added_indices", "rotation", "added_keys", "renamed_indices", "renamed_keys")

@@ -159,6 +159,16 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.FromString,
                 _registered_method=True)
+        self.GetLayers = channel.unary_unary(
+                '/dynhull.v1.HullService/GetLayers',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetLayersRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetLayersResponse.FromString,
+                _registered_method=True)
+        self.GetInfluence = channel.unary_unary(
+                '/dynhull.v1.HullService/GetInfluence',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetInfluenceRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetInfluenceResponse.FromString,
+                _registered_method=True)
         self.GetMeasures = channel.unary_unary(
                 '/dynhull.v1.HullService/GetMeasures',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetMeasuresRequest.SerializeToString,
@@ -374,6 +384,23 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetLayers(self, request, context):
+        """Returns the outermost convex layers of the points. Layer 1 is the hull; layer i + 1 is the hull of the points left when
+        all points at the vertices of layers 1 to i are taken out. Exact. RESOURCE_EXHAUSTED for layers with more than 1 000 000
+        vertices together. Writes to the hull continue.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def GetInfluence(self, request, context):
+        """Returns the area that the hull would lose without each of its vertices (all points there): who stretches the hull.
+        RESOURCE_EXHAUSTED for a hull with more than 100 000 vertices. Writes to the hull continue.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def GetMeasures(self, request, context):
         """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners.
         """
@@ -537,6 +564,16 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.SamplePoints,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.SerializeToString,
+            ),
+            'GetLayers': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetLayers,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetLayersRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetLayersResponse.SerializeToString,
+            ),
+            'GetInfluence': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetInfluence,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetInfluenceRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.GetInfluenceResponse.SerializeToString,
             ),
             'GetMeasures': grpc.unary_unary_rpc_method_handler(
                     servicer.GetMeasures,
@@ -1117,6 +1154,60 @@ class HullService(object):
             '/dynhull.v1.HullService/SamplePoints',
             dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.SamplePointsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetLayers(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/GetLayers',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetLayersRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetLayersResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetInfluence(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/GetInfluence',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetInfluenceRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.GetInfluenceResponse.FromString,
             options,
             channel_credentials,
             insecure,

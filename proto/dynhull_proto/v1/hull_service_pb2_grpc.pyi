@@ -121,6 +121,15 @@ class HullServiceStub:
     """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
     coordinates have the smallest hashes.
     """
+    GetLayers: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetLayersRequest, _hull_service_pb2.GetLayersResponse]
+    """Returns the outermost convex layers of the points. Layer 1 is the hull; layer i + 1 is the hull of the points left when
+    all points at the vertices of layers 1 to i are taken out. Exact. RESOURCE_EXHAUSTED for layers with more than 1 000 000
+    vertices together. Writes to the hull continue.
+    """
+    GetInfluence: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetInfluenceRequest, _hull_service_pb2.GetInfluenceResponse]
+    """Returns the area that the hull would lose without each of its vertices (all points there): who stretches the hull.
+    RESOURCE_EXHAUSTED for a hull with more than 100 000 vertices. Writes to the hull continue.
+    """
     GetMeasures: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]
     """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
     Separate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]
@@ -251,6 +260,15 @@ class HullServiceAsyncStub(HullServiceStub):
     SamplePoints: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SamplePointsRequest, _hull_service_pb2.SamplePointsResponse]  # type: ignore[assignment]
     """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
     coordinates have the smallest hashes.
+    """
+    GetLayers: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetLayersRequest, _hull_service_pb2.GetLayersResponse]  # type: ignore[assignment]
+    """Returns the outermost convex layers of the points. Layer 1 is the hull; layer i + 1 is the hull of the points left when
+    all points at the vertices of layers 1 to i are taken out. Exact. RESOURCE_EXHAUSTED for layers with more than 1 000 000
+    vertices together. Writes to the hull continue.
+    """
+    GetInfluence: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetInfluenceRequest, _hull_service_pb2.GetInfluenceResponse]  # type: ignore[assignment]
+    """Returns the area that the hull would lose without each of its vertices (all points there): who stretches the hull.
+    RESOURCE_EXHAUSTED for a hull with more than 100 000 vertices. Writes to the hull continue.
     """
     GetMeasures: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]  # type: ignore[assignment]
     """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
@@ -493,6 +511,27 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_hull_service_pb2.SamplePointsResponse, _abc.Awaitable[_hull_service_pb2.SamplePointsResponse]]:
         """Returns a sample of the points, for drawing. Samples of similar point sets are similar: a sample has the points whose
         coordinates have the smallest hashes.
+        """
+
+    @_abc_1.abstractmethod
+    def GetLayers(
+        self,
+        request: _hull_service_pb2.GetLayersRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetLayersResponse, _abc.Awaitable[_hull_service_pb2.GetLayersResponse]]:
+        """Returns the outermost convex layers of the points. Layer 1 is the hull; layer i + 1 is the hull of the points left when
+        all points at the vertices of layers 1 to i are taken out. Exact. RESOURCE_EXHAUSTED for layers with more than 1 000 000
+        vertices together. Writes to the hull continue.
+        """
+
+    @_abc_1.abstractmethod
+    def GetInfluence(
+        self,
+        request: _hull_service_pb2.GetInfluenceRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetInfluenceResponse, _abc.Awaitable[_hull_service_pb2.GetInfluenceResponse]]:
+        """Returns the area that the hull would lose without each of its vertices (all points there): who stretches the hull.
+        RESOURCE_EXHAUSTED for a hull with more than 100 000 vertices. Writes to the hull continue.
         """
 
     @_abc_1.abstractmethod

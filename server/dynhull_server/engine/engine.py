@@ -45,6 +45,7 @@ from .fence_keeping import FenceKeeping
 from .fences import Fences
 from .group_commit import GroupCommit
 from .housekeeping import Housekeeping
+from .layers import COPIES
 from .live_hull import LiveHull
 from .recalls import Recalls
 from .server_time import ServerTime
@@ -99,6 +100,7 @@ class Engine:
 
     Attributes:
         fences: the fences.
+        copies: limits the copies of hulls that large reads make.
     """
 
     def __init__(self, limits: Limits, storage: Storage, supervisor: Supervisor, machine: Machine) -> None:
@@ -108,6 +110,7 @@ class Engine:
         self._machine = machine
         self._core = Core(limits)
         self.fences = Fences(self, storage)
+        self.copies = asyncio.Semaphore(COPIES)
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
         self._calls: deque[Callable[[], None]] = deque()

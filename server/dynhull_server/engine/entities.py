@@ -19,6 +19,7 @@ from ..state.numbers import rows_of
 from ..state.outline import Outline
 from ..state.records import Contents, Keys
 from ..state.sample import sample_rows
+from .layers import layer_of
 from .live_hull import LiveHull
 from .steps import BLOCK, Run, in_blocks
 
@@ -59,19 +60,27 @@ async def entities(hull: LiveHull, min_revision: int) -> tuple[Counts, Contents]
 
 
 async def ask_of_keys(
-    hull: LiveHull, min_revision: int, owner: LiveHull, owner_min_revision: int, keys: Keys, question: Question
+    hull: LiveHull,
+    min_revision: int,
+    owner: LiveHull,
+    owner_min_revision: int,
+    keys: Keys,
+    question: Question,
+    layer: int = 1,
 ) -> KeyAnswers:
-    """Ask a hull about the positions of keys that it has itself, or another one."""
+    """Ask a hull, or one of its convex layers, about the positions of keys that it has itself, or another one."""
     owner.require_frame_of(hull, "keys_of")
 
     def ask(state: HullState, keyed: HullState) -> tuple[Found, npt.NDArray[Any] | None, Points]:
         found = _keyed(keyed).find(keys)
+        if layer > 1:
+            return found, None, layer_of(state, layer)
         if len(keys) > BLOCK or hull.geographic:
             return found, None, state.vertices()
         return found, question(state.outline(), _known(found)), NO_POINTS
 
     counts, owner_counts, (found, answers, vertices) = await hull.read_beside(
-        owner, ask, len(keys), min_revision, owner_min_revision
+        owner, ask, len(keys) if layer == 1 else max(len(keys), BLOCK), min_revision, owner_min_revision
     )
     if answers is None:
         xy = _known(found)
@@ -85,7 +94,7 @@ def _known(found: Found) -> Checked:
 
 
 async def support(
-    hull: LiveHull, directions: Checked, min_revision: int, run: Run
+    hull: LiveHull, directions: Checked, min_revision: int, run: Run, layer: int = 1
 ) -> tuple[Counts, Points, VertexKeys]:
     """The extreme vertices of a keyed hull and their keys, or raise HullEmptyError."""
 
@@ -95,12 +104,10 @@ async def support(
         vertices = state.outline().support(directions)
         return vertices, state.keys_at(vertices)
 
-    if len(directions) <= BLOCK:
+    if len(directions) <= BLOCK and layer == 1:
         counts, (extremes, keys) = await hull.read(extreme, len(directions), min_revision)
         return counts, extremes, keys
-    counts, (vertices, vertex_keys) = await hull.read(
-        lambda state: (state.vertices(), state.vertex_keys()), hull.vertex_count, min_revision
-    )
+    counts, vertices, vertex_keys = await hull.named_vertices(min_revision, layer)
     if not len(vertices):
         raise HullEmptyError(hull.name)
     outline = await hull.outline(counts, vertices)

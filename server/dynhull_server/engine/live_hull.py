@@ -29,12 +29,13 @@ from ..state.events import ReadHull, ReadTogether, Recenter
 from ..state.fences.fence import Fence
 from ..state.fences.recomputing import Sides, sides_of
 from ..state.hull import Hull
-from ..state.hull_state import Counts, HullState
+from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.outline import GlobeOutline, Outline
 from ..state.records import Center, HullSettings, Keys
 from ..state.sample import sample
 from .difference import Differences
 from .fence_verification import MOST_FAULTS, verify_events, verify_sides
+from .layers import Peeling
 from .recalls import Recalls
 from .steps import BLOCK, FEW_ROWS, at_once, in_blocks
 from .verification import Verification, verify
@@ -56,10 +57,12 @@ class LiveHull:
 
     Attributes:
         differences: the differences between its vertices at successive reads.
+        peeling: its convex layers.
     """
 
     def __init__(self, engine: "Engine", hull: Hull, recalls: Recalls) -> None:
         self.differences = Differences(engine.aside)
+        self.peeling = Peeling(self, engine.aside, engine.copies)
         self._engine = engine
         self._hull = hull
         self._recalls = recalls
@@ -122,10 +125,11 @@ class LiveHull:
         """Whether the points are places on the globe."""
         return self.settings.geographic
 
-    def require_plane(self) -> None:
-        """Raise HullUnsuitableError if the points are places on the globe."""
+    def require_plane(self, field: str = "") -> None:
+        """Raise HullUnsuitableError if the points are places on the globe; `field` is that of the request."""
         if self.geographic:
-            raise HullUnsuitableError(self.name, "is geographic, and this question is about points of a plane")
+            reason = "is geographic, and this question is about points of a plane"
+            raise HullUnsuitableError(self.name, reason, field=field)
 
     def require_frame_of(self, other: "LiveHull", field: str) -> None:
         """Raise HullUnsuitableError if one hull is geographic, and the other one is not; `field` names this one."""
@@ -184,9 +188,24 @@ class LiveHull:
             if counts.revision >= min_revision and other_counts.revision >= other_min_revision:
                 return counts, other_counts, result
 
-    async def vertices(self, min_revision: int = 0) -> tuple[Counts, Points]:
-        """The vertices; the same array object while the hull has not changed."""
+    async def vertices(self, min_revision: int = 0, layer: int = 1) -> tuple[Counts, Points]:
+        """The vertices, or those of another convex layer; the same array object while they have not changed."""
+        if layer > 1:
+            peeled = await self.peeling.layers(layer, min_revision)
+            return peeled.counts, peeled.layer(layer)[0]
         return await self.read(HullState.vertices, self.vertex_count // 2, min_revision)
+
+    async def named_vertices(self, min_revision: int = 0, layer: int = 1) -> tuple[Counts, Points, VertexKeys]:
+        """As `vertices`, with the keys of a keyed hull."""
+        if layer > 1:
+            peeled = await self.peeling.layers(layer, min_revision)
+            vertices, named = peeled.layer(layer)
+            assert named is not None  # the hull is keyed
+            return peeled.counts, vertices, named
+        counts, (vertices, keys) = await self.read(
+            lambda state: (state.vertices(), state.vertex_keys()), self.vertex_count, min_revision
+        )
+        return counts, vertices, keys
 
     async def ask_rows(
         self,
@@ -194,6 +213,7 @@ class LiveHull:
         rows: int,
         min_revision: int = 0,
         *,
+        layer: int = 1,
         check: Callable[[Center], None] | None = None,
     ) -> tuple[Counts, T]:
         """Answer a query about many rows that depends only on the vertices.
@@ -202,14 +222,15 @@ class LiveHull:
             question: called with a hull of these vertices and a slice of the rows, once or several times.
             rows: the number of rows.
             min_revision: the least revision of the hull.
+            layer: the convex layer to ask.
             check: called with the centre of a geographic hull that has one; raises an error to refuse the query.
 
         Returns:
             The counts at the revision that answered, and an array of the answers.
         """
-        if rows <= BLOCK and not self.geographic:  # delays later writes by some milliseconds only
+        if rows <= BLOCK and layer == 1 and not self.geographic:  # delays later writes by some milliseconds only
             return await self.read(lambda state: question(state.outline(), slice(0, rows)), rows, min_revision)
-        counts, vertices = await self.vertices(min_revision)
+        counts, vertices = await self.vertices(min_revision, layer)
         if check is not None and counts.center is not None:
             await (at_once if rows <= FEW_ROWS else self._engine.aside)(partial(check, counts.center))
         return counts, await self.ask_vertices(counts, vertices, question, rows)
@@ -224,6 +245,13 @@ class LiveHull:
         answers: T = await in_blocks(run, partial(question, outline), rows, block)
         return answers
 
+    async def sketch(self, counts: Counts, vertices: Points, most: int) -> tuple[Points, float]:
+        """At most `most` of these vertices, and how far the hull reaches beyond them. The hull is a plane."""
+        outline = await self.outline(counts, vertices)
+        assert isinstance(outline, DynamicHull)  # of the plane
+        found: tuple[Points, float] = await self._engine.aside(partial(outline.sketch, most))
+        return found
+
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
         """The multiplicity of each of some points."""
         if len(xy) <= BLOCK:
@@ -232,7 +260,7 @@ class LiveHull:
         hull: DynamicHull = await self._engine.aside(partial(DynamicHull, stored))
         return counts, await in_blocks(self._engine.aside, lambda rows: hull.count_many(xy[rows]), len(xy))
 
-    async def support(self, directions: Checked, min_revision: int = 0) -> tuple[Counts, Points]:
+    async def support(self, directions: Checked, min_revision: int = 0, layer: int = 1) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
 
         def extreme(hull: Outline, block: slice) -> Points:
@@ -240,7 +268,7 @@ class LiveHull:
                 raise HullEmptyError(self.name)
             return hull.support(directions[block])
 
-        return await self.ask_rows(extreme, len(directions), min_revision)
+        return await self.ask_rows(extreme, len(directions), min_revision, layer=layer)
 
     async def verify(
         self, min_revision: int = 0, prefixes: tuple[str, ...] = ("",), *, events: bool = True

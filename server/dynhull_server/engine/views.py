@@ -7,7 +7,9 @@ import numpy as np
 
 from dynhull.arrays import Points
 
+from ..state.contents.places import GeographicHull
 from ..state.hull_state import Counts, HullState, VertexKeys
+from ..state.numbers import rows_of
 from .difference import Difference
 from .live_hull import LiveHull
 
@@ -38,12 +40,16 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """The extreme vertices, one per direction, their keys if requested, and all vertices for requested measures."""
+    """Some vertices, their keys if requested, and all vertices for requested measures.
+
+    `error` is how far the hull reaches beyond them; 0 for extreme vertices, one per direction.
+    """
 
     counts: Counts
     extremes: Points
     vertices: Points | None
     keys: VertexKeys | None = None
+    error: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +75,13 @@ class View(Protocol):
         """Wait until the part of the hull may have changed after a revision."""
 
 
-async def _changed(hull: LiveHull, revision: int, *, keys: bool) -> None:
-    if keys:  # vertices may have other keys
+# A sketch of this many vertices takes some milliseconds, so it is made between two writes. A vertex of it takes as long
+# as locating this many rows.
+FEW_VERTICES, ROWS_A_VERTEX = 64, 64
+
+
+async def _changed(hull: LiveHull, revision: int, *, any_point: bool) -> None:
+    if any_point:  # vertices may have other keys, and inner layers other vertices
         await hull.reached(revision + 1)
     else:
         await hull.outlined(revision)
@@ -82,21 +93,20 @@ class VerticesView:
     Args:
         hull: the hull.
         keys: whether to include the keys of the vertices, in a keyed hull.
+        layer: the convex layer.
     """
 
-    def __init__(self, hull: LiveHull, *, keys: bool = False) -> None:
+    def __init__(self, hull: LiveHull, *, keys: bool = False, layer: int = 1) -> None:
         self._hull = hull
         self._with_keys = keys
+        self._layer = layer
         self._held = np.empty((0, 2))
         self._held_keys: VertexKeys | None = None
 
     async def _look(self, min_revision: int = 0) -> tuple[Counts, Points, VertexKeys | None]:
-        if not self._with_keys:
-            return *await self._hull.vertices(min_revision), None
-        counts, (vertices, keys) = await self._hull.read(
-            lambda state: (state.vertices(), state.vertex_keys()), self._hull.vertex_count, min_revision
-        )
-        return counts, vertices, keys
+        if self._with_keys:
+            return await self._hull.named_vertices(min_revision, self._layer)
+        return *await self._hull.vertices(min_revision, self._layer), None
 
     async def first(self, min_revision: int) -> Event:
         """A snapshot."""
@@ -114,8 +124,8 @@ class VerticesView:
         return Change(counts, held[change.removed], vertices, change, keys) if change else Progress(counts)
 
     async def changed(self, revision: int) -> None:
-        """Wait until the vertices, or with keys the hull, may have changed."""
-        await _changed(self._hull, revision, keys=self._with_keys)
+        """Wait until the vertices, or with keys or in an inner layer the hull, may have changed."""
+        await _changed(self._hull, revision, any_point=self._with_keys or self._layer > 1)
 
 
 class ResumedView(VerticesView):
@@ -189,7 +199,69 @@ class SketchView:
 
     async def changed(self, revision: int) -> None:
         """Wait until the vertices, or with keys the hull, may have changed."""
-        await _changed(self._hull, revision, keys=self._with_keys)
+        await _changed(self._hull, revision, any_point=self._with_keys)
+
+
+class FewView:
+    """At most `most` of the vertices, and how far the hull reaches beyond them; each event has all of them.
+
+    Args:
+        hull: the hull, which is a plane.
+        most: the number of vertices.
+        vertices: whether to include all vertices.
+        keys: whether to include the keys of the vertices, in a keyed hull.
+        layer: the convex layer.
+    """
+
+    def __init__(self, hull: LiveHull, most: int, *, vertices: bool, keys: bool, layer: int) -> None:
+        self._hull = hull
+        self._most = most
+        self._with_vertices = vertices
+        self._with_keys = keys
+        self._layer = layer
+        self._held: _Looked = np.empty((0, 2)), None, None
+        self._error = 0.0
+
+    def _look(self, state: HullState) -> tuple[_Looked, float]:
+        """A sketch of the hull itself."""
+        assert not isinstance(state.hull, GeographicHull)  # it is a plane
+        chosen, error = state.hull.sketch(self._most)
+        vertices = state.vertices() if self._with_vertices else None
+        return (chosen, vertices, state.keys_at(chosen) if self._with_keys else None), error
+
+    async def _look_aside(self, min_revision: int) -> tuple[Counts, tuple[_Looked, float]]:
+        """A sketch of the vertices of the layer, made outside of the trips."""
+        keys = None
+        if self._with_keys:
+            counts, vertices, keys = await self._hull.named_vertices(min_revision, self._layer)
+        else:
+            counts, vertices = await self._hull.vertices(min_revision, self._layer)
+        chosen, error = await self._hull.sketch(counts, vertices, self._most)
+        named = None if keys is None else keys[rows_of(chosen, vertices)]
+        return counts, ((chosen, vertices if self._with_vertices else None, named), error)
+
+    async def _sketch(self, min_revision: int = 0) -> Sketch:
+        if self._layer > 1 or self._most > FEW_VERTICES:
+            counts, (self._held, self._error) = await self._look_aside(min_revision)
+        else:
+            rows = self._most * ROWS_A_VERTEX + (self._hull.vertex_count if self._with_vertices else 0)
+            counts, (self._held, self._error) = await self._hull.read(self._look, rows, min_revision)
+        return Sketch(counts, *self._held, error=self._error)
+
+    async def first(self, min_revision: int) -> Event:
+        """A sketch."""
+        return await self._sketch(min_revision)
+
+    async def next(self) -> Event:
+        """A sketch, if it has changed."""
+        before, error = self._held, self._error
+        sketch = await self._sketch()
+        same = self._error == error and all(map(_same, before, self._held))
+        return Progress(sketch.counts) if same else sketch
+
+    async def changed(self, revision: int) -> None:
+        """Wait until the vertices, or with keys or in an inner layer the hull, may have changed."""
+        await _changed(self._hull, revision, any_point=self._with_keys or self._layer > 1)
 
 
 def _same(a: Points | VertexKeys | None, b: Points | VertexKeys | None) -> bool:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 
+from ..engine.layers import MOST_LAYERS
 from ..state.frames import off_globe
 from .readings import Reading
 
@@ -22,6 +23,7 @@ DEFAULT_PAGE = 100
 LARGEST_PAGE = 1000
 DEFAULT_SAMPLE = 1000
 LARGEST_SAMPLE = 100_000
+LARGEST_SKETCH = 1000
 LONGEST_INTERVAL = 24 * 3600
 BYTES_PER_POINT = 16
 LARGEST_INTEGER = 2**63 - 1
@@ -214,6 +216,32 @@ def decode_view(view: hull_service_pb2.HullView) -> bool:
     if view not in hull_service_pb2.HullView.values():
         raise InvalidFieldError("view", view, "not a view that this server supports")
     return view != hull_service_pb2.HULL_VIEW_BASIC
+
+
+def decode_layer(request: Any) -> int:
+    """The number of the convex layer that a request is about, from 1."""
+    if request.layer > MOST_LAYERS:
+        raise InvalidFieldError("layer", request.layer, f"must be at most {MOST_LAYERS}")
+    return int(request.layer) or 1
+
+
+def decode_layer_count(count: int) -> int:
+    """A number of convex layers."""
+    if not 1 <= count <= MOST_LAYERS:
+        raise InvalidFieldError("layer_count", count, f"must be from 1 to {MOST_LAYERS}")
+    return count
+
+
+def decode_max_vertices(request: hull_service_pb2.WatchRequest) -> int:
+    """The most vertices of a sketch, 0 for all vertices."""
+    if request.max_vertices > LARGEST_SKETCH:
+        raise InvalidFieldError("max_vertices", request.max_vertices, f"must be at most {LARGEST_SKETCH}")
+    for field in ("layer", "max_vertices"):
+        for other in ("directions", "resume"):
+            if getattr(request, field) and request.HasField(other):
+                problem = f"cannot be combined with {other}"
+                raise InvalidFieldError(field, getattr(request, field), problem)
+    return request.max_vertices
 
 
 def decode_sample_size(size: int) -> int:

@@ -10,11 +10,12 @@ from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
+from ..engine.layers import Layers
 from ..engine.live_hull import LiveHull
 from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
-from ..state.batch import Applied
+from ..state.batch import NO_POINTS, Applied
 from ..state.contents.keyed import Found
 from ..state.fences.faults import FenceFault
 from ..state.hull_state import Cause, Counts, VertexKeys
@@ -225,6 +226,7 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
             message.progress.SetInParent()
         case _:
             message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
+            message.sketch.error = event.error
             if event.keys is not None:
                 message.sketch.keys.CopyFrom(encode_key_array(event.keys, encoding))
     return message
@@ -258,6 +260,23 @@ def _rows(event: Event) -> int:
             return 0
         case _:
             return len(event.extremes)
+
+
+def encode_layers(
+    peeled: Layers, encoding: points_pb2.PointEncoding, *, keys: bool
+) -> hull_service_pb2.GetLayersResponse:
+    """Convex layers, and with `keys` those of their vertices if the hull is keyed."""
+    named = peeled.keys if keys else None
+    return hull_service_pb2.GetLayersResponse(
+        revision=peeled.counts.revision,
+        vertex_counts=map(len, peeled.layers),
+        vertices=encode_points(np.concatenate([NO_POINTS, *peeled.layers]), encoding),
+        vertex_keys=None if named is None else encode_key_array(_joined(named), encoding),
+    )
+
+
+def _joined(keys: list[VertexKeys]) -> VertexKeys:
+    return np.concatenate(keys) if keys else np.empty(0, object)
 
 
 def encode_verification(

@@ -16,7 +16,7 @@ from ..engine.engine import Engine
 from ..engine.entities import KeyAnswers, Question
 from ..engine.live_hull import LiveHull
 from ..engine.steps import FEW_ROWS, Run, at_once
-from ..engine.views import ResumedView, SketchView, VerticesView, View
+from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..state.errors import HullEmptyError
 from ..state.frames import require_lines, require_reach
@@ -174,7 +174,9 @@ class HullService:
                 revision=found.counts.revision, sides=found.rows.tobytes(), keys_revision=_keys_revision(found)
             )
         xy = _places(hull, request.points)
-        counts, sides = await hull.ask_rows(lambda live, rows: live.locate(xy[rows]), len(xy), request.min_revision)
+        counts, sides = await hull.ask_rows(
+            lambda live, rows: live.locate(xy[rows]), len(xy), request.min_revision, layer=decode.decode_layer(request)
+        )
         return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
 
     async def Count(self, request: pb.CountRequest, call: Call) -> pb.CountResponse:
@@ -207,12 +209,14 @@ class HullService:
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        directions = Checked(decode.decode_directions(request.directions))
+        directions, layer = Checked(decode.decode_directions(request.directions)), decode.decode_layer(request)
         if not request.include_keys:
-            counts, extremes = await hull.support(directions, request.min_revision)
+            counts, extremes = await hull.support(directions, request.min_revision, layer)
             return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
         hull.require_keys("include_keys")
-        counts, extremes, keys = await entities.support(hull, directions, request.min_revision, self._engine.aside)
+        counts, extremes, keys = await entities.support(
+            hull, directions, request.min_revision, self._engine.aside, layer
+        )
         return pb.SupportResponse(
             revision=counts.revision,
             vertices=encode.encode_points(extremes, encoding),
@@ -227,6 +231,7 @@ class HullService:
             lambda live, rows: live.tangents(xy[rows]),
             len(xy),
             request.min_revision,
+            layer=decode.decode_layer(request),
             check=lambda center: require_reach(center, "points", xy.points),
         )
         return pb.TangentsResponse(
@@ -245,7 +250,10 @@ class HullService:
             )
         xy = _places(hull, request.points)
         counts, distances = await hull.ask_rows(
-            lambda live, rows: live.distance(xy[rows]), len(xy), request.min_revision
+            lambda live, rows: live.distance(xy[rows]),
+            len(xy),
+            request.min_revision,
+            layer=decode.decode_layer(request),
         )
         return pb.DistanceResponse(revision=counts.revision, distances=distances)
 
@@ -260,6 +268,7 @@ class HullService:
             lambda live, rows: live.intersect_lines(p[rows], q[rows]),
             len(p),
             request.min_revision,
+            layer=decode.decode_layer(request),
             check=lambda center: require_lines(center, p.points, q.points),
         )
         return pb.IntersectLinesResponse(
@@ -270,17 +279,15 @@ class HullService:
 
     async def GetHull(self, request: pb.GetHullRequest, call: Call) -> pb.GetHullResponse:
         hull = self._read(call, request.name)
-        encoding = decode.decode_encoding(request.encoding)
+        encoding, layer = decode.decode_encoding(request.encoding), decode.decode_layer(request)
         if not decode.decode_view(request.view):
             await hull.reached(request.min_revision)
             return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
         keys = None
         if request.include_keys and hull.keyed:
-            counts, (vertices, keys) = await hull.read(
-                lambda state: (state.vertices(), state.vertex_keys()), hull.vertex_count, request.min_revision
-            )
+            counts, vertices, keys = await hull.named_vertices(request.min_revision, layer)
         else:
-            counts, vertices = await hull.vertices(request.min_revision)
+            counts, vertices = await hull.vertices(request.min_revision, layer)
         measures = await encode.encode_measures(vertices, self._run(len(vertices)), geographic=hull.geographic)
         return pb.GetHullResponse(
             hull=encode.encode_hull(hull, counts),
@@ -289,10 +296,33 @@ class HullService:
             vertex_keys=None if keys is None else encode.encode_key_array(keys, encoding),
         )
 
+    async def GetLayers(self, request: pb.GetLayersRequest, call: Call) -> pb.GetLayersResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        count = decode.decode_layer_count(request.layer_count)
+        peeled = await hull.peeling.layers(count, request.min_revision)
+        run = self._run(peeled.vertex_count)
+        response: pb.GetLayersResponse = await run(
+            partial(encode.encode_layers, peeled, encoding, keys=request.include_keys)
+        )
+        return response
+
+    async def GetInfluence(self, request: pb.GetInfluenceRequest, call: Call) -> pb.GetInfluenceResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        counts, vertices, areas, keys = await hull.peeling.influence(request.min_revision)
+        named = keys is not None and request.include_keys
+        return pb.GetInfluenceResponse(
+            revision=counts.revision,
+            vertices=encode.encode_points(vertices, encoding),
+            areas=areas,
+            vertex_keys=encode.encode_key_array(keys, encoding) if named else None,
+        )
+
     async def GetMeasures(self, request: pb.GetMeasuresRequest, call: Call) -> pb.GetMeasuresResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        counts, vertices = await hull.vertices(request.min_revision)
+        counts, vertices = await hull.vertices(request.min_revision, decode.decode_layer(request))
         return await answers.measures(counts, vertices, encoding, self._run(len(vertices)), geographic=hull.geographic)
 
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
@@ -374,11 +404,15 @@ class HullService:
         keys = request.include_keys
         if keys:
             hull.require_keys("include_keys")
+        layer, most = decode.decode_layer(request), decode.decode_max_vertices(request)
         view: View
         if directions is not None:
             view = SketchView(hull, directions, vertices=request.include_measures, keys=keys)
+        elif most:
+            hull.require_plane("max_vertices")
+            view = FewView(hull, most, vertices=request.include_measures, keys=keys, layer=layer)
         elif resume is None:
-            view = VerticesView(hull, keys=keys)
+            view = VerticesView(hull, keys=keys, layer=layer)
         else:
             view = ResumedView(hull, resume.uid, resume.revision, keys=keys)
         events = watch(
@@ -415,7 +449,10 @@ class HullService:
         """The answers about the positions of the keys of a request."""
         owner = self._read(call, request.keys_of, "keys_of") if request.keys_of else hull
         keys = owner.keys(decode_keys(request.keys, "keys"))
-        return await entities.ask_of_keys(hull, request.min_revision, owner, request.keys_min_revision, keys, question)
+        layer = decode.decode_layer(request)
+        return await entities.ask_of_keys(
+            hull, request.min_revision, owner, request.keys_min_revision, keys, question, layer
+        )
 
     # Names
 

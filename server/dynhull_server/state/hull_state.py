@@ -266,7 +266,7 @@ class HullState:
         """The key at each vertex of a keyed hull; the same array object while no vertex has changed its key."""
         revision = self.counts.revision
         if self._keys_as_of != revision:
-            keys = self._key_array(self._keyed.vertex_keys())
+            keys = key_array(self._keyed, self._keyed.vertex_keys())
             if self._vertex_keys is None or not np.array_equal(self._vertex_keys, keys):
                 self._vertex_keys = keys
             self._keys_as_of = revision
@@ -279,15 +279,12 @@ class HullState:
 
     def keys_at(self, places: Points) -> VertexKeys:
         """The key at each of some places of a keyed hull, all of which have one."""
-        return self._key_array(self._keyed.keys_at(places))
+        return key_array(self._keyed, self._keyed.keys_at(places))
 
     @property
     def _keyed(self) -> AnyKeyedHull:
         assert isinstance(self.hull, AnyKeyedHull)  # nobody asks others for keys
         return self.hull
-
-    def _key_array(self, keys: Sequence[str | int | None]) -> VertexKeys:
-        return np.array(keys, object if self._keyed.key_type == "str" else np.uint64)
 
     def earlier_vertices(self, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where they were never sent; raises RevisionForgottenError."""
@@ -311,6 +308,11 @@ class HullState:
     def _new_producers(self, last: dict[str, int], skipping: frozenset[str], now: float) -> Producers:
         limits = self._limits
         return Producers(limits.max_producers, limits.max_producers_per_caller, last, skipping, now)
+
+
+def key_array(hull: AnyKeyedHull, keys: Sequence[str | int | None]) -> VertexKeys:
+    """The keys of a hull as an array."""
+    return np.array(keys, object if hull.key_type == "str" else np.uint64)
 
 
 def _last_cause(kept: Kept) -> Cause | None:
