@@ -128,27 +128,24 @@ class EventLog:
 
     def _numbered(self, waiting: list[_Crossed]) -> EventBlock:
         counts = [len(each.crossings) for each in waiting]
-        n = sum(counts)
-        fences = _column(waiting, "fences")
-        changes = _column(waiting, "changes")
+        fences, changes = _column(waiting, "fences"), _column(waiting, "changes")
         points, distances = _column(waiting, "points"), _column(waiting, "distances")
+        n = len(fences)
         # Of each fence the events follow each other.
-        order = np.argsort(fences, kind="stable")
+        order = fences.argsort(kind="stable")
         ascending = fences[order]
         groups = first_rows(ascending)
-        made = np.diff(groups, append=n)
+        made = sizes(groups, n)
         numbers = ascending[groups]
         before = self._before(numbers)
         sequences = np.empty(n, np.int64)
         sequences[order] = np.arange(1, n + 1) + (before.lasts - groups).repeat(made)
         times = np.empty(n, np.int64)
         times[order] = before.times.repeat(made)
-        np.maximum(times, np.repeat([each.now for each in waiting], counts), out=times)
-        ends = np.cumsum(counts)
-        new = np.append(True, fences[1:] != fences[:-1])
-        new[ends[:-1]] = True
-        runs = np.flatnonzero(new)
-        moments = np.searchsorted(ends, runs, "right")  # of each run, which crossings it is part of
+        if waiting[0].now == waiting[-1].now:  # they never go back
+            np.maximum(times, waiting[0].now, out=times)
+        else:
+            np.maximum(times, np.array([each.now for each in waiting]).repeat(counts), out=times)
         self._tell(
             Told(
                 numbers,
@@ -159,14 +156,24 @@ class EventLog:
                 before.changes + np.add.reduceat(changes[order], groups, dtype=np.int64),
             )
         )
-        names = tuple(dict.fromkeys(each.subjects.hull.name for each in waiting))
+        ends = np.cumsum(counts)
+        runs = first_rows(fences, ends[:-1])
+        moments = ends.searchsorted(runs, "right")  # of each run, which crossings it is part of
+        names = tuple({each.subjects.hull.name: None for each in waiting})
         keys = [key_columns(each.crossings.keys) for each in waiting]
         none = np.full(n, NO_TIME)
-        timed = any(each.event_times is not None for each in waiting)
+        event_times = none
+        if any(each.event_times is not None for each in waiting):
+            columns = (each.event_times for each in waiting)
+            event_times = _joined(
+                [np.full(count, NO_TIME) if each is None else each for count, each in zip(counts, columns, strict=True)]
+            )
+        distances = distances.copy()
+        distances[points[:, 0] != points[:, 0]] = np.nan
         return EventBlock(
             fences[runs],
             sequences[runs],
-            np.diff(runs, append=n),
+            sizes(runs, n),
             np.array([names.index(each.subjects.hull.name) for each in waiting])[moments],
             np.array([kind for kind, _, _ in keys], np.uint8)[moments],
             np.array([each.revision for each in waiting])[moments],
@@ -175,13 +182,11 @@ class EventLog:
             TYPES[changes],
             _joined([_caused(each.crossings.causes, each.swap) for each in waiting]),
             _joined([lengths for _, lengths, _ in keys]),
-            b"".join(data for _, _, data in keys),
+            b"".join([data for _, _, data in keys]),
             points,
             _column(waiting, "previous"),
-            np.where(np.isnan(points[:, 0]), np.nan, distances),
-            _joined([none[: len(each.crossings)] if each.event_times is None else each.event_times for each in waiting])
-            if timed
-            else none,
+            distances,
+            event_times,
             none,
             names,
         )
@@ -233,9 +238,22 @@ def _area_revisions(waiting: list[_Crossed], fences: Integers, moments: Integers
     return np.array(found, np.int64)
 
 
-def first_rows(numbers: Integers) -> Integers:
-    """The rows at which the number of another fence begins."""
-    return np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1]))
+def first_rows(numbers: Integers, more: Integers | None = None) -> Integers:
+    """The rows at which the number of another fence begins, and some more."""
+    begins = np.empty(len(numbers), np.bool_)
+    begins[0] = True
+    np.not_equal(numbers[1:], numbers[:-1], out=begins[1:])
+    if more is not None:
+        begins[more] = True
+    return begins.nonzero()[0]
+
+
+def sizes(starts: Integers, end: int) -> Integers:
+    """How many rows there are from each of some rows to the next, or to the end."""
+    found = np.empty(len(starts), np.int64)
+    np.subtract(starts[1:], starts[:-1], out=found[:-1])
+    found[-1] = end - starts[-1]
+    return found
 
 
 def _caused(causes: Bytes, swap: Swap | None) -> Bytes:

@@ -28,6 +28,7 @@ PAIRED = EventType.BEGIN, EventType.CEASE  # they have a distance without a posi
 HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE, HAS_ORIGINS = 1, 2, 4, 8, 16
 ALL_FLAGS = 31
 WORD = 8
+FEW = 64
 # The numbers from which on an integer needs one byte more.
 LIMITS = np.array([1 << 8 * size for size in range(WORD)], np.uint64)
 
@@ -224,12 +225,22 @@ def _take_one(cursor: Cursor, _: int) -> Integers:
 
 def _put_integers(out: bytearray, *columns: Column) -> None:
     for column in columns:
-        least = column.min()
+        if len(column) <= FEW:  # numpy begins slowly
+            numbers = column.tolist()
+            least = min(numbers)
+            size = ((max(numbers) - least).bit_length() + 7) // 8
+            put_signed(out, least)
+            out.append(size)
+            if size:
+                out += b"".join([(number - least).to_bytes(size, "little") for number in numbers])
+            continue
+        least = int(column.min())
         above = column.astype(np.int64).view(np.uint64) - np.int64(least).view(np.uint64)
         size = (int(above.max()).bit_length() + 7) // 8
-        put_signed(out, int(least))
+        put_signed(out, least)
         out.append(size)
-        out += above.astype("<u8", copy=False).view(np.uint8).reshape(-1, WORD)[:, :size].tobytes()
+        if size:
+            out += above.astype("<u8", copy=False).view(np.uint8).reshape(-1, WORD)[:, :size].tobytes()
 
 
 def _take_integers(cursor: Cursor, count: int) -> Integers:

@@ -54,7 +54,6 @@ Statement = tuple[str, tuple[Any, ...]]
 KEYS_A_ROW = 16_384
 # Events in a row: whoever reads those of one fence reads all of them.
 EVENTS_A_ROW = 1024
-MISSING = -1  # the sequence of no event
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,39 +217,22 @@ class FenceChanges:
                 self._drop_inside(change.sequence, now)
 
     def _append(self, block: EventBlock) -> None:
-        if not self._lasts and not any(now.deleted for now in self._now.values()) and self._follows(block):
-            ends = (block.firsts + block.counts - 1).tolist()
-            self._lasts.update(zip(block.fences.tolist(), ends, strict=True))
-        else:
-            self._follow(block)
-        self._blocks.append(block)
-
-    def _follows(self, block: EventBlock) -> bool:
-        """Whether the events follow those of the last commit; also False if a fence is not that old."""
-        order = np.argsort(block.fences, kind="stable")
-        fences, firsts, counts = block.fences[order], block.firsts[order], block.counts[order]
-        ends = firsts + counts
-        again = fences[1:] == fences[:-1]
-        starts = np.append(True, ~again)
+        lasts, numbers = self._lasts, block.fences.tolist()
         try:
-            lasts = self._ledger.runs.lasts(fences[starts])
-        except KeyError:
-            return False
-        return bool((firsts[starts] == lasts + 1).all() and (firsts[1:] == ends[:-1])[again].all())
-
-    def _follow(self, block: EventBlock) -> None:
-        """Take note of the last events, or raise NotCommittedError if they do not follow."""
-        lasts, runs = self._lasts, zip(block.fences.tolist(), block.firsts.tolist(), block.counts.tolist(), strict=True)
-        for number, first, count in runs:
-            last = lasts.get(number, MISSING)
-            if last == MISSING:
-                if number not in self._ledger.fences or (number in self._now and self._now[number].deleted):
-                    raise NotCommittedError(f"there is no fence {number}")
-                last = int(self._ledger.runs.lasts(np.array([number]))[0])
+            known = self._ledger.runs.lasts(block.fences).tolist()
+        except KeyError:  # one is new, or does not exist
+            known = [self._ledger.runs.last(number) for number in numbers]
+        gone = {number for number, now in self._now.items() if now.deleted}
+        runs = zip(numbers, known, block.firsts.tolist(), block.counts.tolist(), strict=True)
+        for number, committed, first, count in runs:
+            last = lasts.get(number, committed)
+            if last is None or number in gone:
+                raise NotCommittedError(f"there is no fence {number}")
             if first != last + 1:
                 name = self._rows(number).row.name
                 raise NotCommittedError(f"event {first} of fence {name} does not follow event {last}")
             lasts[number] = last + count
+        self._blocks.append(block)
 
     def finish(self) -> None:
         """Write all events, after the last change: in one row, or in several if they are many."""

@@ -217,6 +217,11 @@ class FenceRuns:
         found: Integers = self.table.columns[LAST, self.table.places(numbers)]
         return found
 
+    def last(self, number: int) -> int | None:
+        """The sequence of the last event of a fence; None if it does not exist."""
+        fence = self.fences.get(number)
+        return None if fence is None else int(self.table.columns[LAST, fence.at])
+
     def own(self, block: EventBlock) -> npt.NDArray[np.bool_]:
         """Of which runs the hull is the one that the fence names; KeyError if a fence does not exist."""
         self.table.sort()
