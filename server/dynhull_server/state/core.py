@@ -56,8 +56,10 @@ from .events import (
 from .fences import recovery
 from .fences.components import SPANNING
 from .fences.fence import Fence
+from .fences.fence_work import MOST_DUE
+from .fences.fenced_trip import Ground
 from .fences.line import Line
-from .fences.line_trip import MOST_DUE, Ground, LineTrip
+from .fences.line_trip import LineTrip
 from .fences.requests import (
     CreateFence,
     DeleteFence,

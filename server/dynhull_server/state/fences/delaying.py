@@ -1,17 +1,16 @@
 """What a change of a hull means for a fence whose events are delayed: `confirmations` and `min_dwell`."""
 
-from collections.abc import Collection, Container, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from dynhull import Crossings
-from dynhull.keys import key_list, take_keys
+from dynhull.keys import key_list
 
-from ..contents.live import AnyKeyedHull
-from ..records import NO_TIME, KeyRows
+from ..records import NO_TIME
 from .event_log import Swap
 from .fence_leg import NOBODY, FenceLeg, caused
+from .keys_changed import KeysChanged
 from .records import Cause, Delay, EventType, Key, Origin, Subject
 from .subjects import Subjects, keyed
 
@@ -19,49 +18,6 @@ OWN = Cause.MOVED | Cause.APPEARED
 GONE = Cause.REMOVED | Cause.EXPIRED
 NO_ROWS = slice(0)
 TRANSFERRED = 2  # a change, as the index reports it
-
-
-@dataclass(slots=True)
-class KeysChanged:
-    """What has happened to the keys of a hull.
-
-    Attributes:
-        rows: the batch; None where keys have only expired.
-        expired: the keys whose deadline had come, in an expiry or before a batch to one of several hulls.
-        fewer: whether others may have left, too old or too many.
-    """
-
-    rows: KeyRows | None = None
-    expired: Collection[Key] = ()
-    fewer: bool = False
-    _removed: set[Key] | None = field(default=None, init=False)
-
-    def why_gone(self, key: Key) -> Cause:
-        """Why a key left."""
-        if self._removed is None:
-            self._removed = set() if self.rows is None else set(key_list(self.rows.removes)) - set(self.expired)
-        return Cause.REMOVED if key in self._removed else Cause.EXPIRED
-
-    def gone(self, waiting: Collection[Key]) -> Iterable[Key]:
-        """Those of some keys that may have left. O(rows of the batch), or of all if points are too old or too many."""
-        if self.fewer:
-            return list(waiting)
-        left = () if self.rows is None else key_list(self.rows.removes)
-        return {key for each in (left, self.expired) for key in each if key in waiting}
-
-    def reports(self, hull: AnyKeyedHull, asked: Container[Key], new: Collection[Key] = ()) -> list[Key]:
-        """Those of some keys whose position the batch has written; all but `new` were there before it. O(its rows)."""
-        rows = self.rows
-        if rows is None:
-            return []
-        found = [row for row, key in enumerate(key_list(rows.keys)) if key in asked]
-        keys = take_keys(rows.keys, np.array(found, np.intp))
-        written = np.ones(len(found), np.bool_)
-        if rows.condition == "absent":  # only a key that has expired
-            written &= np.array([key in self.expired or key in new for key in key_list(keys)], np.bool_)
-        if hull.ordered and rows.times is not None:
-            written &= ~(rows.times[found] < hull.times(keys))
-        return [key for key, each in zip(key_list(keys), written.tolist(), strict=True) if each]
 
 
 def delay(

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 
 from dynhull.keys import key_list
 
-from .delaying import KeysChanged
 from .fence import Fence
+from .keys_changed import KeysChanged
 from .records import Key, Origin
 from .subjects import Subjects
 
