@@ -10,11 +10,20 @@ from dynhull_server.rpc.access import EVERYTHING, Caller, TokenFile
 from dynhull_server.rpc.calls import Call, Context
 
 OWNER, KEY = "dynhull-owner", "dynhull-token-hash"
+# In place of a hash: the caller is the gateway itself, which passes on to callers what they may read.
+ITSELF = "gateway"
+
+Metadata = tuple[tuple[str, str], ...]
 
 
-def metadata_of(call: Call) -> tuple[tuple[str, str], ...]:
+def metadata_of(call: Call) -> Metadata:
     """The metadata that name the caller."""
     return ((OWNER, call.owner), (KEY, call.caller.key))
+
+
+def metadata_of_feed(name: str) -> Metadata:
+    """The metadata of a call for all who watch a hull. Each hull has its own limits."""
+    return ((OWNER, f"{ITSELF}/{name}"), (KEY, ITSELF))
 
 
 def authenticator(tokens: TokenFile | None) -> Callable[[Context], Caller]:
@@ -22,7 +31,7 @@ def authenticator(tokens: TokenFile | None) -> Callable[[Context], Caller]:
 
     def authenticate(context: Context) -> Caller:
         said = dict(context.invocation_metadata() or ())
-        if tokens is None:
+        if tokens is None or said[KEY] == ITSELF:
             return Caller(str(said[OWNER]), EVERYTHING)
         tokens.look()
         return tokens.known(str(said[KEY]))

@@ -12,6 +12,7 @@ google.rpc.Status.
 import asyncio
 from enum import IntEnum
 from struct import Struct
+from typing import cast
 
 HEADER = Struct("<IIB")
 LENGTHS = Struct("<HH")
@@ -40,8 +41,7 @@ class Frames(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin to send."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast("asyncio.Transport", transport)
 
     def connection_lost(self, _: Exception | None) -> None:
         """Send nothing any more."""

@@ -32,6 +32,7 @@ from dynhull_server.settings import Settings
 from . import worker_link
 from .composed import Composed
 from .relay import Relay, Route, within
+from .shared_watches import WATCH, SharedWatches
 from .sockets import Sockets
 from .worker_link import WorkerLink
 
@@ -42,6 +43,7 @@ AWAY_SECONDS = 30.0
 # Seconds that a gateway looks for all workers before it serves some.
 FIRST_SECONDS = 5.0
 WHOLE = ""
+WATCH_FENCE = f"/{FENCES.full_name}/WatchFence"
 
 SERVING = health_pb2.HealthCheckResponse.SERVING
 NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
@@ -78,8 +80,9 @@ class Gateway:
         watched = (WHOLE, SCRUB)
         self._links = [WorkerLink(i, sockets, watched, self._update_health) for i in range(settings.workers)]
         self._away_since: dict[int, float | None] = dict.fromkeys(range(settings.workers))
-        self._relay = Relay(self._links, settings.max_watch_lag)
+        self._relay = Relay(self._links, settings.max_watch_lag, metrics)
         self._composed = Composed(self._relay, settings.max_fence_corners)
+        self._watches = SharedWatches(self._relay, metrics)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False
         self._all_well = asyncio.Event()
@@ -144,6 +147,10 @@ class Gateway:
         path = f"/{service.full_name}/{method.name}"
         if path in self._composed.works and len(self._links) > 1:
             return self._composed.works[path]
+        if path == WATCH:
+            return self._watches.watch
+        if path == WATCH_FENCE:
+            return partial(self._relay.watch, path, "fence")
         if method.client_streaming:
             return partial(self._relay.write, path)
         if method.server_streaming:

@@ -3,8 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
-from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING
 
 import grpc
 
@@ -15,8 +14,12 @@ from dynhull_server.rpc.methods import DESCRIPTOR
 from dynhull_server.rpc.query import MOST_ANSWERS, MOST_BYTES, REVISIONS, UNKNOWN_KIND
 from dynhull_server.rpc.status import ANSWERED, HullsApartError, RelayedError, WorkerAwayError, error_status
 
-from .relay import Relay, next_response
+from .callers import metadata_of
+from .relay import Relay
 from .worker_link import WorkerLink
+
+if TYPE_CHECKING:
+    from .upstream import Upstream
 
 QUERY = f"/{DESCRIPTOR.full_name}/Query"
 
@@ -38,7 +41,7 @@ class MergedQuery:
         self._call = call
         self._relay = relay
         self._separate = separate
-        self._upstreams: dict[WorkerLink, _Upstream] = {}
+        self._upstreams: dict[WorkerLink, _WorkerAnswers] = {}
         self._response = pb.QueryResponse()
         self._bytes = 0
 
@@ -104,10 +107,10 @@ class MergedQuery:
                 return request if kind == "separate" else HullsApartError(field, other, request.name)
         return link
 
-    def _begun(self, link: WorkerLink) -> "_Upstream":
+    def _begun(self, link: WorkerLink) -> "_WorkerAnswers":
         upstream = self._upstreams.get(link)
         if upstream is None or upstream.over:
-            upstream = self._upstreams[link] = _Upstream(link, self._call)
+            upstream = self._upstreams[link] = _WorkerAnswers(link, self._call)
         return upstream
 
 
@@ -118,7 +121,7 @@ def _waits(read: pb.Read) -> bool:
     return any(getattr(request, field, 0) for field in REVISIONS)
 
 
-class _Upstream:
+class _WorkerAnswers:
     """The call of one worker.
 
     Attributes:
@@ -127,26 +130,26 @@ class _Upstream:
 
     def __init__(self, link: WorkerLink, call: Call) -> None:
         self.over = False
-        self._stream: Any = None
+        self._stream: Upstream | None = None
         self._answers: deque[pb.ReadAnswer] = deque()
         self._failure: RelayedError | WorkerAwayError | None = None
         try:
-            self._stream = link.stream(QUERY, call)
+            self._stream = link.stream(QUERY, metadata_of(call))
         except WorkerAwayError as error:
             self._failure = error
 
     async def send(self, part: pb.QueryRequest) -> None:
         """Send reads. An error is that of their answers."""
         if self._stream is not None:
-            with suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError):  # it has ended: reading says why
-                await self._stream.write(part.SerializeToString())
+            await self._stream.write(part.SerializeToString())
 
     async def next(self) -> pb.ReadAnswer:
         """The next answer. Raises RelayedError if the call ends for another reason than that the worker does."""
         while not self._answers:
             if self._failure is None:
+                assert self._stream is not None  # otherwise there is a failure
                 try:
-                    response = await next_response(self._stream)
+                    response = await self._stream.read()
                 except RelayedError as error:
                     if error.status.code != grpc.StatusCode.UNAVAILABLE.value[0]:
                         raise

@@ -1,7 +1,7 @@
 """The metrics of all processes on one page, with a label that names the process."""
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from prometheus_client import CollectorRegistry
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
@@ -9,21 +9,33 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.parser import text_string_to_metric_families
 from prometheus_client.registry import Collector
 
+from dynhull_server.rpc.call_counts import CallCounts
+
 from .child_process import METRICS_SECONDS, ChildProcess
 
 LABEL = "process"
+SUPERVISOR = "supervisor"
 
 
-def registry_of(processes: Sequence[ChildProcess], loop: asyncio.AbstractEventLoop) -> CollectorRegistry:
-    """A registry that asks the processes, on the event loop, whenever another thread reads it."""
+def registry_of(
+    processes: Sequence[ChildProcess], calls: CallCounts, loop: asyncio.AbstractEventLoop
+) -> CollectorRegistry:
+    """A registry that asks the processes, on the event loop, whenever another thread reads it.
+
+    Args:
+        processes: the processes.
+        calls: what the supervisor has counted itself, on the event loop.
+        loop: the event loop.
+    """
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Collector(processes, loop))
+    registry.register(_Collector(processes, calls, loop))
     return registry
 
 
 class _Collector(Collector):
-    def __init__(self, processes: Sequence[ChildProcess], loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, processes: Sequence[ChildProcess], calls: CallCounts, loop: asyncio.AbstractEventLoop) -> None:
         self._processes = processes
+        self._calls = calls
         self._loop = loop
 
     def describe(self) -> Iterator[Metric]:
@@ -33,23 +45,27 @@ class _Collector(Collector):
     def collect(self) -> Iterator[Metric]:
         """The metrics of the processes that answer, and which of them serve."""
         asked = asyncio.run_coroutine_threadsafe(self._ask(), self._loop)
-        pages = asked.result(2 * METRICS_SECONDS)
+        pages, own = asked.result(2 * METRICS_SECONDS)
+        found: dict[str, Iterable[Metric]] = {
+            process: text_string_to_metric_families(page) for process, page in pages.items()
+        }
         serving = GaugeMetricFamily("dynhull_process_serving", "Whether a process serves.", labels=[LABEL])
         starts = CounterMetricFamily("dynhull_process_starts", "Starts of a process.", labels=[LABEL])
         for each in self._processes:
             serving.add_metric([each.name], each.serving.is_set())
             starts.add_metric([each.name], each.starts)
-        yield from (serving, starts, *_merged(pages))
+        yield from (serving, starts, *_merged({**found, SUPERVISOR: own}))
 
-    async def _ask(self) -> dict[str, str]:
+    async def _ask(self) -> tuple[dict[str, str], list[Metric]]:
         pages = await asyncio.gather(*(each.metrics() for each in self._processes))
-        return {each.name: page for each, page in zip(self._processes, pages, strict=True) if page is not None}
+        found = {each.name: page for each, page in zip(self._processes, pages, strict=True) if page is not None}
+        return found, self._calls.families()
 
 
-def _merged(pages: dict[str, str]) -> list[Metric]:
+def _merged(found: dict[str, Iterable[Metric]]) -> list[Metric]:
     families: dict[str, Metric] = {}
-    for process, page in pages.items():
-        for family in text_string_to_metric_families(page):
+    for process, own in found.items():
+        for family in own:
             merged = families.setdefault(family.name, Metric(family.name, family.documentation, family.type))
             for sample in family.samples:
                 merged.samples.append(sample._replace(labels={**sample.labels, LABEL: process}))

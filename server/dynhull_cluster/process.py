@@ -15,6 +15,10 @@ from dynhull_server.entrance import tls_context
 from dynhull_server.failure import code_of, fail, text_of
 from dynhull_server.listening import listening_error, why_not
 from dynhull_server.process import stop_signal
+from dynhull_server.rpc.call_counts import CallCounts
+from dynhull_server.rpc.calls import refusals_elsewhere
+from dynhull_server.rpc.metrics import BUCKETS
+from dynhull_server.rpc.refusal_log import RefusalLog
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite.disk import Disk
@@ -65,8 +69,10 @@ async def _serve(settings: Settings) -> None:
             [ChildProcess(f"worker-{i}", begin, settings.grace) for i in range(workers)],
             [ChildProcess(f"gateway-{i}", begin, settings.grace) for i in range(gateways)],
         )
-        registry = registry_of(processes.all, asyncio.get_running_loop())
-        page = metrics_page(settings, registry, tokens, _log_refusal)
+        refusals, calls = RefusalLog(), CallCounts(BUCKETS)
+        opened.callback(refusals.flush)
+        registry = registry_of(processes.all, calls, asyncio.get_running_loop())
+        page = metrics_page(settings, registry, tokens, refusals_elsewhere(refusals, calls))
         if page is not None:
             opened.callback(page.close)
         try:
@@ -150,11 +156,6 @@ class Processes:
 async def _all(events: Sequence[asyncio.Event]) -> None:
     for each in events:
         await each.wait()
-
-
-def _log_refusal(reason: str, code: str, peer: str) -> None:
-    """Log a refused request for metrics."""
-    log.warning("a request for metrics was refused: %s", reason, extra={"code": code, "peer": peer})
 
 
 @contextmanager

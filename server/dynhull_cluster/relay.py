@@ -1,23 +1,23 @@
 """What a gateway does with a call: it passes the bytes to the worker that has the name, and the answers back."""
 
 import asyncio
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
+from functools import partial
 from typing import Any
-
-import grpc
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.calls import Call
+from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import LimitExceededError
 
+from .callers import metadata_of
 from .placement import worker_of
-from .worker_link import WorkerLink, relayed
+from .upstream import Upstream
+from .worker_link import WorkerLink
 
 Route = Callable[[bytes], WorkerLink]
-# Writing to a call that has ended.
-ENDED = suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError)
 
 
 class Relay:
@@ -26,10 +26,12 @@ class Relay:
     Args:
         links: the workers, by their numbers.
         max_watch_lag: the seconds that a caller may take to receive one message of a call that only answers.
+        metrics: counts the watchers.
     """
 
-    def __init__(self, links: Sequence[WorkerLink], max_watch_lag: float) -> None:
+    def __init__(self, links: Sequence[WorkerLink], max_watch_lag: float, metrics: Metrics) -> None:
         self.links = links
+        self._metrics = metrics
         self._max_watch_lag = max_watch_lag
 
     def link(self, name: str) -> WorkerLink:
@@ -63,19 +65,33 @@ class Relay:
         with call.stream():
             with call.cutoff():
                 message = await call.receive()
-            upstream = self.route(message).stream(method, call)
-            try:
-                with call.cutoff(), ENDED:  # reading raises why
-                    await upstream.write(message)
-                    await upstream.done_writing()
-                while True:
-                    with call.cutoff():
-                        response = await next_response(upstream)
-                    if response is None:
-                        return
+            await self.read_from(self.route(message), method, call, message)
+
+    async def watch(self, method: str, kind: str, call: Call) -> None:
+        """A call with one request, and responses for as long as the caller likes; `kind` is that of their events."""
+        with call.stream(), self._metrics.watcher() as watcher:
+            with call.cutoff():
+                message = await call.receive()
+            sending = partial(self._metrics.sending, watcher, kind)
+            await self.read_from(self.route(message), method, call, message, sending)
+
+    async def read_from(
+        self,
+        link: WorkerLink,
+        method: str,
+        call: Call,
+        message: bytes,
+        sending: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
+        """Pass on the responses of a worker to a request, until the last; `sending` is around the sending of each."""
+        async with one_request(link.stream(method, metadata_of(call)), message) as upstream:
+            while True:
+                with call.cutoff():
+                    response = await upstream.read()
+                if response is None:
+                    return
+                with sending():
                     await self.send(call, response)
-            finally:
-                upstream.cancel()
 
     async def send(self, call: Call, response: bytes) -> None:
         """Send a response. Raises LimitExceededError if the caller does not receive it."""
@@ -88,10 +104,10 @@ class Relay:
                 first = await call.read()
             # Without any request, every worker refuses the call with the same words.
             link = self.links[0] if first is None else self.route(first)
-            upstream = link.stream(method, call)
+            upstream = link.stream(method, metadata_of(call))
             feeding = asyncio.create_task(self._feed(call, first, upstream))
             try:
-                while (response := await next_response(upstream)) is not None:
+                while (response := await _response(upstream, feeding)) is not None:
                     await call.write(response)
                 await feeding  # raises what has ended the requests
             except RelayedError:
@@ -103,25 +119,36 @@ class Relay:
                 feeding.cancel()
                 upstream.cancel()
 
-    async def _feed(self, call: Call, message: bytes | None, upstream: Any) -> None:
+    async def _feed(self, call: Call, message: bytes | None, upstream: Upstream) -> None:
         """Pass on requests until the last, or until the call ends; the worker answers those that it has."""
         try:
-            with call.cutoff(), ENDED:
-                while message is not None:
-                    await upstream.write(message)
+            with call.cutoff():
+                while message is not None and await upstream.write(message):
                     message = await call.read()
         finally:
-            with ENDED:
-                await upstream.done_writing()
+            await upstream.done_writing()
 
 
-async def next_response(upstream: Any) -> bytes | None:
-    """The next response; None after the last. Raises RelayedError."""
+async def _response(upstream: Upstream, feeding: "asyncio.Task[None]") -> bytes | None:
+    """The next response. Raises what has ended the requests in the middle of one: gRPC then cancels the whole call."""
     try:
-        response = await upstream.read()
-    except grpc.aio.AioRpcError as error:
-        raise relayed(error) from None
-    return None if response is grpc.aio.EOF else response
+        return await upstream.read()
+    except asyncio.CancelledError:
+        task = asyncio.current_task()
+        if task is not None and not task.cancelling():
+            await feeding
+        raise
+
+
+@asynccontextmanager
+async def one_request(upstream: Upstream, message: bytes) -> AsyncIterator[Upstream]:
+    """The call of a worker, with this request and no other, which ends with the block."""
+    try:
+        await upstream.write(message)
+        await upstream.done_writing()
+        yield upstream
+    finally:
+        upstream.cancel()
 
 
 def within(max_bytes: int) -> Any:

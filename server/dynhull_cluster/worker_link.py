@@ -9,14 +9,14 @@ from typing import Any
 import grpc
 from google.rpc.status_pb2 import Status
 from grpc_health.v1 import health_pb2
-from grpc_status import rpc_status
 
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 
-from .callers import metadata_of
+from .callers import Metadata, metadata_of
 from .frames import MOST_BYTES, Frames, Kind, pack_request
 from .sockets import Sockets
+from .upstream import Upstream, lost_status, status_of
 
 # Seconds until a worker that is away is looked for again.
 LOOK_SECONDS = 0.05
@@ -106,18 +106,20 @@ class WorkerLink:
         try:
             response: bytes = await asked
         except grpc.aio.AioRpcError as error:
-            raise relayed(error) from None
+            raise RelayedError(status_of(error)) from None
         finally:
             asked.cancel()
         return response
 
-    def stream(self, method: str, call: Call) -> "grpc.aio.StreamStreamCall[bytes, bytes]":
-        """A call of the worker, with any number of requests and responses. Raises WorkerAwayError."""
+    def stream(self, method: str, caller: Metadata) -> Upstream:
+        """A call of the worker, with any number of requests and responses. Raises WorkerAwayError.
+
+        Args:
+            method: its path.
+            caller: the metadata that name the caller.
+        """
         self._present()
-        begun: grpc.aio.StreamStreamCall[bytes, bytes] = self._channel.stream_stream(method)(
-            metadata=metadata_of(call), wait_for_ready=True
-        )
-        return begun
+        return Upstream(self._channel.stream_stream(method)(metadata=caller, wait_for_ready=True))
 
     def _present(self) -> "_Frames":
         if self._frames is None:
@@ -189,36 +191,3 @@ class _Frames(Frames):
                 answer.set_exception(RelayedError(lost_status()))
         if not self._lost.done():
             self._lost.set_result(None)
-
-
-# What gRPC itself makes of a connection that breaks; a worker gives its own errors details.
-BROKEN = grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN
-
-
-def lost_status() -> Status:
-    """The status of a call whose worker has ended: without a reason, as that of a lost connection."""
-    return Status(code=grpc.StatusCode.UNAVAILABLE.value[0], message="the worker has ended; the outcome is unknown")
-
-
-def relayed(error: "grpc.aio.AioRpcError") -> RelayedError:
-    """The error of a worker, as the caller gets it."""
-    status = rpc_status.from_call(_Finished(error))
-    if status is None and error.code() in BROKEN:
-        status = lost_status()
-    return RelayedError(status or Status(code=error.code().value[0], message=error.details() or ""))
-
-
-class _Finished:
-    """An error as the finished call that grpc_status reads."""
-
-    def __init__(self, error: "grpc.aio.AioRpcError") -> None:
-        self._error = error
-
-    def trailing_metadata(self) -> Any:
-        return self._error.trailing_metadata()
-
-    def code(self) -> grpc.StatusCode:
-        return self._error.code()
-
-    def details(self) -> str:
-        return self._error.details() or ""

@@ -10,7 +10,7 @@ import grpc
 import numpy as np
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
-from metrics import measured, scrape
+from metrics import measured, samples
 from refusal import refusal
 
 from dynhull.margin import max_margin
@@ -156,12 +156,23 @@ def test_reads_of_all_workers_are_answered_in_order(client: HullClient) -> None:
     assert last.result().sides.tolist() == [1]
 
 
+def test_a_refusal_is_told_while_requests_are_sent(place: Place) -> None:
+    """The worker ends the call while the gateway writes to it."""
+    bad = pb.IngestRequest(name=ZERO, batch={"deletes": {"coordinates": [77, 77]}})
+    more = pb.IngestRequest(batch={"inserts": {"packed": np.ones((4096, 2)).tobytes()}})
+    with grpc.insecure_channel(place.address) as channel:
+        stub = HullServiceStub(channel)
+        for _ in range(30):
+            code, info, _ = refusal(lambda: stub.Ingest(iter([bad, *[more] * 32]), metadata=BEARER))
+            assert (code, info.metadata["batch"]) == (grpc.StatusCode.FAILED_PRECONDITION, "0")
+
+
 def test_health_of_each_worker_and_metrics_of_all(place: Place) -> None:
     with grpc.insecure_channel(place.address) as channel:
         health = health_pb2_grpc.HealthStub(channel)
         for service in ("", "dynhull.v1.worker/0", "dynhull.v1.worker/1", "dynhull.v1.scrub"):
             assert health.Check(health_pb2.HealthCheckRequest(service=service)).status == SERVING
-    found = scrape(place.metrics)
+    found = samples(place.metrics)
     names = ("worker-0", "worker-1", "gateway-0", "gateway-1")
     assert [found[f'dynhull_process_serving{{process="{name}"}}'] for name in names] == [1, 1, 1, 1]
     hulls = [found[f'dynhull_hulls{{process="worker-{i}"}}'] for i in range(2)]

@@ -152,6 +152,13 @@ INVALID_REQUESTS = {
         None,
         "nan",
     ),
+    "a rate that never sends": (
+        "Watch",
+        lambda hull: pb.WatchRequest(name=hull, max_events_per_second=5e-324),
+        "max_events_per_second",
+        None,
+        "5e-324",
+    ),
     "a sketch to be resumed": (
         "Watch",
         lambda hull: pb.WatchRequest(name=hull, directions=ONE, resume={"uid": "a"}),

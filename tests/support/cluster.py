@@ -1,4 +1,4 @@
-"""The processes of a server of several, seen from outside."""
+"""The processes of a server, seen from outside."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from pathlib import Path
 def processes(supervisor: int) -> dict[str, int]:
     """The numbers of the workers and gateways that run now, by their names as the operating system shows them."""
     found = {}
-    for process in _descendants(supervisor):
+    for process in descendants(supervisor):
         try:
             name = Path(f"/proc/{process}/comm").read_text().strip()
         except OSError:  # it has just ended
@@ -16,7 +16,8 @@ def processes(supervisor: int) -> dict[str, int]:
     return found
 
 
-def _descendants(process: int) -> list[int]:
+def descendants(process: int) -> list[int]:
+    """The numbers of the processes that it has started, and those that they have."""
     found = []
     for thread in Path(f"/proc/{process}/task").glob("*/children"):
         try:
@@ -24,5 +25,5 @@ def _descendants(process: int) -> list[int]:
         except OSError:
             continue
         for child in children:
-            found += [child, *_descendants(child)]
+            found += [child, *descendants(child)]
     return found

@@ -834,7 +834,8 @@ def watch(
     Args:
         name: the hull.
         min_revision: the first event waits until the hull has reached it.
-        max_rate: the most events a second, each with all changes since the one before; 0 for no limit.
+        max_rate: the most events a second, each with all changes since the one before; 0 for no limit. At
+            least one a day.
         progress_interval: seconds without an event after which a Progress is sent; None for never or, with a copy that
             has a `max_staleness`, for a third of it.
         measures: whether events include measures.

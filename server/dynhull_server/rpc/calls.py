@@ -17,6 +17,7 @@ from grpc_status import rpc_status
 from ..logs import caller_has_left
 from ..state.errors import LimitExceededError
 from .access import UNAUTHENTICATED_CALLER, Caller, PermissionDeniedError, Rights, UnauthenticatedError
+from .call_counts import CallCounts
 from .metrics import Metrics
 from .places import Places
 from .refusal_log import RefusalLog
@@ -211,6 +212,8 @@ class Calls:
             known: returns the present caller for the hash of a token, or raises UnauthenticatedError.
         """
         for call in self._open:
+            if not call.caller.key:  # it was admitted without a token
+                continue
             try:
                 call.caller = known(call.caller.key)
                 call.access.change(call.caller.access)
@@ -239,16 +242,7 @@ class Calls:
 
     def refused_elsewhere(self) -> Callable[[str, str, str], None]:
         """A function for other threads, to report a refused request for metrics: its reason, code and peer."""
-        loop = asyncio.get_running_loop()
-
-        def count(reason: str, code: str, peer: str) -> None:
-            self._refusals.add(reason, METRICS_PAGE, code, peer)
-            self._metrics.calls.ended(METRICS_PAGE, code, 0.0)
-
-        def refused(reason: str, code: str, peer: str) -> None:
-            loop.call_soon_threadsafe(count, reason, code, peer)
-
-        return refused
+        return refusals_elsewhere(self._refusals, self._metrics.calls)
 
     def finish(self, task: asyncio.Task[Any]) -> None:
         """Have a draining server wait for this task."""
@@ -287,6 +281,20 @@ class Calls:
             if call is not None:
                 self._open.discard(call)
             self._metrics.calls.ended(method, code, time.perf_counter() - begun)
+
+
+def refusals_elsewhere(refusals: RefusalLog, calls: CallCounts) -> Callable[[str, str, str], None]:
+    """A function for other threads, to log and count a refused request for metrics: its reason, code and peer."""
+    loop = asyncio.get_running_loop()
+
+    def count(reason: str, code: str, peer: str) -> None:
+        refusals.add(reason, METRICS_PAGE, code, peer)
+        calls.ended(METRICS_PAGE, code, 0.0)
+
+    def refused(reason: str, code: str, peer: str) -> None:
+        loop.call_soon_threadsafe(count, reason, code, peer)
+
+    return refused
 
 
 class Cutoff:

@@ -274,10 +274,12 @@ def decode_resume(request: hull_service_pb2.WatchRequest) -> Resume | None:
 
 def decode_rate(events_per_second: float, field: str = "max_events_per_second") -> float:
     """The least number of seconds between events."""
-    if not 0 <= events_per_second < math.inf:
-        raise InvalidFieldError(field, events_per_second, "must be finite and not negative")
-    # Lower rates are treated as one event per day.
-    return min(1 / events_per_second, LONGEST_INTERVAL) if events_per_second else 0.0
+    if events_per_second == 0:
+        return 0.0
+    if not 1 / LONGEST_INTERVAL <= events_per_second < math.inf:
+        problem = f"must be finite, and at least 1/{LONGEST_INTERVAL} (one a day), or 0 for no limit"
+        raise InvalidFieldError(field, events_per_second, problem)
+    return 1 / events_per_second
 
 
 def decode_interval(

@@ -10,6 +10,7 @@ from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
+from ..engine.difference import Difference
 from ..engine.layers import Layers
 from ..engine.live_hull import LiveHull
 from ..engine.steps import BLOCK, Run
@@ -195,6 +196,28 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
     result.clock_time.FromMicroseconds(applied.clock)
 
 
+def encode_change(
+    removed: Points,
+    vertices: Points,
+    difference: Difference,
+    keys: VertexKeys | None,
+    encoding: points_pb2.PointEncoding,
+) -> hull_service_pb2.HullChange:
+    """The edit to `vertices`, which have `keys` if the watcher asked for them; `removed` are those that are lost."""
+    change = hull_service_pb2.HullChange(
+        removed=encode_points(removed, encoding),
+        removed_indices=difference.removed.tolist(),
+        added=encode_points(vertices[difference.added], encoding),
+        added_indices=difference.added.tolist(),
+        rotation=difference.rotation,
+    )
+    if keys is not None:
+        change.added_keys.CopyFrom(encode_key_array(keys[difference.added], encoding))
+        change.renamed_indices.extend(difference.renamed.tolist())
+        change.renamed_keys.CopyFrom(encode_key_array(keys[difference.renamed], encoding))
+    return change
+
+
 def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_service_pb2.WatchResponse:
     """The message of an event, without measures."""
     counts = event.counts
@@ -212,16 +235,8 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
             if event.keys is not None:
                 message.snapshot.vertex_keys.CopyFrom(encode_key_array(event.keys, encoding))
         case Change():
-            removed, added, renamed = event.difference.removed, event.difference.added, event.difference.renamed
-            message.change.removed.CopyFrom(encode_points(event.removed, encoding))
-            message.change.removed_indices.extend(removed.tolist())
-            message.change.added.CopyFrom(encode_points(event.vertices[added], encoding))
-            message.change.added_indices.extend(added.tolist())
-            message.change.rotation = event.difference.rotation
-            if event.keys is not None:
-                message.change.added_keys.CopyFrom(encode_key_array(event.keys[added], encoding))
-                message.change.renamed_indices.extend(renamed.tolist())
-                message.change.renamed_keys.CopyFrom(encode_key_array(event.keys[renamed], encoding))
+            change = encode_change(event.removed, event.vertices, event.difference, event.keys, encoding)
+            message.change.CopyFrom(change)
         case Progress():
             message.progress.SetInParent()
         case _:

@@ -103,20 +103,19 @@ class Metrics:
         self._watchers[watcher] = None
         self._events.labels(kind).inc()
 
-    @property
-    def watchers(self) -> int:
-        """The number of watchers."""
-        return len(self._watchers)
-
-    @property
-    def lag(self) -> float:
-        """The seconds since the slowest watcher was sent an event it has not received yet."""
+    def watch_families(self) -> list[GaugeMetricFamily]:
+        """The watchers of now, for Prometheus."""
         now = time.monotonic()
-        return max((now - since for since in self._watchers.values() if since is not None), default=0.0)
+        lag = max((now - since for since in self._watchers.values() if since is not None), default=0.0)
+        help_of_lag = "Seconds since the slowest watcher was sent an event it has not received yet."
+        return [
+            GaugeMetricFamily("dynhull_watchers", "Watchers.", value=len(self._watchers)),
+            GaugeMetricFamily("dynhull_watch_lag_seconds", help_of_lag, value=lag),
+        ]
 
 
 class CallCollector(Collector):
-    """Collects the counts of calls on the event loop, for a process without hulls."""
+    """Collects the counts of calls and watchers on the event loop, for a process without hulls."""
 
     def __init__(self, metrics: Metrics, loop: asyncio.AbstractEventLoop) -> None:
         self._metrics = metrics
@@ -124,7 +123,7 @@ class CallCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """The counts."""
-        yield from _on(self._loop, lambda: list(self._metrics.calls.families()))
+        yield from _on(self._loop, lambda: [*self._metrics.calls.families(), *self._metrics.watch_families()])
 
 
 class StateCollector(Collector):
@@ -162,15 +161,13 @@ class StateCollector(Collector):
             vertices.add_metric([hull.name], hull.vertex_count)
         total = sum(hull.counts.points for hull in hulls)
         entities = sum(hull.counts.points for hull in hulls if hull.settings.identity != "multiset")
-        lag = "Seconds since the slowest watcher was sent an event it has not received yet."
         behind = "Seconds by which the slowest clock that event times drive is behind the server's; 0 without any."
         return [
             GaugeMetricFamily("dynhull_hulls", "Hulls.", value=len(hulls)),
             GaugeMetricFamily("dynhull_points", "Points of all hulls.", value=total),
             GaugeMetricFamily("dynhull_entities", "Points of all keyed hulls.", value=entities),
             GaugeMetricFamily("dynhull_clock_lag_seconds", behind, value=self._clock_lag(hulls)),
-            GaugeMetricFamily("dynhull_watchers", "Watchers.", value=self._metrics.watchers),
-            GaugeMetricFamily("dynhull_watch_lag_seconds", lag, value=self._metrics.lag),
+            *self._metrics.watch_families(),
             points,
             vertices,
         ]

@@ -1,0 +1,269 @@
+"""Watches of hulls at a gateway: many callers cost the worker one watch.
+
+A watch begins as one of its caller's own, which the worker checks and answers. As soon as the gateway knows what the
+caller holds, the caller gets its events from the feed of all watches of the same kind: the next event as it arrived, or
+the change since the last one that it took. So nobody waits for a caller that is slow, and there are no queues. A watch
+that is resumed without a snapshot stays one of its own until the feed has been at its revision, and one that gets
+sketches always does.
+"""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_server.rpc.calls import Call
+from dynhull_server.rpc.decode import decode_name, decode_rate
+from dynhull_server.rpc.methods import DESCRIPTOR
+from dynhull_server.rpc.metrics import Metrics
+from dynhull_server.rpc.status import RelayedError
+from dynhull_server.state.errors import HullNotFoundError
+
+from .callers import metadata_of, metadata_of_feed
+from .held import Held
+from .relay import Relay, one_request
+from .upstream import lost_status
+from .worker_link import WorkerLink
+
+WATCH = f"/{DESCRIPTOR.full_name}/Watch"
+# Vertices that are compared and edited on the event loop, at most.
+FEW = 256
+# The last revisions of a feed, at which watches can join it, and the bytes of their vertices.
+RECENT, RECENT_BYTES = 16, 2**22
+
+T = TypeVar("T")
+
+
+class SharedWatches:
+    """The watches of a gateway.
+
+    Args:
+        relay: the workers.
+        metrics: counts the watchers.
+    """
+
+    def __init__(self, relay: Relay, metrics: Metrics) -> None:
+        self._relay = relay
+        self._metrics = metrics
+        self._feeds: dict[tuple[str, bytes], Feed] = {}
+
+    async def watch(self, call: Call) -> None:
+        """The method `Watch`."""
+        with call.stream(), self._metrics.watcher() as watcher, ExitStack() as joined:
+            with call.cutoff():
+                message = await call.receive()
+            request = pb.WatchRequest.FromString(message)
+            call.access.require_read(decode_name(request.name))
+            found = await self._begin(call, request, message, watcher, joined)
+            if found is not None:
+                await self._follow(call, request, watcher, *found)
+
+    async def _begin(
+        self, call: Call, request: pb.WatchRequest, message: bytes, watcher: object, joined: ExitStack
+    ) -> "tuple[Feed, Held] | None":
+        """Pass on a watch of the caller's own, until what the caller holds is known; None if it ends before."""
+        link = self._relay.link(request.name)
+        revision = request.resume.revision
+        # Otherwise the first event has to come before the next one of the feed, or after it, or names all vertices.
+        may_join = not (request.min_revision > revision or request.max_events_per_second or request.include_keys)
+        feed: Feed | None = None
+        if request.resume.uid:
+            feed = joined.enter_context(self._feed(link, request, request.resume.uid))
+            if may_join and (held := feed.recent.get(revision)) is not None:
+                return feed, held
+        async with one_request(link.stream(WATCH, metadata_of(call)), message) as upstream:
+            while True:
+                reading = asyncio.ensure_future(upstream.read())
+                meeting = asyncio.ensure_future(feed.at(revision)) if feed is not None and may_join else None
+                try:
+                    with call.cutoff():
+                        if meeting is not None:
+                            await asyncio.wait({reading, meeting}, return_when=asyncio.FIRST_COMPLETED)
+                            if not reading.done() and (held := meeting.result()) is not None:
+                                assert feed is not None
+                                return feed, held
+                        response = await reading
+                finally:
+                    _drop(reading, meeting)
+                if response is None:
+                    return None
+                event = pb.WatchResponse.FromString(response)
+                with self._metrics.sending(watcher, event.WhichOneof("event")):
+                    await self._relay.send(call, response)
+                revision, may_join = event.revision, True
+                if event.HasField("snapshot"):
+                    if feed is None or feed.uid != event.snapshot.uid:
+                        feed = joined.enter_context(self._feed(link, request, event.snapshot.uid))
+                    return feed, Held.of(event, keys=request.include_keys)
+
+    async def _follow(self, call: Call, request: pb.WatchRequest, watcher: object, feed: "Feed", held: Held) -> None:
+        """Pass on the feed to a caller."""
+        loop = asyncio.get_running_loop()
+        interval = decode_rate(request.max_events_per_second)
+        sent = loop.time()
+        number: int | None = None
+        while True:
+            with call.cutoff():
+                await feed.beyond(number, held.revision)
+                await asyncio.sleep(sent + interval - loop.time())
+                number, held, event = await feed.since(number, held)
+            if event is not None:
+                sent = loop.time()
+                with self._metrics.sending(watcher, event.kind):
+                    await self._relay.send(call, event.message)
+
+    @contextmanager
+    def _feed(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> "Iterator[Feed]":
+        """The feed for watches like this one, of the hull with this uid; it ends with the last of them."""
+        kind = pb.WatchRequest()
+        kind.CopyFrom(request)
+        kind.ClearField("resume")
+        kind.ClearField("min_revision")
+        key = uid, kind.SerializeToString(deterministic=True)
+        feed = self._feeds.get(key)
+        if feed is None or feed.failure is not None:
+            feed = self._feeds[key] = Feed(link, kind, uid)
+        feed.watchers += 1
+        try:
+            yield feed
+        finally:
+            feed.watchers -= 1
+            if not feed.watchers:
+                feed.close()
+                if self._feeds.get(key) is feed:
+                    del self._feeds[key]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """The message of an event, and its kind."""
+
+    message: bytes
+    kind: str
+
+
+class Feed:
+    """One watch of a worker, for all watches of a kind.
+
+    Args:
+        link: the worker.
+        request: the watch.
+        uid: that of the hull.
+
+    Attributes:
+        uid: that of the hull.
+        watchers: the number of watches that use it.
+        failure: what it has ended with, or None.
+        recent: what watchers hold at the last revisions.
+    """
+
+    def __init__(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> None:
+        self.uid = uid
+        self.watchers = 0
+        self.failure: Exception | None = None
+        self.recent: OrderedDict[int, Held] = OrderedDict()
+        self._link = link
+        self._request = request
+        self._number = 0
+        self._latest = Event(b"", "")
+        self._event = pb.WatchResponse()
+        self._measures = pb.WatchResponse().measures
+        self._held: Held | None = None
+        self._moved = asyncio.Event()
+        self._running = asyncio.create_task(self._run())
+
+    def close(self) -> None:
+        """End the watch."""
+        self._running.cancel()
+
+    async def at(self, revision: int) -> Held | None:
+        """Wait until the feed is at this revision or later; what watchers hold at it, None if that is not known."""
+        while self.failure is None and (self._held is None or self._held.revision < revision):
+            await self._moved.wait()
+        return None if self.failure is not None else self.recent.get(revision)
+
+    async def beyond(self, number: int | None, revision: int) -> None:
+        """Wait for a message after that with this number, at this revision or later. Raises the failure of the feed."""
+        while self.failure is None and (self._held is None or self._number == number or self._held.revision < revision):
+            await self._moved.wait()
+        if self.failure is not None:
+            raise self.failure
+
+    async def since(self, number: int | None, held: Held) -> tuple[int, Held, Event | None]:
+        """The number of the last message, what watchers hold after it, and what brings a watcher there, if anything.
+
+        Args:
+            number: that of the last message which the watcher has got, None for none.
+            held: what the watcher holds.
+        """
+        now, last, event, measures = self._held, self._number, self._event, self._measures
+        assert now is not None
+        if number == last - 1:
+            return last, now, self._latest
+        if now.revision == held.revision:
+            return last, now, None if number is None else self._latest
+        change = await _run(held.change_to, len(held.vertices) + len(now.vertices), now, self._request.encoding)
+        if change is None and self._request.outline_only and now.center == held.center:
+            return last, now, None
+        response = pb.WatchResponse(revision=event.revision, point_count=event.point_count, cause=event.cause)
+        if event.HasField("clock_time"):
+            response.clock_time.CopyFrom(event.clock_time)
+        if event.HasField("center"):
+            response.center.CopyFrom(event.center)
+        if change is None:
+            response.progress.SetInParent()
+        else:
+            response.change.CopyFrom(change)
+            if self._request.include_measures:
+                response.measures.CopyFrom(measures)
+        return last, now, Event(response.SerializeToString(), response.WhichOneof("event"))
+
+    async def _run(self) -> None:
+        try:
+            upstream = self._link.stream(WATCH, metadata_of_feed(self._request.name))
+            async with one_request(upstream, self._request.SerializeToString()):
+                while (message := await upstream.read()) is not None:
+                    await self._take(message)
+            self.failure = RelayedError(lost_status())  # watches do not end by themselves
+        except Exception as error:  # each watcher raises it, and logs what is a bug
+            self.failure = error
+        self._wake()
+
+    async def _take(self, message: bytes) -> None:
+        event = pb.WatchResponse.FromString(message)
+        if self._held is None:
+            if event.snapshot.uid != self.uid:  # it was deleted meanwhile, and created again
+                raise HullNotFoundError(self._request.name)
+            held = Held.of(event, keys=self._request.include_keys)
+        else:
+            held = await _run(self._held.after, len(self._held.vertices), event)
+        if event.HasField("measures"):
+            self._measures = event.measures
+        self._held, self._event, self._latest = held, event, Event(message, event.WhichOneof("event"))
+        self._number += 1
+        self.recent[held.revision] = held
+        while len(self.recent) > RECENT or (len(self.recent) > 1 and self._recent_bytes() > RECENT_BYTES):
+            self.recent.popitem(last=False)
+        self._wake()
+
+    def _recent_bytes(self) -> int:
+        return sum(each.vertices.nbytes for each in self.recent.values())
+
+    def _wake(self) -> None:
+        self._moved.set()
+        self._moved = asyncio.Event()
+
+
+async def _run(function: Callable[..., T], rows: int, *arguments: Any) -> T:
+    """Call a function: in a thread if it is about many vertices."""
+    return function(*arguments) if rows <= FEW else await asyncio.to_thread(function, *arguments)
+
+
+def _drop(*tasks: "asyncio.Future[Any] | None") -> None:
+    """Cancel tasks, or pass over what they have raised."""
+    for task in tasks:
+        if task is not None and not task.cancel() and not task.cancelled():
+            task.exception()
