@@ -64,8 +64,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if servers.shape != "process":
         for each in items:
-            if each.get_closest_marker("one_process"):
-                each.add_marker(pytest.mark.skip(reason="about a server of one process"))
+            if marker := each.get_closest_marker("one_process"):
+                each.add_marker(pytest.mark.skip(reason=f"about a server of one process: {marker.args[0]}"))
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)  # after pytest's own summary

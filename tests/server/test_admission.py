@@ -17,9 +17,10 @@ import grpc
 import numpy as np
 import pytest
 import trustme
+from cluster import descendants, processes
 from command_line import dynhull
 from grpc_health.v1 import health_pb2, health_pb2_grpc
-from metrics import measured, scrape
+from metrics import PROCESS, measured, scrape
 from patience import PATIENCE, wait_until
 from refusal import refusal
 from server_process import Server, finished, server_process
@@ -102,8 +103,9 @@ def flooded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 )
 def test_messages_of_strangers_take_no_memory(flooded: Server, method: str, token: str) -> None:
     def memory(what: str) -> int:
-        text = Path(f"/proc/{flooded.process.pid}/status").read_text()
-        return int(re.search(rf"{what}:\s+(\d+) kB", text).group(1)) * 1024
+        processes = (flooded.process.pid, *descendants(flooded.process.pid))
+        texts = [Path(f"/proc/{each}/status").read_text() for each in processes]
+        return sum(int(re.search(rf"{what}:\s+(\d+) kB", text).group(1)) for text in texts) * 1024
 
     before = memory("VmRSS")
     command = [sys.executable, FLOOD, flooded.address, token, method, str(CALLS), str(BYTES)]
@@ -196,7 +198,8 @@ def test_a_missing_file_of_tokens_is_told_once(tokens: Tokens, tmp_path: Path) -
             assert one.get_hull("a").info.name == "a"
         tokens.write(two=ALL)
         wait_until(lambda: refusal_of(lambda: one.get_hull("a")))
-    assert log.read_text().count("the tokens do not change") == 1
+        readers = len(processes(server.process.pid)) or 1
+    assert 1 <= log.read_text().count("the tokens do not change") <= readers
 
 
 def refusal_of(call: Callable[[], object]) -> Exception | None:
@@ -315,6 +318,7 @@ def test_health_of_an_unknown_service(channel: grpc.Channel) -> None:
     watch.cancel()
 
 
+@pytest.mark.one_process("each gateway has its own limit")
 def test_connections_are_bounded_and_idle_ones_closed() -> None:
     with server_process("--max-connections", "1", "--max-connection-idle", "0.1") as server, ExitStack() as stack:
         channels = [
@@ -403,6 +407,6 @@ def test_metrics_for_other_machines_are_for_who_may_read_everything(
                     page(token)
                 assert caught.value.code == status
                 caught.value.close()
-            told = page("all")
+            told = PROCESS.sub("", page("all"))
         assert 'dynhull_calls_total{code="UNAUTHENTICATED",method="metrics"} 2.0' in told
         assert 'dynhull_calls_total{code="PERMISSION_DENIED",method="metrics"} 1.0' in told

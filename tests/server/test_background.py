@@ -40,6 +40,7 @@ def health(address: str) -> int:
         return health_pb2_grpc.HealthStub(channel).Check(request).status
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_path: Path) -> None:
     with (
         faulty_server(tmp_path, "--metrics-port", "0", complaints="health is NOT_SERVING") as (server, faults),
@@ -60,6 +61,7 @@ def test_work_that_keeps_failing_makes_the_server_unwell_until_it_succeeds(tmp_p
         assert scrape(metrics)['dynhull_background_unwell{work="checkpoint"}'] == 0
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None:
     log = tmp_path / "data" / "dynhull.db-wal"
     points = np.random.default_rng(8).normal(size=(50, 2000, 2))
@@ -77,6 +79,7 @@ def test_the_log_is_short_again_after_checkpoints_failed(tmp_path: Path) -> None
         wait_until(lambda: client.apply("a", insert=points[0]) and log.stat().st_size <= 2**18)
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_a_disk_that_hangs_makes_the_server_unwell(tmp_path: Path) -> None:
     with (
         faulty_server(tmp_path, complaints="a commit has been running for") as (server, faults),
@@ -93,6 +96,7 @@ def test_a_disk_that_hangs_makes_the_server_unwell(tmp_path: Path) -> None:
         wait_until(lambda: health(server.address) == SERVING)
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Path) -> None:
     with faulty_server(tmp_path, complaints="this is a bug") as (server, faults):
         (faults / "impossible").touch()
@@ -101,6 +105,7 @@ def test_what_should_be_impossible_makes_the_server_unwell_at_once(tmp_path: Pat
         wait_until(lambda: health(server.address) == SERVING)
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_the_process_ends_with_its_committing_thread(tmp_path: Path) -> None:
     died = "background work has died"
     with (
@@ -114,6 +119,7 @@ def test_the_process_ends_with_its_committing_thread(tmp_path: Path) -> None:
         server.process.wait(PATIENCE)
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_an_outcome_is_unknown_until_the_disk_can_be_read(tmp_path: Path) -> None:
     with (
         faulty_server(tmp_path, complaints="Input/output error") as (server, faults),
@@ -143,6 +149,7 @@ def readable(client: HullClient) -> bool:
     return True
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_a_writer_finds_out_and_goes_on(tmp_path: Path) -> None:
     points = np.random.default_rng(5).normal(size=(30, 4, 2))
     with (

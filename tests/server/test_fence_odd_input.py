@@ -31,13 +31,13 @@ CORNERS = np.stack([np.cos(RING), np.sin(RING)], axis=1)
 def address() -> Iterator[str]:
     """A server with a fence, and hulls of every kind."""
     with server_process() as server, HullClient(server.address) as client:
-        for name, key in {"fleet": "str", "ids": "int", "points": None, "others": None}.items():
+        for name, key in {"odd/fleet": "str", "odd/ids": "int", "odd/points": None, "odd/others": None}.items():
             client.create_hull(name, keyed=key)
-        for name, center in {"ships": (180, -17), "nowhere": None, "atlantic": (0, 0)}.items():
+        for name, center in {"odd/ships": (180, -17), "odd/nowhere": None, "odd/atlantic": (0, 0)}.items():
             client.create_hull(name, keyed="str", geographic=True, center=center)
-        client.create_fence("depot", area=Circle(0, 0, 5), subjects="fleet")
-        client.put("fleet", ["a"], [[1, 1]])
-        client.ack_fence("depot", "mail", 2)
+        client.create_fence("odd/depot", area=Circle(0, 0, 5), subjects="odd/fleet")
+        client.put("odd/fleet", ["a"], [[1, 1]])
+        client.ack_fence("odd/depot", "mail", 2)
         yield server.address
 
 
@@ -52,32 +52,32 @@ def unchanged(address: str) -> Iterator[Callable[[], bytes]]:
 def settings(**given: Any) -> dict[str, Any]:
     """Settings of a fence: those that are given, and a circle around the fleet where they leave that open."""
     area = {} if {"polygon_area", "hull_area", "circle_area"} & given.keys() else CIRCLE
-    subjects = {} if {"subject_prefix", "subject_hull", "other_hull"} & given.keys() else {"subject_hull": "fleet"}
+    subjects = {} if {"subject_prefix", "subject_hull", "other_hull"} & given.keys() else {"subject_hull": "odd/fleet"}
     return {**area, **subjects, **given}
 
 
-def create(name: str = "zone", **given: Any) -> tuple[str, fs.CreateFenceRequest]:
+def create(name: str = "odd/zone", **given: Any) -> tuple[str, fs.CreateFenceRequest]:
     return "CreateFence", fs.CreateFenceRequest(name=name, config=settings(**given))
 
 
-def replace(name: str = "depot", **given: Any) -> tuple[str, fs.ReplaceFenceRequest]:
+def replace(name: str = "odd/depot", **given: Any) -> tuple[str, fs.ReplaceFenceRequest]:
     return "ReplaceFence", fs.ReplaceFenceRequest(name=name, config=settings(**given))
 
 
 def watch(**given: Any) -> tuple[str, fs.WatchFenceRequest]:
-    return "WatchFence", fs.WatchFenceRequest(**{"name": "depot", **given})
+    return "WatchFence", fs.WatchFenceRequest(**{"name": "odd/depot", **given})
 
 
 def ack(**given: Any) -> tuple[str, fs.AckFenceRequest]:
-    return "AckFence", fs.AckFenceRequest(**{"name": "depot", "consumer": "mail", **given})
+    return "AckFence", fs.AckFenceRequest(**{"name": "odd/depot", "consumer": "mail", **given})
 
 
 def ships(*ring: float) -> dict[str, Any]:
-    return {"subject_hull": "ships", "polygon_area": polygon(ring)}
+    return {"subject_hull": "odd/ships", "polygon_area": polygon(ring)}
 
 
 def ships_circle(x: float, y: float, radius: float) -> dict[str, Any]:
-    return {"subject_hull": "ships", "circle_area": {"center_x": x, "center_y": y, "radius": radius}}
+    return {"subject_hull": "odd/ships", "circle_area": {"center_x": x, "center_y": y, "radius": radius}}
 
 
 EXTERIOR = "config.polygon_area.polygons[0].exterior"
@@ -104,7 +104,7 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     "no fence to read": (("ReadInside", fs.ReadInsideRequest(name="zz")), NOT_FOUND, "", "zz"),
     # Subjects
     "no subjects": (
-        ("CreateFence", fs.CreateFenceRequest(name="zone", config=CIRCLE)),
+        ("CreateFence", fs.CreateFenceRequest(name="odd/zone", config=CIRCLE)),
         INVALID,
         "config",
         "no subjects",
@@ -112,16 +112,16 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     "subjects without a name": (create(subject_hull=""), INVALID, "config.subject_hull", ""),
     "subjects of two lines": (create(subject_hull="a\nb"), INVALID, "config.subject_hull", "a\nb"),
     "a prefix of nothing": (create(subject_prefix="a b"), INVALID, "config.subject_prefix", "a b"),
-    "subjects that are not there": (create(subject_hull="nobody"), NOT_FOUND, "", "nobody"),
-    "subjects without keys": (create(subject_hull="points"), FAILED, "config.subject_hull", "points"),
+    "subjects that are not there": (create(subject_hull="odd/nobody"), NOT_FOUND, "", "odd/nobody"),
+    "subjects without keys": (create(subject_hull="odd/points"), FAILED, "config.subject_hull", "odd/points"),
     "an other hull that is the area": (
-        create(other_hull="points", hull_area={"name": "points"}),
+        create(other_hull="odd/points", hull_area={"name": "odd/points"}),
         INVALID,
         "config.other_hull",
-        "points",
+        "odd/points",
     ),
-    "an other hull and a circle": (create(other_hull="points"), INVALID, "config.other_hull", "points"),
-    "other subjects": (replace(subject_hull="ids"), INVALID, "config.subject_hull", "ids"),
+    "an other hull and a circle": (create(other_hull="odd/points"), INVALID, "config.other_hull", "odd/points"),
+    "other subjects": (replace(subject_hull="odd/ids"), INVALID, "config.subject_hull", "odd/ids"),
     "a prefix instead": (replace(subject_prefix="fl"), INVALID, "config.subject_prefix", "fl"),
     # Numbers
     "a margin that is none": (create(margin=NAN), INVALID, "config.margin", "nan"),
@@ -129,7 +129,7 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     "a negative margin": (create(margin=-1), INVALID, "config.margin", "-1.0"),
     "another margin that is none": (replace(margin=NAN), INVALID, "config.margin", "nan"),
     "a distance that is none": (
-        create(other_hull="points", hull_area={"name": "others"}, near_distance=NAN),
+        create(other_hull="odd/points", hull_area={"name": "odd/others"}, near_distance=NAN),
         INVALID,
         "config.near_distance",
         "nan",
@@ -156,7 +156,7 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     ),
     # Areas
     "no area": (
-        ("CreateFence", fs.CreateFenceRequest(name="zone", config={"subject_hull": "fleet"})),
+        ("CreateFence", fs.CreateFenceRequest(name="odd/zone", config={"subject_hull": "odd/fleet"})),
         INVALID,
         "config",
         "no area",
@@ -165,7 +165,7 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     "a polygon without corners": (create(polygon_area=polygon([])), INVALID, EXTERIOR, "0 corners"),
     "two corners": (create(polygon_area=polygon([0, 0, 1, 1])), INVALID, EXTERIOR, "2 corners"),
     "two corners, and nobody compared": (
-        create(polygon_area=polygon([0, 0, 1, 1]), subject_prefix="later"),
+        create(polygon_area=polygon([0, 0, 1, 1]), subject_prefix="odd/later"),
         INVALID,
         EXTERIOR,
         "2 corners",
@@ -214,15 +214,15 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     "a negative radius": (create(circle_area={"radius": -1}), INVALID, "config.circle_area.radius", "-1.0"),
     "a centre that is none": (create(circle_area={"center_y": NAN}), INVALID, "config.circle_area.center_y", "nan"),
     "an area without a name": (create(hull_area={"name": ""}), INVALID, "config.hull_area.name", ""),
-    "an area that is not there": (create(hull_area={"name": "nobody"}), NOT_FOUND, "", "nobody"),
+    "an area that is not there": (create(hull_area={"name": "odd/nobody"}), NOT_FOUND, "", "odd/nobody"),
     "without self, of others": (
-        create(hull_area={"name": "points", "without_self": True}),
+        create(hull_area={"name": "odd/points", "without_self": True}),
         INVALID,
         "config.hull_area.without_self",
         "true",
     ),
     "without self and margin": (
-        create(hull_area={"name": "fleet", "without_self": True}),
+        create(hull_area={"name": "odd/fleet", "without_self": True}),
         INVALID,
         "config.margin",
         "0.0",
@@ -260,10 +260,15 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
         "config.margin",
         "1.0",
     ),
-    "no centre": (create(subject_hull="nowhere"), FAILED, "", "nowhere"),
-    "a prefix of the globe": (create(subject_prefix="ship"), FAILED, "", "ships"),
-    "another centre": (create(subject_hull="ships", hull_area={"name": "atlantic"}), FAILED, "", "ships"),
-    "an area of the plane": (create(subject_hull="ships", hull_area={"name": "points"}), FAILED, "", "points"),
+    "no centre": (create(subject_hull="odd/nowhere"), FAILED, "", "odd/nowhere"),
+    "a prefix of the globe": (create(subject_prefix="odd/ship"), FAILED, "", "odd/ships"),
+    "another centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/atlantic"}), FAILED, "", "odd/ships"),
+    "an area of the plane": (
+        create(subject_hull="odd/ships", hull_area={"name": "odd/points"}),
+        FAILED,
+        "",
+        "odd/points",
+    ),
     # Watches and consumers
     "after the last event": (watch(after_sequence=99), RANGE, "after_sequence", "99"),
     "after all numbers": (watch(after_sequence=2**64 - 1), INVALID, "after_sequence", str(2**64 - 1)),
@@ -273,20 +278,21 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
     "not only new": (watch(only_new=False), INVALID, "only_new", "false"),
     "a rate that is none": (watch(max_responses_per_second=NAN), INVALID, "max_responses_per_second", "nan"),
     "a negative rate": (watch(max_responses_per_second=-1), INVALID, "max_responses_per_second", "-1.0"),
+    "a rate that never sends": (watch(max_responses_per_second=5e-324), INVALID, "max_responses_per_second", "5e-324"),
     "no progress": (watch(progress_interval=Duration()), INVALID, "progress_interval", "0.0 s"),
-    "another uid": (watch(after_sequence=0, uid="zz"), RANGE, "uid", "depot"),
+    "another uid": (watch(after_sequence=0, uid="zz"), RANGE, "uid", "odd/depot"),
     "ahead": (ack(sequence=99), RANGE, "sequence", "99"),
     "far ahead": (ack(sequence=2**64 - 1), RANGE, "sequence", str(2**64 - 1)),
     "nobody acknowledges": (ack(consumer="", sequence=1), INVALID, "consumer", ""),
-    "another uid acknowledged": (ack(sequence=1, uid="zz"), RANGE, "uid", "depot"),
+    "another uid acknowledged": (ack(sequence=1, uid="zz"), RANGE, "uid", "odd/depot"),
     "no such consumer": (
-        ("DeleteConsumer", fs.DeleteConsumerRequest(name="depot", consumer="zz")),
+        ("DeleteConsumer", fs.DeleteConsumerRequest(name="odd/depot", consumer="zz")),
         NOT_FOUND,
         "",
         "zz",
     ),
     "no consumer to delete": (
-        ("DeleteConsumer", fs.DeleteConsumerRequest(name="depot")),
+        ("DeleteConsumer", fs.DeleteConsumerRequest(name="odd/depot")),
         INVALID,
         "consumer",
         "",
@@ -320,108 +326,127 @@ def test_a_request_is_refused(address: str, unchanged: Callable[[], bytes], case
 
 def test_odd_input_that_is_allowed(address: str) -> None:
     with HullClient(address) as client:
-        huge = client.create_fence("huge", CORNERS[:-1], "fleet", max_events=2**63 - 1, confirmations=2**32 - 1)
+        huge = client.create_fence("odd/huge", CORNERS[:-1], "odd/fleet", max_events=2**63 - 1, confirmations=2**32 - 1)
         assert (huge.inside, len(huge.area[0].exterior)) == (0, 100_000)
         client.create_fence("later", Circle(0, 0, 1), Prefix("later/"))
-        assert client.ack_fence("depot", "mail", 1).acknowledged == 2  # backwards changes nothing
-        assert client.ack_fence("depot", "new", 0).acknowledged == 0
+        assert client.ack_fence("odd/depot", "mail", 1).acknowledged == 2  # backwards changes nothing
+        assert client.ack_fence("odd/depot", "new", 0).acknowledged == 0
         for _ in range(2):  # the same consumer twice at a time
-            with client.watch_fence("depot", consumer="twice") as one, client.watch_fence("depot", "twice") as two:
+            with (
+                client.watch_fence("odd/depot", consumer="twice") as one,
+                client.watch_fence("odd/depot", "twice") as two,
+            ):
                 assert next(one) == next(two)
-        client.delete_fence("huge")
+        client.delete_fence("odd/huge")
         client.delete_fence("later")
         for consumer in ("new", "twice"):
-            client.delete_consumer("depot", consumer)
+            client.delete_consumer("odd/depot", consumer)
 
 
 MASKED = np.ma.array([[0, 0], [4, 0], [4, 4.0]], mask=[[0, 0], [0, 1], [0, 0]])
 
 ARGUMENTS: dict[str, tuple[Callable[[HullClient], object], type[Exception], str]] = {
-    "masked corners": (lambda c: c.create_fence("zone", MASKED, "fleet"), ValueError, "masked array"),
+    "masked corners": (lambda c: c.create_fence("odd/zone", MASKED, "odd/fleet"), ValueError, "masked array"),
     "complex corners": (
-        lambda c: c.create_fence("zone", [[0, 0], [1j, 0], [1, 1]], "fleet"),
+        lambda c: c.create_fence("odd/zone", [[0, 0], [1j, 0], [1, 1]], "odd/fleet"),
         ValueError,
         "area row 1",
     ),
-    "no area": (lambda c: c.create_fence("zone", None, "fleet"), TypeError, "area is None"),
-    "a circle that is none": (lambda c: c.create_fence("zone", Circle(0, NAN, 1), "fleet"), ValueError, "y is nan"),
-    "a name that is a number": (lambda c: c.create_fence(7, Circle(0, 0, 1), "fleet"), TypeError, "name is 7"),
+    "no area": (lambda c: c.create_fence("odd/zone", None, "odd/fleet"), TypeError, "area is None"),
+    "a circle that is none": (
+        lambda c: c.create_fence("odd/zone", Circle(0, NAN, 1), "odd/fleet"),
+        ValueError,
+        "y is nan",
+    ),
+    "a name that is a number": (lambda c: c.create_fence(7, Circle(0, 0, 1), "odd/fleet"), TypeError, "name is 7"),
     "no name": (lambda c: c.get_fence(None), TypeError, "name is None"),
-    "subjects that are a number": (lambda c: c.create_fence("zone", Circle(0, 0, 1), 7), TypeError, "subjects is 7"),
+    "subjects that are a number": (
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), 7),
+        TypeError,
+        "subjects is 7",
+    ),
     "a prefix that is a number": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), Prefix(7)),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), Prefix(7)),
         TypeError,
         "subjects is 7",
     ),
     "an other hull that is a number": (
-        lambda c: c.create_fence("zone", "points", other_hull=7),
+        lambda c: c.create_fence("odd/zone", "odd/points", other_hull=7),
         TypeError,
         "other_hull is 7",
     ),
-    "nobody compared": (lambda c: c.create_fence("zone", Circle(0, 0, 1)), ValueError, "subjects or other_hull"),
-    "a unit": (lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", margin="5m"), TypeError, "margin: .*'5m'"),
-    "no margin": (lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", margin=None), TypeError, "margin: .*None"),
+    "nobody compared": (lambda c: c.create_fence("odd/zone", Circle(0, 0, 1)), ValueError, "subjects or other_hull"),
+    "a unit": (
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", margin="5m"),
+        TypeError,
+        "margin: .*'5m'",
+    ),
+    "no margin": (
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", margin=None),
+        TypeError,
+        "margin: .*None",
+    ),
     "a negative margin": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", margin=-1),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", margin=-1),
         InvalidRequestError,
         "margin is -1",
     ),
     "half a confirmation": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", confirmations=1.5),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", confirmations=1.5),
         TypeError,
         "confirmations is 1.5",
     ),
     "too many confirmations": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", confirmations=2**32),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", confirmations=2**32),
         ValueError,
         "confirmations must be less than 2\\*\\*32",
     ),
     "many events": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", max_events="many"),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", max_events="many"),
         TypeError,
         "max_events is 'many'",
     ),
     "a flag in words": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", crosses="no"),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", crosses="no"),
         TypeError,
         "crosses is 'no'",
     ),
     "a dwell in words": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", dwell="1h"),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", dwell="1h"),
         ValueError,
         "dwell is '1h'",
     ),
     "a dwell of nothing": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", dwell=1e-9),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", dwell=1e-9),
         ValueError,
         "dwell is 1e-09: must be at least a microsecond",
     ),
     "an endless min_dwell": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", min_dwell=INF),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", min_dwell=INF),
         ValueError,
         "min_dwell is inf",
     ),
     "a negative age": (
-        lambda c: c.create_fence("zone", Circle(0, 0, 1), "fleet", max_event_age=-1),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", max_event_age=-1),
         InvalidRequestError,
         "max_event_age is '-1 s",
     ),
     "latitudes first": (
-        lambda c: c.create_fence("zone", [(-17.5, 179.5), (-17.5, -179.5), (-16.5, -179.5)], "ships"),
+        lambda c: c.create_fence("odd/zone", [(-17.5, 179.5), (-17.5, -179.5), (-16.5, -179.5)], "odd/ships"),
         InvalidRequestError,
         "the longitude comes first",
     ),
-    "a negative sequence": (lambda c: c.ack_fence("depot", "mail", -1), ValueError, "sequence must be at least 0"),
-    "half a sequence": (lambda c: c.ack_fence("depot", "mail", 1.5), TypeError, "sequence is 1.5"),
-    "no sequence": (lambda c: c.ack_fence("depot", "mail", None), TypeError, "sequence is None"),
-    "a sequence beyond all": (lambda c: c.ack_fence("depot", "mail", 2**64), ValueError, "sequence must be less"),
-    "a consumer that is a number": (lambda c: c.ack_fence("depot", 7, 1), TypeError, "consumer is 7"),
-    "a consumer to delete": (lambda c: c.delete_consumer("depot", None), TypeError, "consumer is None"),
-    "after half an event": (lambda c: c.watch_fence("depot", after=0.5), TypeError, "after is 0.5"),
-    "a rate that is none": (lambda c: c.watch_fence("depot", max_rate=NAN), ValueError, "max_rate is nan"),
-    "a rate in words": (lambda c: c.watch_fence("depot", max_rate="fast"), TypeError, "max_rate: .*'fast'"),
+    "a negative sequence": (lambda c: c.ack_fence("odd/depot", "mail", -1), ValueError, "sequence must be at least 0"),
+    "half a sequence": (lambda c: c.ack_fence("odd/depot", "mail", 1.5), TypeError, "sequence is 1.5"),
+    "no sequence": (lambda c: c.ack_fence("odd/depot", "mail", None), TypeError, "sequence is None"),
+    "a sequence beyond all": (lambda c: c.ack_fence("odd/depot", "mail", 2**64), ValueError, "sequence must be less"),
+    "a consumer that is a number": (lambda c: c.ack_fence("odd/depot", 7, 1), TypeError, "consumer is 7"),
+    "a consumer to delete": (lambda c: c.delete_consumer("odd/depot", None), TypeError, "consumer is None"),
+    "after half an event": (lambda c: c.watch_fence("odd/depot", after=0.5), TypeError, "after is 0.5"),
+    "a rate that is none": (lambda c: c.watch_fence("odd/depot", max_rate=NAN), ValueError, "max_rate is nan"),
+    "a rate in words": (lambda c: c.watch_fence("odd/depot", max_rate="fast"), TypeError, "max_rate: .*'fast'"),
     "a progress that is none": (
-        lambda c: c.watch_fence("depot", progress_interval=NAN),
+        lambda c: c.watch_fence("odd/depot", progress_interval=NAN),
         ValueError,
         "progress_interval is nan",
     ),
@@ -438,45 +463,51 @@ def test_an_argument_of_the_client_is_refused(address: str, unchanged: Callable[
     assert unchanged() == before
 
 
-DISK = ("--circle", "0", "0", "1", "--subjects", "fleet")
+DISK = ("--circle", "0", "0", "1", "--subjects", "odd/fleet")
 
 OPTIONS: dict[str, tuple[list[str], str]] = {
-    "a margin that is none": (["create", "zone", *DISK, "--margin", "nan"], "margin is nan"),
-    "a margin in metres": (["create", "zone", *DISK, "--margin", "5m"], "unable to parse string as a number"),
-    "a negative margin": (["create", "zone", *DISK, "--margin", "-1"], "margin is -1.0"),
+    "a margin that is none": (["create", "odd/zone", *DISK, "--margin", "nan"], "margin is nan"),
+    "a margin in metres": (["create", "odd/zone", *DISK, "--margin", "5m"], "unable to parse string as a number"),
+    "a negative margin": (["create", "odd/zone", *DISK, "--margin", "-1"], "margin is -1.0"),
     "half a confirmation": (
-        ["create", "zone", *DISK, "--confirmations", "1.5"],
+        ["create", "odd/zone", *DISK, "--confirmations", "1.5"],
         "unable to parse string as an integer",
     ),
-    "negative confirmations": (["create", "zone", *DISK, "--confirmations", "-1"], "confirmations must be at least 0"),
-    "negative events": (["create", "zone", *DISK, "--max-events", "-1"], "max_events must be at least 0"),
-    "a dwell without a unit": (["create", "zone", *DISK, "--dwell", "90 sheep"], "--dwell '90 sheep'"),
-    "a negative min_dwell": (["create", "zone", *DISK, "--min-dwell", "-1s"], "--min-dwell '-1s'"),
-    "an age in words": (["create", "zone", *DISK, "--max-event-age", "old"], "--max-event-age 'old'"),
-    "half a boundary": (["create", "zone", *DISK, "--boundary", "half"], "'half' is not one of"),
+    "negative confirmations": (
+        ["create", "odd/zone", *DISK, "--confirmations", "-1"],
+        "confirmations must be at least 0",
+    ),
+    "negative events": (["create", "odd/zone", *DISK, "--max-events", "-1"], "max_events must be at least 0"),
+    "a dwell without a unit": (["create", "odd/zone", *DISK, "--dwell", "90 sheep"], "--dwell '90 sheep'"),
+    "a negative min_dwell": (["create", "odd/zone", *DISK, "--min-dwell", "-1s"], "--min-dwell '-1s'"),
+    "an age in words": (["create", "odd/zone", *DISK, "--max-event-age", "old"], "--max-event-age 'old'"),
+    "half a boundary": (["create", "odd/zone", *DISK, "--boundary", "half"], "'half' is not one of"),
     "a name with a blank": (["create", "a b", *DISK], "name is 'a b'"),
     "an empty prefix of odd characters": (
-        ["create", "zone", "--circle", "0", "0", "1", "--subject-prefix", "%"],
+        ["create", "odd/zone", "--circle", "0", "0", "1", "--subject-prefix", "%"],
         "config.subject_prefix is %",
     ),
     "a circle that is none": (
-        ["create", "zone", "--circle", "0", "nan", "1", "--subjects", "fleet"],
+        ["create", "odd/zone", "--circle", "0", "nan", "1", "--subjects", "odd/fleet"],
         "the circle's y is nan",
     ),
     "a ring that crosses itself": (
-        ["create", "zone", "--polygon", "POLYGON ((0 0, 2 2, 2 0, 0 2, 0 0))", "--subjects", "fleet"],
+        ["create", "odd/zone", "--polygon", "POLYGON ((0 0, 2 2, 2 0, 0 2, 0 0))", "--subjects", "odd/fleet"],
         "edges 0 and 2 cross",
     ),
-    "an empty polygon": (["create", "zone", "--polygon", "POLYGON EMPTY", "--subjects", "fleet"], "empty Polygon"),
-    "other subjects": (
-        ["replace", "depot", "--circle", "0", "0", "5", "--subjects", "ids"],
-        "config.subject_hull is ids",
+    "an empty polygon": (
+        ["create", "odd/zone", "--polygon", "POLYGON EMPTY", "--subjects", "odd/fleet"],
+        "empty Polygon",
     ),
-    "ahead": (["ack", "depot", "mail", "99"], "sequence 99 is after the last event, 2"),
-    "backwards in words": (["ack", "depot", "mail", "-1"], "No such option: -1"),
-    "a watch from the future": (["watch", "depot", "--after", "99"], "sequence 99 is after the last event, 2"),
-    "a rate that is none": (["watch", "depot", "--max-rate", "nan"], "greater than or equal to 0"),
-    "no events": (["watch", "depot", "--events", "0"], "greater than or equal to 1"),
+    "other subjects": (
+        ["replace", "odd/depot", "--circle", "0", "0", "5", "--subjects", "odd/ids"],
+        "config.subject_hull is odd/ids",
+    ),
+    "ahead": (["ack", "odd/depot", "mail", "99"], "sequence 99 is after the last event, 2"),
+    "backwards in words": (["ack", "odd/depot", "mail", "-1"], "No such option: -1"),
+    "a watch from the future": (["watch", "odd/depot", "--after", "99"], "sequence 99 is after the last event, 2"),
+    "a rate that is none": (["watch", "odd/depot", "--max-rate", "nan"], "greater than or equal to 0"),
+    "no events": (["watch", "odd/depot", "--events", "0"], "greater than or equal to 1"),
     "a list of nothing": (["list", "%"], "prefix is %"),
     "inside of nothing": (["inside", "zz"], "there is no fence 'zz'"),
 }

@@ -93,6 +93,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Ve
     return data, found
 
 
+@pytest.mark.one_process("the fences combine hulls of many names, and the folder is read as one")
 def test_fences_of_every_kind_are_whole(folder: tuple[Path, dict[str, Verification]]) -> None:
     data, found = folder
     assert {name: each.fence_differences for name, each in found.items() if not each.whole} == {}
@@ -209,6 +210,7 @@ def test_a_wrong_count_is_found() -> None:
     ]
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_health_logs_and_the_command_tell_of_a_wrong_fence() -> None:
     complaint = "a fence differs from its recomputation"
     with (
@@ -247,6 +249,7 @@ def depot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return data
 
 
+@pytest.mark.one_process("the test writes into the database of a folder")
 @pytest.mark.parametrize(
     ("made", "complaint"),
     [

@@ -250,22 +250,23 @@ def test_a_stay_goes_on_while_the_server_is_down(tmp_path: Path, name: str) -> N
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             put(stub, keyed(stub, name), a=(1, 0))
-            fences.CreateFence(fs.CreateFenceRequest(name="replaced", config=config))
+            fences.CreateFence(fs.CreateFenceRequest(name=f"{name}/replaced", config=config))
             begun = time.time_ns() // 1000
-            fences.CreateFence(fs.CreateFenceRequest(name="new", config=config | {"dwell": span(1)}))
-            fences.ReplaceFence(fs.ReplaceFenceRequest(name="replaced", config=config | {"dwell": span(1)}))
+            fences.CreateFence(fs.CreateFenceRequest(name=f"{name}/new", config=config | {"dwell": span(1)}))
+            fences.ReplaceFence(fs.ReplaceFenceRequest(name=f"{name}/replaced", config=config | {"dwell": span(1)}))
             ended = time.time_ns() // 1000
         server.process.kill()
     time.sleep(1)
     with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
-        for fence in ("new", "replaced"):
+        for fence in (f"{name}/new", f"{name}/replaced"):
             (dwelt,) = waited(fences, fence, 1)
             assert told(dwelt) == "DWELL a TIME_PASSED"
             assert stayed(dwelt) >= SECOND
             assert begun <= dwelt.first_time.ToMicroseconds() <= ended
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 @pytest.mark.parametrize("fault", ["commit", "settle"])
 def test_a_commit_that_fails_makes_no_second_event(tmp_path: Path, name: str, fault: str) -> None:
     """The commit of the event is kept but reported as failed; with `settle`, nobody can say so for a while."""
@@ -438,13 +439,14 @@ def test_a_fence_replaced_by_one_with_fewer_rules_ends_what_waits(
 
 def test_what_waits_survives_kills(tmp_path: Path, name: str) -> None:
     """Reports are counted, and time passes, over two lives of the server and while it is down."""
+    counts, times = f"{name}/counts", f"{name}/times"
     config = {"circle_area": CIRCLE, "subject_hull": name, "initial": "FENCE_INITIAL_NONE"}
     with server_process("--data", str(tmp_path), killed=True) as server:
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
             put(stub, keyed(stub, name), a=(9, 0), b=(1, 0), c=(1, 1))
-            create(fences, "counts", **config, confirmations=3)
-            create(fences, "times", **config, min_dwell=span(LONG_STAY))
+            create(fences, counts, **config, confirmations=3)
+            create(fences, times, **config, min_dwell=span(LONG_STAY))
             begun = time.time_ns() // 1000
             put(stub, name, a=(1, 0), b=(9, 0), c=(9, 1))
             ended = time.time_ns() // 1000
@@ -453,10 +455,10 @@ def test_what_waits_survives_kills(tmp_path: Path, name: str) -> None:
     with server_process("--data", str(tmp_path), killed=True) as server:
         with grpc.insecure_channel(server.address) as channel:
             stub, fences = HullServiceStub(channel), FenceServiceStub(channel)
-            assert [inside(fences, fence) for fence in ("counts", "times")] == [["b", "c"]] * 2
+            assert [inside(fences, fence) for fence in (counts, times)] == [["b", "c"]] * 2
             put(stub, name, a=(3, 0))
-            assert words(events(fences, "counts")) == ["ENTER a SUBJECT_MOVED"]
-            found = waited(fences, "times", 2)
+            assert words(events(fences, counts)) == ["ENTER a SUBJECT_MOVED"]
+            found = waited(fences, times, 2)
             expected = ["ENTER a SUBJECT_MOVED TIME_PASSED", "EXIT b SUBJECT_MOVED TIME_PASSED"]
             assert words(found) == expected
             assert all(stayed(each) >= LONG_STAY * SECOND for each in found)
@@ -464,11 +466,11 @@ def test_what_waits_survives_kills(tmp_path: Path, name: str) -> None:
         server.process.kill()
     with server_process("--data", str(tmp_path)) as server, grpc.insecure_channel(server.address) as channel:
         fences = FenceServiceStub(channel)
-        assert [inside(fences, fence) for fence in ("counts", "times")] == [["a", "b", "c"], ["a", "c"]]
+        assert [inside(fences, fence) for fence in (counts, times)] == [["a", "b", "c"], ["a", "c"]]
         put(HullServiceStub(channel), name, b=(9, 0))
         put(HullServiceStub(channel), name, b=(9, 0))
-        assert words(events(fences, "counts", after=1)) == ["EXIT b SUBJECT_MOVED"]
-        assert len(events(fences, "times")) == len(expected)
+        assert words(events(fences, counts, after=1)) == ["EXIT b SUBJECT_MOVED"]
+        assert len(events(fences, times)) == len(expected)
 
 
 @pytest.mark.parametrize(

@@ -125,6 +125,7 @@ def test_what_a_writer_that_has_gone_left_behind_does_not_hold_up_the_end() -> N
         server.process.terminate()  # in peace, and without a word
 
 
+@pytest.mark.one_process("a supervisor has one thread")
 def test_a_signal_that_another_thread_gets_ends_the_server() -> None:
     with server_process() as server:
         pid = server.process.pid

@@ -68,6 +68,8 @@ def reads_of(hull: str) -> list[pb.Read]:
         pb.Read(frontier=pb.FrontierRequest(name=name, points=SHARES, rates=[0.01])),
         pb.Read(verify=pb.VerifyRequest(name=name)),
         pb.Read(get_producer=pb.GetProducerRequest(name=name, producer="p")),
+        pb.Read(get_layers=pb.GetLayersRequest(name=keyed, layer_count=2, include_keys=True)),
+        pb.Read(get_influence=pb.GetInfluenceRequest(name=name)),
     ]
 
 
@@ -186,8 +188,12 @@ class Conversation:
     def end(self) -> None:
         self._messages.put(None)
 
-    def receive(self) -> list[pb.ReadAnswer]:
-        return list(next(self.call).answers)
+    def receive(self, least: int = 1) -> list[pb.ReadAnswer]:
+        """The answers of the next message, or of as many as have so many."""
+        answers: list[pb.ReadAnswer] = []
+        while len(answers) < least:
+            answers += next(self.call).answers
+        return answers
 
 
 def at(name: str, revision: int) -> pb.Read:
@@ -198,9 +204,9 @@ def test_a_read_waits_for_its_revision_and_those_before_it_do_not(stub: HullServ
     name = f"{filled}/points"
     talk = Conversation(stub)
     talk.send(at(name, 0), at(name, 1), at(name, 2), at(name, 0))
-    assert [answer.get_hull.hull.revision for answer in talk.receive()] == [1, 1]
+    assert [answer.get_hull.hull.revision for answer in talk.receive(2)] == [1, 1]
     stub.Apply(pb.ApplyRequest(name=name, batch={"inserts": {"coordinates": [5, 5]}}))
-    assert [answer.get_hull.hull.revision for answer in talk.receive()] == [2, 2]
+    assert [answer.get_hull.hull.revision for answer in talk.receive(2)] == [2, 2]
     talk.send(pb.Read(separate=pb.SeparateRequest(name=name, other_name=f"{filled}/keys", other_min_revision=2)))
     stub.DeleteHull(pb.DeleteHullRequest(name=f"{filled}/keys"))
     assert [reason(answer) for answer in talk.receive()] == ["HULL_NOT_FOUND"]
