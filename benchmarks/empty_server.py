@@ -1,4 +1,7 @@
-"""The fastest handlers that grpcio allows: they read, acknowledge and do nothing else. `server.py` measures them."""
+"""The fastest handlers that grpcio allows: they read, acknowledge and do nothing else. `server.py` measures them.
+
+With a port as the last argument, several of these processes share it.
+"""
 
 import asyncio
 import sys
@@ -24,7 +27,7 @@ async def main() -> None:
         "Locate": grpc.unary_unary_rpc_method_handler(unary),
     }
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("dynhull.v1.HullService", handlers),))
-    port = server.add_insecure_port("127.0.0.1:0")
+    port = server.add_insecure_port(f"127.0.0.1:{sys.argv[-1] if sys.argv[-1].isdecimal() else 0}")
     await server.start()
     print(f"empty serving on 127.0.0.1:{port}", flush=True)
     await server.wait_for_termination()

@@ -58,13 +58,14 @@ def unary(client, reads):
     return reads / (time.perf_counter() - begun)
 
 
-def h2load(address, requests):
-    """Unary calls a second, over 4 connections with 32 streams each."""
+def h2load(address, requests, connections=4):
+    """Unary calls a second, 128 at a time: over 4 connections with 32 streams each, or over more with fewer."""
     message = pb.LocateRequest(name="a", points={"packed": ONE.tobytes()}).SerializeToString()
     with tempfile.NamedTemporaryFile() as body:
         body.write(b"\0" + len(message).to_bytes(4, "big") + message)
         body.flush()
-        command = ["h2load", "-n", str(requests), "-c", "4", "-m", "32", "-t", "1", "-d", body.name]
+        command = ["h2load", "-n", str(requests), "-c", str(connections), "-m", str(128 // connections)]
+        command += ["-t", "1", "-d", body.name]
         headers = ["-H", "content-type: application/grpc", "-H", "te: trailers"]
         url = f"http://{address}{SERVICE}Locate"
         done = subprocess.run([*command, *headers, url], capture_output=True, text=True, check=True)
