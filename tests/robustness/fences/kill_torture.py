@@ -12,7 +12,6 @@ many. A step is a key or point that a batch names, or a change of a fence.
 import argparse
 import random
 import shutil
-import subprocess
 import sys
 import tempfile
 import threading
@@ -27,8 +26,7 @@ from typing import Any
 import grpc
 
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[2] / "support")]
-import wall_clock
-from forked import COMMAND, Process
+from mortal_server import MortalServer
 from told import Expectation, Reader, ToldWorld, must
 from world import FENCES, GUEST, HULLS, KEYED, TICK, ZONE, Chance
 
@@ -59,41 +57,6 @@ SHARED_MEMORY = Path("/dev/shm")
 STEPS_BACK = shutil.which("faketime") is not None
 LOST = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED, grpc.StatusCode.UNKNOWN)
 Ask = Callable[[Any], Any]
-
-
-class Server:
-    """`dynhull serve` on a folder; it keeps its port over its lives."""
-
-    def __init__(self, folder: Path) -> None:
-        self._data = folder / "data"
-        self._log = folder / "server.log"
-        self._port = 0
-        self.lives = 0
-        self.stepped_back = False
-        self.up = threading.Event()
-        self.start()
-
-    def start(self, *, stepped_back: bool = False) -> None:
-        wrap = wall_clock.at("-1h") if stepped_back else []
-        command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--data", str(self._data)]
-        command += ["--snapshot-points", "300", "--log-level", "warning", "--scrub-cpu", "0"]
-        with self._log.open("ab") as log:
-            self._process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        must("serving on" in line, "the server did not start:", self._log.read_text()[-2000:])
-        self._port = int(line.rsplit(":", 1)[1])
-        self.lives += 1
-        self.up.set()
-
-    @property
-    def address(self) -> str:
-        return f"127.0.0.1:{self._port}"
-
-    def kill(self) -> None:
-        self.up.clear()
-        self._process.kill()
-        self._process.wait()
 
 
 class LiveWatch:
@@ -192,7 +155,7 @@ class Draw(Chance):
 class WorldClient:
     """The only client of one world."""
 
-    def __init__(self, number: int, server: Server, seed: int) -> None:
+    def __init__(self, number: int, server: MortalServer, seed: int) -> None:
         self.counts: Counter[str] = Counter()
         self.failure: BaseException | None = None
         self._server = server
@@ -463,7 +426,7 @@ def packed(times: list[int]) -> bytes:
 def run(steps: int, kills: int, worlds: int, seed: int, folder: Path) -> Counter[str]:
     """That many steps and kills; AssertionError at the first event that is missing, wrong or too many."""
     rng = random.Random(seed)
-    server = Server(folder)
+    server = MortalServer(folder, "--snapshot-points", "300", "--scrub-cpu", "0")
     counts: Counter[str] = Counter()
     begun = time.monotonic()
     clients = [WorldClient(number, server, seed) for number in range(worlds)]

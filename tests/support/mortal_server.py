@@ -1,0 +1,48 @@
+"""A real server that is killed and started again on what is left."""
+
+import subprocess
+import threading
+from pathlib import Path
+
+import wall_clock
+from forked import COMMAND, Process
+
+
+class MortalServer:
+    """`dynhull serve` with these options on a folder; it keeps its port over its lives.
+
+    Attributes:
+        lives: how often it has started.
+        up: set while it runs.
+    """
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        self._data = folder / "data"
+        self._options = options
+        self._log = folder / "server.log"
+        self._port = 0
+        self.lives = 0
+        self.up = threading.Event()
+        self.start()
+
+    def start(self, *, stepped_back: bool = False) -> None:
+        wrap = wall_clock.at("-1h") if stepped_back else []
+        command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--data", str(self._data)]
+        command += ["--log-level", "warning", *self._options]
+        with self._log.open("ab") as log:
+            self._process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        assert "serving on" in line, f"the server did not start: {self._log.read_text()[-2000:]}"
+        self._port = int(line.rsplit(":", 1)[1])
+        self.lives += 1
+        self.up.set()
+
+    @property
+    def address(self) -> str:
+        return f"127.0.0.1:{self._port}"
+
+    def kill(self) -> None:
+        self.up.clear()
+        self._process.kill()
+        self._process.wait()
