@@ -1,10 +1,12 @@
 """Keys that one batch moves between hulls of a prefix are subjects that move."""
 
+import time
 from itertools import count
 
 import grpc
 import pytest
 from fence_calls import create, events, polygon, put, puts
+from patience import wait_until
 
 from dynhull_proto.v1 import batch_pb2, fence_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -165,6 +167,27 @@ def test_reports_that_confirm_go_over(stub, fences, at):
     ]
     confirmed = events(fences, fence)[3]
     assert confirmed.first_time.ToMicroseconds() < confirmed.time.ToMicroseconds()
+
+
+def test_time_that_confirms_goes_over(stub, fences, at):
+    """Who waits in one hull waits on in the other, and since the same time."""
+    fence = at + "gate"
+    put(stub, at + "yard", van=(9, 1), bus=(1, 1))
+    config = {"polygon_area": polygon(SQUARE), "subject_prefix": at, "min_dwell": {"seconds": 1}}
+    create(fences, fence, initial="FENCE_INITIAL_NONE", **config)
+    begun = time.time_ns()
+    put(stub, at + "yard", van=(1, 1), bus=(9, 1))
+    ended = time.time_ns()
+    transfer(stub, at, "yard", "road", van=(2, 1), bus=(9, 2))
+    wait_until(lambda: len(events(fences, fence)) == 3)
+    assert [line[:4] for line in lines(fences, fence, at)] == [
+        ("transfer", "yard", "road", "bus"),
+        ("exit", "", "road", "bus"),
+        ("enter", "", "road", "van"),
+    ]
+    for event in events(fences, fence)[1:]:
+        assert begun // 1000 <= event.first_time.ToMicroseconds() <= ended // 1000
+        assert event.time.ToMicroseconds() - event.first_time.ToMicroseconds() >= 10**6
 
 
 def test_a_batch_that_is_refused_moves_nobody(stub, fences, at):

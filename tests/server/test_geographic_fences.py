@@ -4,7 +4,7 @@ import signal
 
 import numpy as np
 import pytest
-from patience import PATIENCE
+from patience import PATIENCE, wait_until
 from pyproj import Geod
 from server_process import server_process
 
@@ -97,6 +97,39 @@ def test_a_hull_as_an_area_moves_over_keys(client, fleet, name):
     ]
     now = dynhull.GeoHull([*ZONE[:2], (180, -17.2)])
     assert events[1].distance == pytest.approx(now.distance([(180, -17)])[0], abs=1e-6)
+
+
+def test_rules_that_delay_hold_on_the_globe(client, fleet):
+    zone = f"{fleet}/zone"
+    client.put(fleet, ["a", "b"], [(178, -17), (180, -17)])
+    client.create_fence(zone, area=ZONE, subjects=fleet, initial="none", confirmations=2, crosses=True)
+    client.put(fleet, ["a", "b"], [(179.9, -17.1), (-178.4, -17.1)])
+    client.put(fleet, ["a", "b"], [(179.9, -17.1), (-178.3, -17.1)])
+    client.put(fleet, ["b"], [(0.1 + 178.8, -17.0)])
+    events = told(client, zone)
+    assert lines(events) == [
+        ("enter", "a", (179.9, -17.1), None),
+        ("exit", "b", (-178.3, -17.1), None),
+        ("cross", "b", (0.1 + 178.8, -17.0), (-178.3, -17.1)),
+    ]
+    assert [event.first_time is not None and event.first_time < event.time for event in events] == [True, True, False]
+    east, west = dynhull.GeoHull(ZONE).distance([(-178.3, -17.1), (0.1 + 178.8, -17.0)])
+    assert [event.distance for event in events] == [0, pytest.approx(east), pytest.approx(west)]
+
+
+def test_a_stay_on_the_globe_is_reported_where_it_is(client, fleet):
+    for rule, kinds in (("dwell", ["enter", "dwell"]), ("min_dwell", ["enter"])):
+        zone = f"{fleet}/{rule}"
+        client.create_fence(zone, area=Circle(180, -17, 5_000), subjects=fleet, initial="none", **{rule: 0.05})
+        client.put(fleet, ["a"], [(179.97, -17)])
+        wait_until(lambda zone=zone, kinds=kinds: client.get_fence(zone).last_sequence == len(kinds))
+        found = told(client, zone)
+        assert [(event.type, event.position, event.distance) for event in found] == [
+            (kind, (179.97, -17), 0) for kind in kinds
+        ]
+        assert (found[-1].time - found[-1].first_time).total_seconds() >= 0.05
+        client.delete_fence(zone)
+        client.remove(fleet, ["a"])
 
 
 def test_two_hulls_meet_or_are_near_in_metres(client, fleet, name):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import grpc
 import pytest
+from adjustable_clock import AdjustableClock
 from entity_messages import COORDINATES, SECOND, STRINGS, duration, keys, points, puts, times, window
 from google.protobuf.duration_pb2 import Duration
 from live_engine import LIMITS
@@ -21,7 +22,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
-from dynhull_server.engine.threads import Clock, Machine
+from dynhull_server.engine.threads import Machine
 from dynhull_server.rpc.decode_batch import decode_batch
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.records import HullSettings, Window
@@ -225,16 +226,6 @@ def test_a_kill_loses_no_key_no_time_and_no_clock(tmp_path: Path) -> None:
         assert stub.Apply(again).result.duplicate
         assert counts(apply(stub, "evicting", insert(0, 0))) == {"inserted": 1, "evicted": 1}
         assert everything(stub, "evicting") == [-59, 59, -58, 58, 0, 0, 58, 1, 59, 2]
-
-
-class AdjustableClock(Clock):
-    """A clock whose wall time can be set."""
-
-    def __init__(self, ahead: float) -> None:
-        self.ahead = ahead
-
-    def wall(self) -> float:
-        return super().wall() + self.ahead
 
 
 def test_a_wall_clock_that_is_set_back_makes_nothing_young_again() -> None:

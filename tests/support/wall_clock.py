@@ -1,6 +1,7 @@
 """A wall clock that is set for one process, by libfaketime."""
 
 import subprocess
+from functools import cache
 
 from peers import program
 
@@ -10,7 +11,11 @@ def at(offset: str) -> list[str]:
 
     The test is skipped where libfaketime is missing.
     """
-    library = subprocess.check_output([program("faketime"), "-f", "+0", "printenv", "LD_PRELOAD"], text=True).strip()
     # Debian's library is built with the fix, which makes every wait on a condition 60 ms longer.
     only_wall = "FAKETIME_DONT_FAKE_MONOTONIC=1", "FAKETIME_FORCE_MONOTONIC_FIX=0"
-    return ["env", f"LD_PRELOAD={library}", f"FAKETIME={offset}", *only_wall]
+    return ["env", f"LD_PRELOAD={_library()}", f"FAKETIME={offset}", *only_wall]
+
+
+@cache  # the program fails where one of the same number was killed before
+def _library() -> str:
+    return subprocess.check_output([program("faketime"), "-f", "+0", "printenv", "LD_PRELOAD"], text=True).strip()
