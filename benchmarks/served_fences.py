@@ -20,6 +20,10 @@ stalled: single writes that make events each, in blocks, in pairs: one without a
 that never read, of consumers that never acknowledge, once the server has sent them what they take. Columns: latency of
 a write, median and 99th percentile, processor time of the server a write, and its memory at the end of the block; and
 the ratios of the pairs.
+
+emptied: one fence around a hull, and many subjects inside; the area is emptied in one batch and filled again, and the
+fence is deleted, while another process writes to a hull of its own, one write after the other. Columns: seconds until
+each of these is acknowledged, and the writes meanwhile: their number, and their latency, median and longest.
 """
 
 import argparse
@@ -45,8 +49,8 @@ from dynhull_proto.v1 import fence_service_pb2 as fences
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 
-WORKS = ["many", "moves", "hull", "webhook", "stalled"]
-NAME, CONSUMER = "fleet", "bench"
+WORKS = ["many", "moves", "hull", "webhook", "stalled", "emptied"]
+NAME, OTHER, CONSUMER = "fleet", "other", "bench"
 IN_FLIGHT = 8
 LOADED = 8192
 CORNERS = 8
@@ -383,6 +387,60 @@ def stalled(folder: Path, pairs: int) -> None:
     print(f"| ratio of {pairs} pairs: median, quartiles | {shown} |", flush=True)
 
 
+def emptied(folder: Path, n: int) -> None:
+    places = np.random.default_rng(2).random((n, 2))
+    keys, corners = np.arange(4), np.array([[-1, -1], [2, -1], [2, 2], [-1, 2]], float)
+    empty = batch_pb2.Batch(removes={"packed_integers": keys.astype("<u8").tobytes()})
+    print("\n| | seconds | other writes | median | longest |")
+    print("| --- | ---: | ---: | ---: | ---: |")
+    with ExitStack() as stack:
+        address = started(stack, folder / "emptied")
+        send(address, [puts(np.arange(i, min(i + LOADED, n)), places[i : i + LOADED]) for i in range(0, n, LOADED)])
+        stub, channel = stack.enter_context(durability.service(address)), grpc.insecure_channel(address)
+        fence_stub = FenceServiceStub(stack.enter_context(channel))
+        config = hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_INTEGER_KEYS)
+        for name in ("area", OTHER):
+            stub.CreateHull(pb.CreateHullRequest(name=name, config=config))
+        fill = pb.ApplyRequest(name="area", batch=area_batch(keys, corners))
+        stub.Apply(fill)
+        around = fence_pb2.FenceConfig(
+            hull_area=fence_pb2.HullArea(name="area"), subject_hull=NAME, initial=fence_pb2.FENCE_INITIAL_NONE
+        )
+        fence_stub.CreateFence(fences.CreateFenceRequest(name="around", config=around))
+        works: dict[str, Callable[[], object]] = {
+            "nothing": lambda: time.sleep(1),
+            "emptied": lambda: stub.Apply(pb.ApplyRequest(name="area", batch=empty)),
+            "filled again": lambda: stub.Apply(fill),
+            "deleted": lambda: fence_stub.DeleteFence(fences.DeleteFenceRequest(name="around")),
+        }
+        for what, work in works.items():
+            wait_for(at_rest)
+            command = [sys.executable, __file__, "--write-to", address]
+            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+                assert other.stdout is not None
+                other.stdout.readline()
+                begun = time.perf_counter()
+                work()
+                took = time.perf_counter() - begun
+                times = sorted(map(float, other.communicate("")[0].split()))
+            latencies = " | ".join(f"{each * 1e3:.1f} ms" for each in (statistics.median(times), times[-1]))
+            print(f"| {what} | {took:.2f} | {len(times):,} | {latencies} |", flush=True)
+
+
+def write_to(address: str) -> None:
+    """Write to a hull, one write after the other, until the standard input ends; print how long each took."""
+    ended, times = threading.Event(), []
+    threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+    with durability.service(address) as stub:
+        stub.Apply(pb.ApplyRequest(name=OTHER, batch=area_batch(np.arange(1), np.zeros((1, 2)))))
+        print("writing", flush=True)
+        while not ended.is_set():
+            begun = time.perf_counter()
+            stub.Apply(pb.ApplyRequest(name=OTHER, batch=area_batch(np.arange(1), np.full((1, 2), begun))))
+            times.append(time.perf_counter() - begun)
+    print(*times)
+
+
 def area_batch(keys: np.ndarray, places: np.ndarray) -> batch_pb2.Batch:
     packed = {"packed_integers": keys.astype("<u8").tobytes()}
     return batch_pb2.Batch(puts=batch_pb2.Puts(keys=packed, points=server.packed(places)))
@@ -445,7 +503,11 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10, help="of each of these rates")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--folder", type=Path, default=Path(), help="where the servers put their data (default: here)")
+    parser.add_argument("--write-to", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    if arguments.write_to is not None:
+        write_to(arguments.write_to)
+        return
     print(f"load average {os.getloadavg()[0]:.1f}")
     with tempfile.TemporaryDirectory(dir=arguments.folder) as data:
         if "many" in arguments.works:
@@ -459,6 +521,8 @@ def main() -> None:
             webhook(Path(data), arguments.walks)
         if "stalled" in arguments.works:
             stalled(Path(data), 5 * arguments.repeat)
+        if "emptied" in arguments.works:
+            emptied(Path(data), int(arguments.subjects))
     print(f"\nload average at the end {os.getloadavg()[0]:.1f}")
 
 

@@ -250,8 +250,9 @@ class _Inbox:
             raise RuntimeError("the inbox is closed")
         self._items.append(item)
 
-    def take(self) -> list[Any]:
-        self._threads.wait(lambda: self._items or self._closed)
+    def take(self, *, wait: bool = True) -> list[Any]:
+        if wait:
+            self._threads.wait(lambda: self._items or self._closed)
         items, self._items = self._items, []
         return items
 

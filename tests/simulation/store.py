@@ -143,6 +143,9 @@ class FaultyStorage:
         self.give_way()
         return events
 
+    def ahead(self, changes: Sequence[Any]) -> tuple[Sequence[Any], Sequence[Any]]:
+        return (), changes
+
     def boundary(self, number: int, first: int) -> int:
         """Before which event all events can be dropped."""
         self._fail("read")

@@ -7,8 +7,8 @@ import sqlite3
 import numpy as np
 import pytest
 from command_line import dynhull
+from faulty_disk import FaultyDisk, failure
 from folders import DATABASE, OLD_FOLDERS, append, event, opened, read_fence, same, snapshot
-from test_faults import FaultyDisk, failure
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed

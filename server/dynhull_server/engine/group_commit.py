@@ -1,5 +1,9 @@
-"""Group commit: one thread commits, and changes that arrive during a commit share the next one."""
+"""Group commit: one thread commits, and changes that arrive during a commit share the next one.
 
+Large changes are committed in pieces, as far as the storage allows, each together with what has arrived meanwhile.
+"""
+
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -9,6 +13,8 @@ from .threads import Clock, Inbox, Threads
 
 # Called with the outcome of a commit: its error or None, and whether the outcome is unknown.
 Done = Callable[[Exception | None, bool], None]
+# Steps ahead of a large change that are committed together.
+STEPS_TOGETHER = 4
 
 
 @dataclass(slots=True)
@@ -17,6 +23,35 @@ class _Waiting:
 
     changes: Sequence[Change | Step]
     done: Done
+
+
+class _Large:
+    """Changes that are committed in pieces.
+
+    Args:
+        steps: what is committed ahead of them.
+        waiting: the changes that are left then.
+
+    Attributes:
+        over: whether the last piece has been taken, or one has failed.
+    """
+
+    def __init__(self, steps: Sequence[Step], waiting: _Waiting) -> None:
+        self._steps = deque(steps)
+        self._waiting = waiting
+        self.over = False
+
+    def piece(self) -> _Waiting:
+        """The next piece."""
+        if self._steps:
+            return _Waiting([self._steps.popleft() for _ in range(min(len(self._steps), STEPS_TOGETHER))], self._done)
+        self.over = True
+        return self._waiting
+
+    def _done(self, error: Exception | None, unknown: bool) -> None:
+        if error is not None:
+            self.over = True
+            self._waiting.done(error, unknown)
 
 
 class GroupCommit:
@@ -65,14 +100,33 @@ class GroupCommit:
         self._thread.join()
 
     def _run(self) -> None:
-        while group := self._inbox.take():
+        large: list[_Large] = []
+        while True:
+            arrived = self._inbox.take(wait=not large)
+            if not arrived and not large:
+                return
             self.since = self._clock.monotonic()
+            group = [each.piece() for each in large]
+            for each in arrived:
+                later = self._in_pieces(each)
+                if later is not None:
+                    large.append(later)
+                group.append(each if later is None else later.piece())
             if self._decided(group):
                 self._commit([each for each in group if each.changes])
                 for each in group:
                     if not each.changes:
                         each.done(None, False)
+            large = [each for each in large if not each.over]
             self.since = None
+
+    def _in_pieces(self, waiting: _Waiting) -> _Large | None:
+        """Changes in pieces; None for those that are committed at once."""
+        try:
+            steps, changes = self._storage.ahead(waiting.changes)
+        except MemoryError:  # at once, then, if that is possible
+            return None
+        return _Large(steps, _Waiting(changes, waiting.done)) if steps else None
 
     def _decided(self, group: list[_Waiting]) -> bool:
         """Whether the outcomes of all earlier commits are known; if not, the group has been refused."""

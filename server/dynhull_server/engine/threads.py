@@ -47,10 +47,10 @@ class Inbox(Generic[T]):
             self._items.append(item)
             self._turn.notify()
 
-    def take(self) -> list[T]:
-        """Wait for items, and take all of them; none once the inbox is closed and empty."""
+    def take(self, *, wait: bool = True) -> list[T]:
+        """Wait for items, and take all of them; none once the inbox is closed and empty, or without `wait`."""
         with self._turn:
-            self._turn.wait_for(lambda: self._items or self._closed)
+            self._turn.wait_for(lambda: self._items or self._closed or not wait)
             items, self._items = self._items, []
             return items
 

@@ -98,6 +98,13 @@ class Storage(Protocol):
             Exception: any other error: the outcome is unknown until `settle` has returned.
         """
 
+    def ahead(self, changes: Sequence["Change | Step"]) -> tuple[Sequence["Step"], Sequence["Change | Step"]]:
+        """What can be committed ahead of large changes, and what is then left of them, so that other commits wait less.
+
+        Commit the steps in their order, some at a time, and then the changes that are returned. The steps have no
+        effect before that. Without steps, the changes are the same. To give up, commit nothing more.
+        """
+
     def settle(self) -> None:
         """Decide a commit with an unknown outcome. From then on `read` and `row` show the outcome.
 

@@ -137,6 +137,9 @@ class FenceWork(FencedTrip):
                 leg = self._fence_leg(fence)
                 leg.summed_up(EventType.CLOSED, 0, request.time)
                 leg.deleted = True
+                for subjects in fence.subjects.values():  # here, since it takes long with many inside
+                    subjects.index.drop(fence.number)
+                    self.applied = True
                 return None
             case PutConsumer():
                 return self._put_consumer(request, self._fence_leg(fence))

@@ -56,8 +56,7 @@ class Subjects:
             contents.mirror.inside = lambda: [self.index.inside(number) for number in self.fences]
 
     def dropped(self, fence: "Fence") -> None:
-        """Forget a fence; without any, nothing is compared any more."""
-        self.index.drop(fence.number)
+        """Forget a fence, which the index has dropped; without any, nothing is compared any more."""
         del self.fences[fence.number]
         self.delaying.discard(fence)
         if not self.fences:

@@ -32,11 +32,14 @@ class EventDirectory:
         return sum(weight for weight, runs in zip(self._weights, self._needed, strict=True) if runs)
 
     def add(self, place: int, weight: int, needed: int, stored: int) -> None:
-        """Add a row behind all others: the number of its runs that are needed, and that of all of them."""
-        self._places.append(place)
-        self._weights.append(weight)
-        self._needed.append(needed)
-        self._stored.append(stored)
+        """Add a row, as a rule behind all others: the number of its runs that are needed, and that of all of them."""
+        row = len(self._places)
+        if row and place < self._places[-1]:
+            row = bisect_left(self._places, place)
+        self._places.insert(row, place)
+        self._weights.insert(row, weight)
+        self._needed.insert(row, needed)
+        self._stored.insert(row, stored)
 
     def left(self, places: Integers) -> tuple[Integers, Integers]:
         """The number of runs that are needed of each of some rows, and the weights of the rows. O(k log n)."""

@@ -298,6 +298,7 @@ class _Examination:
                 f"{there.hulls} with {there.batches}, or different ones: rows are missing, or log and database do not "
                 "belong together"
             )
+            self._findings.fatal += fences.gaps
         if totals is not None and totals.fence_rows != there.fence_rows:
             self._findings.fatal.append(
                 f"the totals record {totals.fence_rows} rows of fences, the tables have {there.fence_rows}"

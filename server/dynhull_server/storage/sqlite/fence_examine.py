@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 from itertools import count, pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...state.fences.records import Consumer
 from .encoding import checksum, weight
-from .event_blocks import decode_runs
+from .event_blocks import Runs, decode_runs
 from .event_rows import decode_delay
-from .fence_ledger import DropInside, FenceStep
+from .fence_ledger import DropInside, DropStaged, FenceStep, Staged
 from .fence_rows import consumer_values, found_fences
 from .fence_runs import FenceRows, Start
 from .schema import DELAYS_SINCE, STARTS_SINCE
@@ -30,6 +32,7 @@ class FoundFences:
         rows, sum: the number of all rows, and the sum of their weights.
         next_number: a number greater than that of any fence found.
         fatal: damage that prevents serving the database.
+        gaps: events that are missing before others. Unless other rows are missing, these are staged, and not valid yet.
         repairs: steps that drop unfinished rows.
         starts: where the events of fences begin that have dropped some, in a format that does not store it.
     """
@@ -38,6 +41,7 @@ class FoundFences:
     sum: int = 0
     next_number: int = 1
     fatal: list[str] = field(default_factory=list)
+    gaps: list[str] = field(default_factory=list)
     repairs: list[FenceStep] = field(default_factory=list)
     starts: dict[int, int] = field(default_factory=dict)
 
@@ -227,6 +231,8 @@ class FenceExamination:
         if any(first != last + 1 for first, last in zip(fence.firsts[1:], lasts, strict=False)):
             self._judge_order(fence, lasts)
         base = fence.base
+        if self._has_starts:
+            self._set_aside(fence, lasts, min(fence.first, base + 1))
         fence.last = max(lasts[-1] if lasts else fence.first - 1, base)
         oldest = fence.firsts[0] if fence.firsts else fence.last + 1
         if not self._has_starts and oldest > 1:
@@ -239,11 +245,38 @@ class FenceExamination:
         """Bring the runs in order, and blame what is missing or there twice."""
         ordered = sorted(zip(fence.firsts, fence.places, lasts, strict=True))
         for (_, _, last), (first, _, _) in pairwise(ordered):
-            if first > last + 1:
+            if first > last + 1 and not self._has_starts:
                 self._blame(fence, f"events {last + 1} to {first - 1} are missing")
             elif first <= last:
                 self._blame(fence, f"events {first} to {last} are stored twice")
         fence.firsts, fence.places, lasts[:] = (array("q", column) for column in zip(*ordered, strict=True))
+
+    def _set_aside(self, fence: FenceRows, lasts: "array[int]", expected: int) -> None:
+        """Events behind a gap, or behind `expected`, are staged: the commit that makes them valid is missing."""
+        gap = 0
+        while gap < len(lasts) and fence.firsts[gap] <= expected:
+            expected = lasts[gap] + 1
+            gap += 1
+        if gap == len(lasts):
+            return
+        text = f"events {expected} to {fence.firsts[gap] - 1} are missing"
+        places, counts = np.unique(np.frombuffer(fence.places[gap:], np.int64), return_counts=True)
+        needed, weights = self._ledger.events.left(places)
+        if (needed != counts).any():  # such rows have no events of others
+            self._blame(fence, text)
+            return
+        number = fence.row.number
+        of_runs, firsts, ends = (np.array(column[gap:]) for column in (fence.places, fence.firsts, lasts))
+        rows = []
+        for place, each in zip(places.tolist(), weights.tolist(), strict=True):
+            own = of_runs == place
+            runs = Runs(np.full(own.sum(), number), firsts[own], ends[own] - firsts[own] + 1)
+            rows.append(Staged(runs, place, each))
+        self._ledger.staged[number] = sorted(rows, key=lambda row: row.first)
+        self._ledger.events.release(places, counts)
+        del fence.firsts[gap:], fence.places[gap:], lasts[gap:]
+        self._found.gaps.append(f"fence {fence.row.name!r}: {text}")
+        self._found.repairs.append(DropStaged(number))
 
     def _blame(self, fence: FenceRows, text: str) -> None:
         self._found.fatal.append(f"fence {fence.row.name!r}: {text}")

@@ -2,10 +2,11 @@
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from itertools import chain
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +30,7 @@ from ...state.fences.records import (
 )
 from ..port import NotCommittedError
 from .encoding import checksum, weight
-from .event_blocks import encode_block
+from .event_blocks import Runs, encode_block
 from .event_rows import encode_delay, encode_inside
 from .fence_rows import consumer_values, values
 from .fence_runs import FenceRows, Start
@@ -54,6 +55,32 @@ Statement = tuple[str, tuple[Any, ...]]
 KEYS_A_ROW = 16_384
 # Events in a row: whoever reads those of one fence reads all of them.
 EVENTS_A_ROW = 1024
+# Rows of events that are deleted in the commit that drops them; of more, `sweep` deletes some at a time.
+DROPPED_AT_ONCE = 64
+
+
+class Staged(NamedTuple):
+    """A row of events of one fence that follow others which are not yet committed. It is not counted among the rows.
+
+    Attributes:
+        runs: its runs.
+        place: the row number.
+        weight: the weight of the row.
+    """
+
+    runs: Runs
+    place: int
+    weight: int
+
+    @property
+    def first(self) -> int:
+        """The sequence of the first event."""
+        return int(self.runs.firsts[0])
+
+    @property
+    def last(self) -> int:
+        """The sequence of the last event."""
+        return int(self.runs.firsts[-1] + self.runs.counts[-1]) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +112,46 @@ class ShrinkEvents:
     payload: bytes
 
 
-FenceStep = PutInside | DropInside | ShrinkEvents
+@dataclass(frozen=True, slots=True)
+class StageEvents:
+    """Step: some rows of a block, events of one fence, are written ahead of the commit that makes them valid.
+
+    There is a gap before such rows, which tells a start that they are not valid. `begins` is whether they are the first
+    ones; what has been staged before them was given up.
+    """
+
+    number: int
+    block: EventBlock
+    start: int
+    end: int
+    place: int
+    begins: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AppendFirst:
+    """Step: the events before staged ones, in rows whose numbers are less than those of the staged ones."""
+
+    block: EventBlock
+    places: Sequence[int]
+
+
+@dataclass(frozen=True, slots=True)
+class CountStaged:
+    """Step: the staged events of a fence are valid: they follow its last one, and lead to the sequence `last`."""
+
+    number: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
+class DropStaged:
+    """Step: deletes the staged events of a fence."""
+
+    number: int
+
+
+FenceStep = PutInside | DropInside | ShrinkEvents | StageEvents | AppendFirst | CountStaged | DropStaged
 
 
 @dataclass(slots=True)
@@ -139,6 +205,8 @@ class FenceChanges:
         self._now: dict[int, _Now] = {}
         self._lasts: dict[int, int] = {}  # the last events of fences, where these are new
         self._blocks: list[EventBlock] = []
+        self._firsts: list[AppendFirst] = []
+        self._counted: list[int] = []  # fences whose staged events are valid from now on
         self._released: Counter[int] = Counter()  # runs by row
         self._shrunk: dict[int, int] = {}  # weights by row
         self.rows = self.sum = self.next_number = 0
@@ -149,7 +217,12 @@ class FenceChanges:
             self._add(change)
             return
         if isinstance(change, AppendEvents):
-            self._append(change.block)
+            self._follow(change.block)
+            self._blocks.append(change.block)
+            return
+        if isinstance(change, AppendFirst):
+            self._follow(change.block)
+            self._firsts.append(change)
             return
         if isinstance(change, ShrinkEvents):
             self._shrink(change)
@@ -215,8 +288,15 @@ class FenceChanges:
                 self._put_inside(change, now)
             case DropInside():
                 self._drop_inside(change.sequence, now)
+            case StageEvents():
+                self._stage(change)
+            case CountStaged():
+                self._count_staged(change)
+            case DropStaged():
+                self._drop_staged(change.number)
 
-    def _append(self, block: EventBlock) -> None:
+    def _follow(self, block: EventBlock) -> None:
+        """Raise NotCommittedError if events do not follow the last ones of their fences."""
         lasts, numbers = self._lasts, block.fences.tolist()
         try:
             known = self._ledger.runs.lasts(block.fences).tolist()
@@ -232,33 +312,73 @@ class FenceChanges:
                 name = self._rows(number).row.name
                 raise NotCommittedError(f"event {first} of fence {name} does not follow event {last}")
             lasts[number] = last + count
-        self._blocks.append(block)
 
     def finish(self) -> None:
         """Write all events, after the last change: in one row, or in several if they are many."""
-        if not self._blocks:
-            return
-        block = joined(self._blocks)
+        if self._blocks:
+            self._write(joined(self._blocks))
+        for each in self._firsts:
+            self._write(each.block, each.places)
+        for number in self._counted:
+            self._effects.append(partial(self._count, number))
+
+    def _write(self, block: EventBlock, places: Iterable[int] = ()) -> None:
+        for number in self._ledger.staged.keys() - self._counted:
+            if number in block.fences:  # those were given up
+                self._drop_staged(number)
         gone = [number for number, now in self._now.items() if now.deleted]
         if gone:
             block = block.runs(~np.isin(block.fences, gone))
+        of_rows = chain(places, self._ledger.event_ids)
         for start in range(0, len(block), EVENTS_A_ROW):
             end = min(start + EVENTS_A_ROW, len(block))
-            self._write_events(block if end - start == len(block) else block.rows(start, end))
+            self._write_events(block if end - start == len(block) else block.rows(start, end), next(of_rows))
 
-    def _write_events(self, block: EventBlock) -> None:
-        payload = encode_block(block, self._own(block))
-        stored = checksum(payload, *MANY)
-        each, place, runs = weight(stored, *MANY), next(self._ledger.event_ids), len(block.fences)
+    def _write_events(self, block: EventBlock, place: int) -> None:
+        each, runs = self._insert_events(block, place), len(block.fences)
         self.rows += 1
         self.sum += each
-        self._statements.append((INSERT_EVENTS, (place, *MANY, stored, payload)))
 
         def add() -> None:
             self._ledger.runs.add(block, place)
             self._ledger.events.add(place, each, runs, runs)
 
         self._effects.append(add)
+
+    def _insert_events(self, block: EventBlock, place: int) -> int:
+        """Write a row of events. Returns its weight."""
+        payload = encode_block(block, self._own(block))
+        stored = checksum(payload, *MANY)
+        self._statements.append((INSERT_EVENTS, (place, *MANY, stored, payload)))
+        return weight(stored, *MANY)
+
+    def _stage(self, step: StageEvents) -> None:
+        staged = self._ledger.staged
+        if step.begins:
+            self._drop_staged(step.number)
+        block = step.block.rows(step.start, step.end)
+        row = Staged(Runs(block.fences, block.firsts, block.counts), step.place, self._insert_events(block, step.place))
+        self._effects.append(lambda: staged.setdefault(step.number, []).append(row))
+
+    def _count_staged(self, step: CountStaged) -> None:
+        rows = self._ledger.staged.get(step.number, [])
+        last = self._lasts.get(step.number, self._ledger.runs.last(step.number))
+        if [last, *(row.last for row in rows)] != [*(row.first - 1 for row in rows), step.last]:
+            raise NotCommittedError(f"the events of fence {step.number} up to {step.last} have not been written")
+        self._lasts[step.number] = step.last
+        self._counted.append(step.number)
+        self.rows += len(rows)
+        self.sum += sum(row.weight for row in rows)
+
+    def _count(self, number: int) -> None:
+        for row in self._ledger.staged.pop(number):
+            runs = len(row.runs.fences)
+            self._ledger.runs.add(row.runs, row.place)
+            self._ledger.events.add(row.place, row.weight, runs, runs)
+
+    def _drop_staged(self, number: int) -> None:
+        self._delete_rows("events", [row.place for row in self._ledger.staged.get(number, ())])
+        self._effects.append(lambda: self._ledger.staged.pop(number, None))
 
     def _own(self, block: EventBlock) -> npt.NDArray[np.bool_]:
         """Of which runs the hull is the one that the fence names."""
@@ -327,7 +447,7 @@ class FenceChanges:
             gone, dead = self._ledger.fences.pop(number), self._ledger.dead
             self._ledger.runs.forget(gone)
             release()
-            dead["events"].extend(empty)
+            dead["events"].extend([*empty, *(row.place for row in self._ledger.staged.pop(number, ()))])
             dead["insides"].extend(place for each in gone.insides.values() for place in each.places.values())
             dead["consumers"].extend(place for _, place, _ in gone.consumers.values())
             dead["delays"].extend(place for place, _ in gone.delays.values())
@@ -353,11 +473,13 @@ class FenceChanges:
         released = rows.places[now.dropped : count]
         dropped, now.dropped = len(released), max(now.dropped, count)
         empty, release = self._release(released)
-        self._delete_rows("events", empty)
+        at_once = empty if len(empty) <= DROPPED_AT_ONCE else []
+        self._delete_rows("events", at_once)
 
         def drop() -> None:
             release()
             rows.begin(start, dropped)
+            self._ledger.dead["events"].extend(empty[len(at_once) :])
 
         self._effects.append(drop)
 

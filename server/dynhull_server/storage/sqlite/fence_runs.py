@@ -15,6 +15,7 @@ from ...state.fences.records import Consumer, FenceRow, Subject
 from ...state.fences.tallies import Integers, Table
 from ..port import NEWEST
 from .encoding import checksum, weight
+from .event_blocks import Runs
 
 # New runs of all fences together, at most.
 MOST_NEW = 2**17
@@ -230,7 +231,7 @@ class FenceRuns:
         found: npt.NDArray[np.bool_] = names[block.hulls] == subjects
         return found
 
-    def add(self, block: EventBlock, row: int) -> None:
+    def add(self, block: EventBlock | Runs, row: int) -> None:
         """Add the runs of a row. O(runs), with O(all new runs) now and then."""
         self.table.sort()
         for first in range(0, len(block.fences), MOST_NEW):

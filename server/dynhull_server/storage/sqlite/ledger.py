@@ -12,7 +12,7 @@ from ...state.records import Append, Create, Delete, HullRow
 from ..port import NotCommittedError
 from .encoding import checksum, encode, weight
 from .event_directory import EventDirectory
-from .fence_ledger import FenceChanges, FenceStep
+from .fence_ledger import FenceChanges, FenceStep, Staged
 from .fence_runs import FenceRows, FenceRuns
 from .hull_rows import values
 from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
@@ -116,6 +116,7 @@ class Ledger:
             row found dead cannot belong to anything else when it is dropped.
         event_ids, inside_ids, consumer_ids, delay_ids, start_ids: the same for fences.
         events: the rows of events.
+        staged: by fence, the rows of events that are not valid yet, in order.
     """
 
     totals: Totals = field(default_factory=Totals)
@@ -131,6 +132,7 @@ class Ledger:
     delay_ids: "count[int]" = field(default_factory=lambda: count(1))
     start_ids: "count[int]" = field(default_factory=lambda: count(1))
     events: EventDirectory = field(default_factory=EventDirectory)
+    staged: dict[int, list[Staged]] = field(default_factory=dict)
     runs: FenceRuns = field(init=False)
 
     def __post_init__(self) -> None:

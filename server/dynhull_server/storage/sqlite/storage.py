@@ -53,6 +53,7 @@ from .ledger import (
 from .migration import make_tables, migrate
 from .reading import Readers, begin, read_each, read_hull, rows_by_id
 from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
+from .staging import staging
 from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
 
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
@@ -161,6 +162,10 @@ class SQLiteStorage:
         except Exception as error:  # a value that does not fit a column, or no memory
             raise _not_committed(error) from error
         self._write(group)
+
+    def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
+        """What of many events can be written before the changes."""
+        return staging(changes, lambda: next(self._ledger.event_ids))
 
     @_as_storage_errors()
     def settle(self) -> None:
