@@ -147,7 +147,7 @@ class NoThreads:
     def put(self, item: Any) -> None:
         self.items.append(item)
 
-    def take(self) -> list[Any]:
+    def take(self, *, wait: bool = True) -> list[Any]:  # noqa: ARG002
         items, self.items = self.items, []
         return items
 

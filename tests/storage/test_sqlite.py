@@ -30,6 +30,7 @@ from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
 from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.records import AddFence, AppendEvents, DropEvents, DropFence, Inside, Members
+from dynhull_server.state.fences.restoring import members_after
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept, Window
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, FormatError, LockedError, StorageError
@@ -435,6 +436,19 @@ def test_an_unfinished_copy_is_refused(folder):
     (folder / "unfinished.db").write_bytes(b"")
     with pytest.raises(StorageError, match="is an unfinished copy: remove it, and copy again"):
         opened(folder)
+
+
+def test_many_that_are_inside_are_all_inside_after_a_start(folder):
+    """They are in several rows."""
+    storage, _ = opened(folder)
+    fill(storage, 1)
+    keys = [f"{number:05}" for number in range(40_000)]
+    members = Members("fleet", PackedKeys.pack(keys), 1), Members("others", PackedKeys.pack(keys[:3]), 1)
+    storage.commit([AddFence(fence_row(), Inside(0, members))])
+    storage.close()
+    storage, _ = opened(folder)
+    assert members_after(read_fence(storage, 9)) == {"fleet": set(keys), "others": set(keys[:3])}
+    storage.close()
 
 
 def test_what_no_fence_needs_of_a_row_of_events_leaves_the_disk(folder):

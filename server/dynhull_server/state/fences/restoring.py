@@ -12,7 +12,7 @@ from dynhull import FenceIndex
 from dynhull.keys import key_list
 
 from ..hull_state import HullState
-from .records import EventType, KeptFence, Key
+from .records import EventType, KeptFence, Key, Members
 from .subjects import Subjects, frame_of, indexed, lay
 
 
@@ -70,10 +70,10 @@ def members_after(kept: KeptFence) -> dict[str, set[Key]]:
 
     O(those stored + events).
     """
-    inside: dict[str, set[Key]] = {each.hull: set(key_list(each.keys)) for each in kept.inside.members}
+    inside = _by_hull(kept.inside.members)
     for event in kept.events:
         if event.type is EventType.SNAPSHOT:
-            inside = {each.hull: set(key_list(each.keys)) for each in event.inside}
+            inside = _by_hull(event.inside)
         elif event.key is not None and event.type in (EventType.EXIT, EventType.TRANSFER):
             hull, key = event.former
             inside[hull].remove(key)
@@ -83,4 +83,12 @@ def members_after(kept: KeptFence) -> dict[str, set[Key]]:
             inside[event.hull] = set()
         elif event.type is EventType.CEASE:
             del inside[event.hull]
+    return inside
+
+
+def _by_hull(members: Iterable[Members]) -> dict[str, set[Key]]:
+    """Subjects by hull; those of one hull may come in several pieces."""
+    inside: dict[str, set[Key]] = {}
+    for each in members:
+        inside.setdefault(each.hull, set()).update(key_list(each.keys))
     return inside

@@ -1,0 +1,16 @@
+"""A short run of the torture of a relay; `make robustness` is the long one."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+@pytest.mark.long
+def test_every_event_arrives_whatever_goes_away() -> None:
+    torture = Path(__file__).with_name("relay_torture.py")
+    command = [sys.executable, torture, "--downs", "2", "--down", "1", "--kills", "4"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "'times without the endpoint': 2" in run.stdout.splitlines()[-1]
