@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto contract fuzz fuzz-reference fuzz-server fuzz-gateway workers properties robustness simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-reference fuzz-server fuzz-gateway workers properties robustness simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -95,6 +95,10 @@ stub: .venv/.check  ## regenerate dynhull/_kernel.pyi, the types of the kernel
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py
+
+vendor:  ## bring newer libraries and maps into the dashboard's page, from npm
+	npm ci --prefix clients/dashboard --no-audit --no-fund --ignore-scripts
+	$(PYTHON) clients/dashboard/vendor.py
 
 contract: .venv/.check  ## with a release: the contract that later ones must not break
 	$(BIN)/buf breaking --against proto/contract.binpb

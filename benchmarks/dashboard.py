@@ -1,7 +1,7 @@
 """What twenty viewers of the dashboard cost those who write: `python benchmarks/dashboard.py`.
 
 A writer streams as fast as the server takes it, in turns with the dashboard and its viewers paused and running. A
-viewer is a session of Bokeh's and a socket of hulls. Server, writer, dashboard and viewers share this machine.
+viewer is a page's websocket. Server, writer, dashboard and viewers share this machine.
 """
 
 import argparse
@@ -17,7 +17,6 @@ from pathlib import Path
 from statistics import median, quantiles
 
 import numpy as np
-from bokeh.util.token import generate_jwt_token, generate_session_id
 from tornado.websocket import websocket_connect
 
 from dynhull_client import HullClient
@@ -25,7 +24,7 @@ from dynhull_client import HullClient
 SERVER = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
 DASHBOARD = ["-m", "dynhull_cli", "dashboard", "--port", "0", "--address"]
 POINTS, BATCH, VERTICES, CYCLE = 100_000, 2_048, 48, 64
-VERTICES_OF = "vertices of a"
+VERTICES_OF = '"kind": "vertices", "hull": "a"'
 SETTLE = 0.3  # seconds from a turn's beginning to its measurement
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -78,14 +77,11 @@ def view(address, viewers, told):
     """Viewers; each sends on how many hulls it was sent."""
 
     async def one(viewer):
-        token = generate_jwt_token(generate_session_id())
-        page = await websocket_connect(f"ws://{address}/ws", subprotocols=["bokeh", token])
-        hulls = await websocket_connect(f"ws://{address}/hulls?hull=a")
-        await asyncio.gather(read(page), read(hulls, viewer))
+        await read(await websocket_connect(f"ws://{address}/live?hull=a"), viewer)
 
-    async def read(socket, viewer=None):
+    async def read(socket, viewer):
         while (message := await socket.read_message()) is not None:
-            if viewer is not None and VERTICES_OF in message[:40]:
+            if VERTICES_OF in message[:60]:
                 told[viewer] += 1
 
     async def all_of_them():

@@ -1,15 +1,22 @@
 """`dynhull demo` as a user runs it: a real server, real input, every step verified."""
 
 import re
+import signal
+import subprocess
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import ClassVar
+from urllib.parse import quote_plus
 
 import numpy as np
 import pytest
 import server_process as servers
 from command_line import dynhull
 from forgetful import FORGETFUL
+from forked import COMMAND
+from patience import PATIENCE, wait_until
 from typer.testing import Result
 
 from dynhull_cli.demo import show
@@ -40,6 +47,44 @@ def test_hours_of_flights(tmp_path):
     assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(4)]
     assert " to SJU" in done.stdout
     assert is_picture(picture)
+
+
+@pytest.mark.long
+def test_the_flights_live_until_ctrl_c(tmp_path: Path) -> None:
+    command = [COMMAND, "demo", "--live", "--hours", "1", "--speed", "6000"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+        assert process.stdout is not None
+        words = [process.stdout.readline().split() for _ in range(4)]
+        page, http, address = (line[-1] for line in words[1:])
+        children = processes_below(process.pid)
+        assert len(children) >= 3
+        for url in (page, http):
+            with urllib.request.urlopen(url, timeout=PATIENCE) as answer:
+                assert answer.status == 200
+        with HullClient(address) as client:
+            (hull,) = client.list_hulls()
+            wait_until(lambda: client.get_hull(hull.name).revision > 61)  # the hour has begun again
+            assert f"hull={quote_plus(hull.name)}" in page
+            assert {fence.name for fence in client.list_fences()} == {"near/ATL", "near/LAX", "near/ORD"}
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+    wait_until(lambda: not any(Path(f"/proc/{child}").exists() for child in children))
+    assert not list(tmp_path.iterdir())
+
+
+def test_live_is_for_the_flights(tmp_path):
+    (tmp_path / "points.csv").write_text("x,y\n0,0\n")
+    for option in (["--points", tmp_path / "points.csv"], ["--window", "30m"]):
+        done = demo("--live", *option)
+        assert (done.exit_code, "--live is for the flights" in done.stderr) == (2, True)
+
+
+def processes_below(parent: int) -> list[int]:
+    """The processes that a process has started, and those that they have."""
+    found = [
+        int(child) for task in Path(f"/proc/{parent}/task").glob("*/children") for child in task.read_text().split()
+    ]
+    return [*found, *(each for child in found for each in processes_below(child))]
 
 
 def test_the_positions_of_the_last_half_hour(tmp_path):

@@ -99,14 +99,15 @@ def let_go(page: Page, name: str) -> None:
     page.get_by_role("button", name=f"Remove {name}", exact=True).click()
 
 
-def wait_for_source(page: Page, name: str, what: str, expected: object) -> None:
-    """Wait until an expression of the columns of a data source in the picture has this value."""
+def wait_for_fence(page: Page, name: str, what: str, expected: object) -> None:
+    """Wait until an expression of a drawn fence has this value: its own area, polygons with those of hulls, margins."""
     page.wait_for_function(
         f"""([name, expected]) => {{
-            const drawn = Bokeh.documents[0]?.get_model_by_name("plane")?.renderers
-                .find(renderer => renderer.data_source.name == name)?.data_source.data
-            const found = ({{xs, ys, x, y, key, label}}) => {what}
-            return drawn && JSON.stringify(found(drawn)) == JSON.stringify(expected)
+            const fence = picture.fences.get(name)
+            if (!fence) return false
+            const [polygons, margins] = ["polygons", "margins"].map(each => fence[each](picture.view, picture.hulls))
+            const [x, y] = [0, 1].map(axis => points => points.flat(2).map(point => point[axis]))
+            return JSON.stringify({what}) == JSON.stringify(expected)
         }}""",
         arg=[name, expected],
     )
@@ -114,8 +115,8 @@ def wait_for_source(page: Page, name: str, what: str, expected: object) -> None:
 
 def wait_for_inside(page: Page, fence: str, places: dict[str, list[float]]) -> None:
     """Wait until these keys are marked as inside, each at its place."""
-    what = "Object.fromEntries(key.map((text, row) => [text, [x[row], y[row]]]))"
-    wait_for_source(page, f"inside of {fence}", what, places)
+    what = "Object.fromEntries(fence.marks(picture.hulls).map(({key, place}) => [key, place]))"
+    wait_for_fence(page, fence, what, places)
 
 
 def test_areas_of_every_kind_and_who_is_inside(
@@ -132,16 +133,16 @@ def test_areas_of_every_kind_and_who_is_inside(
         wait_for_inside(page, yard, {"in": [1, 2]})
         wait_for_inside(page, pond, {"out": [20, 2]})
         wait_for_inside(page, herd, {"in": [1, 2]})
-        wait_for_source(page, f"area of {yard}", "xs", [[[[0, 10, 10, 0], [4, 6, 6, 4]]]])
-        wait_for_source(page, f"margin of {yard}", "[Math.min(...xs.flat(3)), Math.max(...ys.flat(3))]", [-1, 11])
-        wait_for_source(page, f"area of {pond}", "[Math.min(...xs.flat(3)), Math.max(...xs.flat(3))]", [17, 23])
-        wait_for_source(page, f"area of {herd}", "[xs, ys]", [[[[[0, 4, 4, 0]]]], [[[[0, 0, 4, 4]]]]])
-        wait_for_source(page, f"margin of {herd}", "Math.max(...xs.flat(3))", 6)
-        wait_for_source(page, "names of fences", "label.toSorted()", sorted([yard, pond, herd]))
+        corners = [[0, 0], [10, 0], [10, 10], [0, 10]]
+        wait_for_fence(page, yard, "polygons", [[corners, [[4, 4], [6, 4], [6, 6], [4, 6]]]])
+        wait_for_fence(page, yard, "[Math.min(...x(margins)), Math.max(...y(margins))]", [-1, 11])
+        wait_for_fence(page, pond, "[Math.min(...x(polygons)), Math.max(...x(polygons))]", [17, 23])
+        wait_for_fence(page, herd, "polygons", [[SQUARE]])
+        wait_for_fence(page, herd, "Math.max(...x(margins))", 6)
         # The area moves, and so do those inside.
         client.apply(pack, delete=[[4, 0], [4, 4]], insert=[[30, 0], [30, 4]])
         client.put(fleet, ["in", "hole"], [[3, 3], [5, 3]])
-        wait_for_source(page, f"area of {herd}", "xs", [[[[0, 30, 30, 0]]]])
+        wait_for_fence(page, herd, "x(polygons)", [0, 30, 30, 0])
         wait_for_inside(page, herd, {"hole": [5, 3], "in": [3, 3], "out": [20, 2]})
         wait_for_inside(page, yard, {"hole": [5, 3], "in": [3, 3]})
         # They are sorted, though an event brings the last one.
@@ -180,7 +181,7 @@ def test_events_are_listed_as_they_happen(
         expect(kept).to_be_focused()  # new rows move nothing
         page.keyboard.press("Enter")
         expect(page.get_by_role("list", name="Where the key is").locator("li").first).to_contain_text("new <b> is")
-        wait_for_source(page, f"area of {yard}", "xs", [[[[7, 9, 9, 7]]]])
+        wait_for_fence(page, yard, "x(polygons)", [7, 9, 9, 7])
 
 
 def test_fences_are_picked_and_let_go_and_watched_once_for_all(
@@ -268,7 +269,7 @@ def test_a_fence_that_is_unknown_deleted_and_created_again(
         client.delete_fence(fence)
         expect(table_row(page, fence)).to_contain_text("Deleted. Remove it above, or create it again")
         expect(events(page).locator(".type")).to_have_text(["✕ closed", "≡ snapshot"])
-        wait_for_source(page, f"area of {fence}", "xs", [])
+        wait_for_fence(page, fence, "polygons", [])
         wait_for_inside(page, fence, {})
         client.create_fence(fence, Circle(20, 2, 1), fleet)
         wait_for_inside(page, fence, {"out": [20, 2]})

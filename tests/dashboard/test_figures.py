@@ -17,7 +17,8 @@ from dynhull_dashboard.event_rows import MOST_EVENTS, EventRows
 from dynhull_dashboard.fence_drawing import area_of
 from dynhull_dashboard.fence_list import FenceList
 from dynhull_dashboard.history import ROWS, History
-from dynhull_dashboard.outline import MOST_DRAWN, drawn, frame_around
+from dynhull_dashboard.outline import MOST_DRAWN, drawn
+from dynhull_dashboard.repeating import pause_after
 from dynhull_dashboard.server_metrics import Scrape
 from dynhull_dashboard.units import Units
 
@@ -33,33 +34,14 @@ dynhull_batch_duration_seconds_sum {seconds}
 """
 
 
-def test_the_picture_stands_still_while_hulls_move_in_it() -> None:
-    frame = frame_around([(0, 0, 10, 4), (5, 5, 6, 6)], None)
-    assert frame == pytest.approx((-0.8, -0.8, 10.8, 6.8))
-    assert frame_around([(1, 1, 9, 5)], frame) is frame
-    assert frame_around([(1, 1, 11, 5)], frame) != frame, "a hull has left it"
-    assert frame_around([(4, 4, 5, 5)], frame) != frame, "it has become too small to see"
-    assert frame_around([], frame) is frame
-
-
-def test_axes_of_different_units_each_fill_the_picture() -> None:
-    wide = (0, 0, 1000, 1)
-    frame = frame_around([wide], None, same_scale=False)
-    assert frame == pytest.approx((-80, -0.08, 1080, 1.08))
-    assert frame_around([wide], frame, same_scale=False) is frame
-    assert frame_around([(0, 0, 1000, 0.1)], frame, same_scale=False) != frame, "one axis has become too short to see"
-    assert frame_around([(0, 0, 1000, 0)], None, same_scale=False)[1] < 0 < frame[3]
+def test_after_one_long_delay_the_figures_do_not_stand_still() -> None:
+    assert pause_after(took=0.001, least=1.0) == 1.0
+    assert pause_after(took=0.1, least=1.0) == pytest.approx(1.9), "a twentieth of the server's time"
+    assert pause_after(took=2.0, least=1.0) == 5.0
 
 
 def test_units_of_areas() -> None:
     assert [Units().area, Units("km", "km").area, Units("ms", "USD").area] == ["square units", "km²", "ms by USD"]
-
-
-@pytest.mark.parametrize("at", [0.0, 7.0, -1e300])
-def test_one_point_has_room_around_it(at: float) -> None:
-    left, below, right, above = frame_around([(at, at, at, at)], None)
-    assert left < at < right
-    assert below < at < above
 
 
 @pytest.mark.parametrize("vertices", [0, 1, MOST_DRAWN, MOST_DRAWN + 1, 10 * MOST_DRAWN])
@@ -131,9 +113,9 @@ def test_the_margin_of_a_polygon_is_narrower_in_its_hole() -> None:
     hole = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
     drawn = area_of("yard", fence(Polygon([[-9, -9], [9, -9], [9, 9], [-9, 9]], (hole,)), margin=0.5))
     assert drawn.bounds == pytest.approx((-9.5, -9.5, 9.5, 9.5))
-    [[outer, inner]] = json.loads(drawn.message)["margin_xs"][0]
-    assert max(outer) == pytest.approx(9.5)
-    assert max(inner) == pytest.approx(0.5)
+    [[outer, inner]] = json.loads(drawn.message)["around"]
+    assert max(x for x, _ in outer) == pytest.approx(9.5)
+    assert max(x for x, _ in inner) == pytest.approx(0.5)
 
 
 def test_a_circle_has_its_radius_and_its_margin() -> None:

@@ -1,6 +1,8 @@
 """The dashboard answers only under its own names, and only to its own pages."""
 
 import http.client
+import re
+import urllib.request
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
@@ -8,6 +10,8 @@ import pytest
 from dashboard_process import dashboard_process
 from patience import PATIENCE
 from server_process import run
+
+from dynhull_dashboard.page import VENDOR
 
 UPGRADE = {
     "Connection": "Upgrade",
@@ -17,8 +21,7 @@ UPGRADE = {
 }
 NAMED = "hulls.example.org:5006"
 PROXIED = "https://proxied.example.org"
-SESSION = "/ws"
-SOCKETS = "/hulls", SESSION
+LIVE = "/live"
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +35,7 @@ def answer(dashboard: str, path: str, **headers: str) -> tuple[int, str]:
     """The status, and the text of a refusal."""
     connection = http.client.HTTPConnection(dashboard, timeout=PATIENCE)
     try:
-        connection.request("GET", path, headers={**(UPGRADE if path in SOCKETS else {}), **headers})
+        connection.request("GET", path, headers={**(UPGRADE if path == LIVE else {}), **headers})
         response = connection.getresponse()
         refused = response.status == http.HTTPStatus.FORBIDDEN
         return response.status, response.read().decode() if refused else ""
@@ -44,7 +47,7 @@ def status(dashboard: str, path: str, **headers: str) -> int:
     return answer(dashboard, path, **headers)[0]
 
 
-@pytest.mark.parametrize("path", ["/", "/static/js/bokeh.min.js", *SOCKETS])
+@pytest.mark.parametrize("path", ["/", "/vendor/d3-geo.min.js", LIVE])
 def test_unknown_hosts_and_origins_are_refused(dashboard: str, path: str) -> None:
     rebound = f"evil.example:{dashboard.rpartition(':')[2]}"
     assert status(dashboard, path, Host=rebound, Origin=f"http://{rebound}") == http.HTTPStatus.FORBIDDEN
@@ -83,9 +86,9 @@ def test_a_port_in_use_is_named(address: str, dashboard: str) -> None:
     )
 
 
-@pytest.mark.parametrize("path", ["/", "/hulls"])
+@pytest.mark.parametrize("path", ["/", LIVE])
 def test_its_own_names_are_answered(dashboard: str, path: str) -> None:
-    expected = http.HTTPStatus.SWITCHING_PROTOCOLS if path == "/hulls" else http.HTTPStatus.OK
+    expected = http.HTTPStatus.SWITCHING_PROTOCOLS if path == LIVE else http.HTTPStatus.OK
     proxied = PROXIED.rpartition("/")[2]
     assert status(dashboard, path, Host=proxied, Origin=PROXIED) == expected
     port = dashboard.rpartition(":")[2]
@@ -100,3 +103,20 @@ def test_whether_the_page_is_there_can_be_asked(dashboard: str) -> None:
     answered = connection.getresponse()
     assert (answered.status, answered.read()) == (http.HTTPStatus.OK, b"")
     connection.close()
+
+
+def test_what_the_page_uses_of_others_comes_with_its_licences(dashboard: str) -> None:
+    files = {each.name for each in VENDOR.iterdir()}
+    licences = (VENDOR / "LICENSES.txt").read_text("utf-8")
+    assert all(name in licences for name in files - {"LICENSES.txt"})
+    assert len(re.findall("provided that the above copyright notice", licences)) == 5
+    used = {name for name in files if f"vendor/{name}" in page_and_scripts(dashboard)}
+    assert used == files - {"LICENSES.txt"}
+    assert all(status(dashboard, f"/vendor/{name}") == http.HTTPStatus.OK for name in files)
+    assert status(dashboard, "/vendor/../page/page.html") == http.HTTPStatus.FORBIDDEN
+
+
+def page_and_scripts(dashboard: str) -> str:
+    with urllib.request.urlopen(f"http://{dashboard}/", timeout=PATIENCE) as answered:
+        text: str = answered.read().decode()
+    return text

@@ -12,6 +12,7 @@ from peers import program
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 from server_process import Server, run, server_process
 
+from dynhull import GeoHull
 from dynhull_client import HullClient
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
@@ -30,6 +31,22 @@ GAP = """cell => {
     const {left, top} = figure.getBoundingClientRect()
     const place = cell.getBoundingClientRect()
     return top >= place.top + height ? height : left - place.left - width
+}"""
+
+
+INSIDE = """([name, columns, rows]) => {
+    const {view, hulls} = picture, canvas = document.createElement("canvas").getContext("2d")
+    for (const rings of hulls.get(name).polygons(view)) view.polygon(canvas, rings)
+    canvas.lineWidth = 3  // nearer to the line than a pixel and a half, a place may be on either side
+    const found = [], {width, height} = view.rect
+    for (let column = 0; column < columns; column++)
+        for (let row = 0; row < rows; row++) {
+            const across = (column + 0.5) * width / columns, down = (row + 0.5) * height / rows
+            const place = view.invert(across, down), [back] = view.place(...place)
+            if (Math.abs(back - across) < 0.01 && !canvas.isPointInStroke(across, down))
+                found.push([...place, canvas.isPointInPath(across, down)])
+        }
+    return found
 }"""
 
 
@@ -98,7 +115,7 @@ def wait_for_hulls(page: Page, *names: str) -> None:
     """Wait until the page lists these hulls."""
     page.wait_for_function(
         """names => {
-            const known = Bokeh.documents[0]?.get_model_by_name("page").offered ?? []
+            const known = [...document.querySelectorAll("#offered option")].map(option => option.value)
             return names.every(name => known.includes(name))
         }""",
         arg=names,
@@ -110,11 +127,13 @@ def wait_for_watchers(metrics: str, count: int) -> None:
 
 
 def wait_for_labels(page: Page, name: str, labels: list[str]) -> None:
-    """Wait until the vertices have these names beside them."""
+    """Wait until these vertices have their names beside them."""
     page.wait_for_function(
-        """([name, labels]) => JSON.stringify(labels) == JSON.stringify(
-            Bokeh.documents[0]?.get_model_by_name("plane")?.renderers
-                .find(each => each.data_source.name == `vertices of ${name}`)?.data_source.data.label)""",
+        """([name, labels]) => {
+            const keys = picture.hulls.get(name)?.vertices.keys ?? []
+            const shown = keys.map(key => picture.labels.shown.has(`${key} of ${name}`) ? key : "")
+            return JSON.stringify(labels) == JSON.stringify(shown)
+        }""",
         arg=[name, labels],
     )
 
@@ -122,10 +141,8 @@ def wait_for_labels(page: Page, name: str, labels: list[str]) -> None:
 def wait_for_ring(page: Page, places: list[list[float]]) -> None:
     """Wait until the rings around the key are at these places."""
     page.wait_for_function(
-        """places => {
-            const {x, y} = Bokeh.documents[0].get_model_by_name("found").data
-            return JSON.stringify(places) == JSON.stringify(Array.from(x, (each, row) => [each, y[row]]))
-        }""",
+        """places => JSON.stringify(places) == JSON.stringify(picture.found().map(({place}) => place))
+            && picture.rings?.length == places.length""",
         arg=places,
     )
 
@@ -134,9 +151,8 @@ def place_of(page: Page, x: float, y: float) -> list[float]:
     """Where a point is on the screen."""
     place: list[float] = page.evaluate(
         """([x, y]) => {
-            const view = Bokeh.index.get_by_id(Bokeh.documents[0].get_model_by_name("plane").id)
-            const box = view.el.getBoundingClientRect()
-            const [right] = view.frame.x_scale.v_compute([x]), [down] = view.frame.y_scale.v_compute([y])
+            picture.draw()
+            const box = picture.element.getBoundingClientRect(), [right, down] = picture.view.place(x, y)
             return [box.x + right, box.y + down]
         }""",
         [x, y],
@@ -166,7 +182,7 @@ def test_hovering_shows_coordinates_and_revision(browser: Browser, url: str, hul
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
         page.mouse.move(*place_of(page, 4, 4))
-        tip = page.locator(".bk-Tooltip")
+        tip = page.get_by_role("tooltip")
         expect(tip).to_contain_text(f"a vertex of {hull}")
         expect(tip).to_contain_text("revision")
 
@@ -177,7 +193,7 @@ def test_vertices_have_the_names_of_their_keys(browser: Browser, url: str, clien
     with opened(browser, url, name) as page:
         wait_for_labels(page, name, ["LH400", "UA17", "AF84", "<b>BA2"])
         page.mouse.move(*place_of(page, 0, 4))
-        expect(page.locator(".bk-Tooltip")).to_contain_text(f"<b>BA2: a vertex of {name}")
+        expect(page.get_by_role("tooltip")).to_contain_text(f"<b>BA2: a vertex of {name}")
         client.put(name, ["a"], [[0, 0]])  # of two at one place the least is named
         client.remove(name, ["LH400"])
         wait_for_labels(page, name, ["a", "UA17", "AF84", "<b>BA2"])
@@ -230,6 +246,155 @@ def test_a_key_is_found_and_followed(browser: Browser, url: str, client: HullCli
         expect(found.nth(1)).to_have_text(f"There is no hull {numbered}")
         field.fill("")
         expect(found).to_have_count(0)
+
+
+def test_the_picture_stands_still_while_hulls_move_in_it(browser: Browser, url: str) -> None:
+    with opened(browser, url, "none") as page:
+        frame = page.evaluate("frame_around([0, 0, 10, 6], undefined)")
+        assert frame == pytest.approx([-0.8, -0.8, 10.8, 6.8])
+
+        def again(box: list[float], old: list[float], same_scale: bool = True) -> list[float]:
+            found: list[float] = page.evaluate("each => frame_around(...each)", [box, old, same_scale])
+            return found
+
+        assert again([1, 1, 9, 5], frame) == frame
+        assert again([1, 1, 11, 5], frame) != frame, "a hull has left it"
+        assert again([4, 4, 5, 5], frame) != frame, "it has become too small to see"
+        wide = page.evaluate("frame_around([0, 0, 1000, 1], undefined, false)")
+        assert wide == pytest.approx([-80, -0.08, 1080, 1.08])
+        assert again([0, 0, 1000, 1], wide, same_scale=False) == wide
+        assert again([0, 0, 1000, 0.1], wide, same_scale=False) != wide, "one axis has become too short to see"
+        for at in (0.0, 7.0, -1e300):
+            left, below, right, above = page.evaluate("at => frame_around([at, at, at, at], undefined)", at)
+            assert left < at < right
+            assert below < at < above
+
+
+def test_all_keys_have_names_where_there_is_room(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str")
+    client.put(name, ["a", "b", "c", "d", "inside"], [*SQUARE, [2, 2]])
+    with opened(browser, url, name) as page:
+        wait_for_labels(page, name, ["a", "b", "c", "d"])
+        named = f"picture.labels.shown.has('inside of {name}')"
+        assert not page.evaluate(named)
+        page.get_by_label("All names").check()
+        page.wait_for_function(named)
+
+
+def test_the_picture_is_moved_by_keys_and_by_hand(browser: Browser, url: str, hull: str) -> None:
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        begun = place_of(page, 4, 4)
+        picture = page.get_by_role("application")
+        picture.press("ArrowRight")
+        assert place_of(page, 4, 4) == pytest.approx([begun[0] - 60, begun[1]])
+        picture.press("+")
+        assert place_of(page, 4, 4)[0] - place_of(page, 0, 4)[0] > 1.3 * (place_of(page, 4, 0)[1] - begun[1]) / 1.4
+        picture.press("0")
+        page.wait_for_function("picture.following")
+        wait_until(lambda: place_of(page, 4, 4) == pytest.approx(begun))
+        page.mouse.move(*begun)
+        page.mouse.down()
+        page.mouse.move(begun[0] - 50, begun[1] + 20, steps=3)
+        page.mouse.up()
+        assert place_of(page, 4, 4) == pytest.approx([begun[0] - 50, begun[1] + 20], abs=5)
+        page.get_by_role("button", name="Show all").click()
+        wait_until(lambda: place_of(page, 4, 4) == pytest.approx(begun))
+
+
+def test_the_picture_is_paused_and_shows_what_was_before(
+    browser: Browser, url: str, client: HullClient, hull: str
+) -> None:
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        page.get_by_role("application").press(" ")
+        client.apply(hull, insert=[[9, 9]])
+        later = [[0, 0], [4, 0], [9, 9], [0, 4]]
+        # The table goes on while the picture is paused.
+        expect(page.get_by_role("row").filter(has_text=hull).locator("td").nth(0)).to_have_text("2")
+        expect(page.get_by_role("timer")).to_contain_text("s ago")
+        wait_for_vertices(page, hull, SQUARE)
+        page.get_by_role("button", name="To now").click()
+        wait_for_vertices(page, hull, later)
+        # Back to just before the change, and on from there.
+        page.evaluate("name => recorder.go(recorder.tracks.get(`vertices of ${name}`).moments.at(-1) - 1)", hull)
+        wait_for_vertices(page, hull, SQUARE)
+        page.get_by_role("button", name="Play").click()
+        wait_for_vertices(page, hull, later)
+        slider = page.get_by_role("slider")
+        slider.press("Home")
+        expect(page.get_by_role("button", name="Play")).to_be_visible()
+        page.get_by_role("button", name="To now").click()
+        expect(page.get_by_role("timer")).to_have_text("Live")
+
+
+def test_old_drawings_are_thinned_and_forgotten(browser: Browser, url: str) -> None:
+    """A recording is bounded, and a moment shows what was there then."""
+    with opened(browser, url, "none") as page:
+        kept = page.evaluate("""() => {
+            const shown = [], begun = Date.now, made = new Recorder(message => shown.push(message.revision), () => {})
+            let now = 1e12
+            Date.now = () => now
+            made.began = now
+            const message = {kind: "vertices", hull: "a", pad: "x".repeat(50_000)}
+            for (let revision = 0; revision < 4000; revision++, now += 100)
+                made.take(message, JSON.stringify({...message, revision}))
+            const {moments, texts} = made.tracks.get("vertices of a")
+            made.go(now - 60_000)
+            Date.now = begun
+            const sum = texts.reduce((sum, text) => sum + text.length, 0)
+            return {length: made.length, sum, oldest: now - moments[1], revision: shown.at(-1)}
+        }""")
+    assert kept["length"] == kept["sum"] <= 60_000_000
+    assert 200_000 < kept["oldest"] <= 300_100  # and one more, which was to be seen then
+    assert 3350 < kept["revision"] <= 3400
+
+
+def test_no_page_asks_another_host(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str", geographic=True, center=(10, 50))
+    client.put(name, ["a", "b", "c"], [[10, 50], [10.1, 50], [10, 50.1]])
+    asked: list[str] = []
+    with opened(browser, url) as page:
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("websocket", lambda socket: asked.append(socket.url))
+        with page.expect_response("**/countries-50m.json"):
+            page.goto(f"{url}?hull={name}")
+        page.wait_for_function("picture.coasts.known.get(FINE)?.coasts.length > 1000")
+    hosts = {request.split("/")[2] for request in asked if not request.startswith("data:")}
+    assert len(asked) > 4
+    assert hosts == {url.split("/")[2]}
+
+
+@pytest.mark.parametrize(
+    ("center", "places"),
+    [
+        ((179, -17), [(177.5, -18), (-179.75, -17), (179.5, -16.25)]),
+        ((0, -90), [(-170, -70), (-60, -65), (40, -72), (150, -68)]),
+        ((0, 60), [(170, 80), (-170, 80), (180, 70)]),
+        ((10, 0), [(-65, -30), (80, -40), (85, 35), (-60, 50)]),  # nearly half the globe
+    ],
+)
+def test_the_picture_has_the_edges_of_a_hull_on_the_globe(
+    browser: Browser,
+    url: str,
+    client: HullClient,
+    name: str,
+    center: tuple[float, float],
+    places: list[tuple[float, float]],
+) -> None:
+    """Great circles, across 180 degrees and around poles: each pixel is inside exactly where the hull contains it."""
+    client.create_hull(name, geographic=True, center=center)
+    client.apply(name, insert=places)
+    expected = GeoHull(places, center)
+    with opened(browser, url, name) as page:
+        page.wait_for_function("picture.view.globe && picture.frames > 0")
+        for turn in ((0, 0), (200, -90)):
+            page.evaluate("turn => picture.move(view => view.pan(...turn))", turn)
+            found = page.evaluate(INSIDE, [name, 60, 40])
+            assert len(found) > 1000
+            inside = expected.contains(np.array([each[:2] for each in found]))
+            assert inside.tolist() == [each[2] for each in found]
+            assert inside.any()
 
 
 def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullClient, hull: str) -> None:
@@ -287,7 +452,7 @@ def test_what_the_server_measures(browser: Browser, url: str, client: HullClient
         wait_for_vertices(page, hull, SQUARE)
         client.apply(hull, insert=np.zeros((1000, 2)))
         page.wait_for_function("""() => {
-            const {updates, mean} = Bokeh.documents[0].get_model_by_name("time lines of whole server").data
+            const {updates, mean} = time_lines.rows.get("") ?? {updates: [], mean: []}
             return updates.some(value => value > 100) && mean.some(value => value > 0)
         }""")
 
@@ -381,10 +546,7 @@ def test_axes_of_different_units_have_scales_of_their_own(
 ) -> None:
     client.create_hull(name)
     client.apply(name, insert=[[0, 0], [1000, 0], [0, 1]])
-    heights = """() => {
-        const {frame} = Bokeh.index.get_by_id(Bokeh.documents[0].get_model_by_name("plane").id)
-        return Math.abs(frame.y_scale.compute(1) - frame.y_scale.compute(0))
-    }"""
+    heights = "() => picture.plane.place(0, 0)[1] - picture.plane.place(0, 1)[1]"
     with (
         dashboard_process(server[0].address, "--x-unit", "ms", "--y-unit", "USD") as url,
         opened(browser, url, name) as page,
@@ -398,12 +560,11 @@ def test_axes_of_different_units_have_scales_of_their_own(
 def test_series_of_the_server_have_no_hulls_colour(browser: Browser, url: str, hull: str) -> None:
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
-        colours = page.evaluate("""() => {
-            const of = name => Bokeh.documents[0].get_model_by_name(name).renderers
-                .filter(renderer => renderer.name).map(renderer => renderer.glyph.line_color.value)
-            return [...of("updates"), ...of("delay")]
-        }""")
-        assert colours == ["#7d8590"] * 3
+        page.wait_for_function("time_lines.rows.has('')")
+        colours = page.evaluate(
+            "time_lines.lines(['updates', 'mean', 'percentile'].slice(0, 2)).map(({colour}) => colour)"
+        )
+        assert colours == ["#7d8590"] * 2
 
 
 def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:

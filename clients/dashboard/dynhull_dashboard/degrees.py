@@ -1,6 +1,6 @@
 """Places on the globe in the picture: longitude to the right, latitude upwards, in degrees."""
 
-from math import cos, radians
+from math import cos, radians, sin
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from .drawing import Points
 Center = tuple[float, float]  # longitude and latitude
 
 FULL_TURN = 360.0
-METRES_A_DEGREE = 111_195.0  # of latitude, on a globe with the mean radius
+MEAN_RADIUS = 6_371_008.8  # of the earth, in metres
 SQUARE_KILOMETRE = 1e6
 CORNERS_OF_CIRCLE = 180
 # Neighbours in an outline are at most this far apart, in metres, so that great circles are drawn as they are.
@@ -60,8 +60,9 @@ def poles(rings: list[Points]) -> list[str]:
 def circle(area: Circle, *, on_globe: bool) -> Points:
     """A circle; on the globe its radius is in metres. For the eye: the server decides who is inside."""
     angles = np.linspace(0, 2 * np.pi, CORNERS_OF_CIRCLE, endpoint=False)
-    wide = high = area.r
-    if on_globe:
-        high = area.r / METRES_A_DEGREE
-        wide = high / max(cos(radians(area.y)), np.finfo(float).eps)
-    return np.column_stack([area.x + wide * np.cos(angles), area.y + high * np.sin(angles)])
+    if not on_globe:
+        return np.column_stack([area.x + area.r * np.cos(angles), area.y + area.r * np.sin(angles)])
+    away, lat = area.r / MEAN_RADIUS, radians(area.y)
+    north = np.arcsin(sin(lat) * cos(away) + cos(lat) * sin(away) * np.sin(angles))
+    east = np.arctan2(np.cos(angles) * sin(away) * cos(lat), cos(away) - sin(lat) * np.sin(north))
+    return np.column_stack([area.x + np.degrees(east), np.degrees(north)])

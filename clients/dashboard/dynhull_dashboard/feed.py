@@ -21,7 +21,7 @@ from dynhull_client import (
 )
 
 from .degrees import SQUARE_KILOMETRE, Center, outline, poles, shown
-from .drawing import Drawing, points_of, vertices_of
+from .drawing import Drawing
 from .history import History
 from .outline import Box, apart, box_around, drawn
 from .repeating import repeat
@@ -89,8 +89,8 @@ class HullFeed:
         self.bounds: Box | None = None
         self.center: Center | None = None
         self.poles: list[str] = []
-        self._outline = Drawing(vertices_of(self.name), 0, NO_POINTS)
-        self._inner = Drawing(points_of(self.name), 0, NO_POINTS)
+        self._outline = Drawing("vertices", self.name, 0, NO_POINTS)
+        self._inner = Drawing("points", self.name, 0, NO_POINTS)
         self.verified: Verified | None = None
         self.keyed = True  # until the server says otherwise
         self._copy = HullCopy()
@@ -169,7 +169,7 @@ class HullFeed:
             rings = outline(copy.vertices[rows], self.center)
             self.bounds, self.poles = box_around(np.concatenate(rings)), poles(rings)
         keys = None if copy.vertex_keys is None else copy.vertex_keys[rows]
-        self._outline = Drawing(vertices_of(self.name), event.revision, corners, keys, rings)
+        self._outline = Drawing("vertices", self.name, event.revision, corners, keys, rings)
 
     @property
     def shown_area(self) -> float:
@@ -197,7 +197,7 @@ class HullFeed:
             points = shown(sampled.points, self.center)
             inner = apart(points, self._outline.points)
             keys = None if sampled.keys is None else [sampled.keys[row] for row in np.flatnonzero(inner)]
-            self._inner = Drawing(points_of(self.name), sampled.revision, points[inner], keys)
+            self._inner = Drawing("points", self.name, sampled.revision, points[inner], keys)
 
     async def _find(self) -> None:
         await self.search.ask(self._copy)

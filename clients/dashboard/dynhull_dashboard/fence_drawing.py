@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
@@ -47,7 +46,7 @@ def area_of(name: str, fence: Fence | None, center: Center | None = None) -> Are
     margin = fence.margin if fence.other_hull is None else fence.near
     polygons = [[shown(ring, center) for ring in rings] for rings in _polygons(fence, on_globe=center is not None)]
     around = _around(polygons, margin) if center is None else []
-    message = _area_message(name, area_hulls(fence), margin, polygons, around)
+    message = _area_message(name, area_hulls(fence), margin, polygons, around, globe=center is not None)
     if not polygons:
         return Area(message)
     bounds = box_around(np.concatenate([rings[0] for rings in (*polygons, *around)]))
@@ -61,10 +60,13 @@ def _area_message(
     margin: float = 0.0,
     polygons: Sequence[Rings] = (),
     around: Sequence[Rings] = (),
+    *,
+    globe: bool = False,
 ) -> str:
-    (x, y), (margin_x, margin_y) = _columns(polygons), _columns(around)
-    rings = {"xs": x, "ys": y, "margin_xs": margin_x, "margin_ys": margin_y}
-    return json.dumps({"kind": "area", "fence": name, "hulls": hulls, "margin": margin, **rings})
+    """All of it as JSON. Each polygon is a list of rings, for overlaps of polygons are no holes."""
+    drawn, wider = ([[ring.tolist() for ring in rings] for rings in each] for each in (polygons, around))
+    named = {"kind": "area", "fence": name, "hulls": hulls, "margin": margin, "globe": globe}
+    return json.dumps({**named, "polygons": drawn, "around": wider})
 
 
 def area_hulls(fence: Fence) -> list[str]:
@@ -113,9 +115,3 @@ def _around(polygons: list[Rings], margin: float) -> list[Rings]:
         for part in shapely.get_parts(wider)
         if not part.is_empty
     ]
-
-
-def _columns(polygons: Sequence[Rings]) -> tuple[list[Any], list[Any]]:
-    """The coordinates x and y as Bokeh has them, in nested lists. Each polygon is a row, for overlaps are no holes."""
-    x, y = ([[[ring[:, axis].tolist() for ring in rings]] for rings in polygons] for axis in (0, 1))
-    return x, y

@@ -1,5 +1,6 @@
 """The latest rows of a growing table, for the time lines."""
 
+import math
 from collections import deque
 from collections.abc import Mapping
 
@@ -24,8 +25,8 @@ class History:
         self._rows.append(row)
         self.length += 1
 
-    def since(self, length: int) -> Mapping[str, list[float]]:
-        """The rows after the first `length`, as far as they are kept, as lists by column."""
+    def since(self, length: int) -> Mapping[str, list[float | None]]:
+        """The rows after the first `length`, as far as they are kept, as lists by column; None for NaN, as in JSON."""
         new = min(self.length - length, len(self._rows))
         rows = list(self._rows)[len(self._rows) - new :]
-        return {name: [row[i] for row in rows] for i, name in enumerate(self.columns)}
+        return {name: [None if math.isnan(row[i]) else row[i] for row in rows] for i, name in enumerate(self.columns)}

@@ -10,30 +10,29 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
-from bokeh.server.tornado import BokehTornado
 from tornado.httputil import HTTPServerRequest
-from tornado.web import RequestHandler
+from tornado.web import Application, RequestHandler
 
 HOST = re.compile(r"([a-z0-9._-]+|\[[0-9a-f:.]+\])(:[0-9]{1,5})?")
 PORTS = {"http": 80, "https": 443}
 
 
-class KnownHosts(BokehTornado):
-    """Bokeh's application, restricted to requests whose Host and Origin are among the given names.
+class KnownHosts(Application):
+    """An application restricted to requests whose Host and Origin are among the given names.
 
     Args:
-        applications: as for `BokehTornado`.
+        handlers: as for `Application`.
         hosts: HOST, HOST:PORT or an origin such as https://HOST, as browsers name the page. Without a port, the ports
             of HTTP and HTTPS.
-        options: as for `BokehTornado`.
+        settings: as for `Application`.
 
     Raises:
         ValueError: if one of the names is none of these.
     """
 
-    def __init__(self, applications: Any, hosts: Iterable[str], **options: Any) -> None:
+    def __init__(self, handlers: Any, hosts: Iterable[str], **settings: Any) -> None:
         self._hosts = {name for host in hosts for name in _configured(host)}
-        super().__init__(applications, extra_websocket_origins=sorted(self._hosts), **options)
+        super().__init__(handlers, **settings)
 
     def find_handler(self, request: HTTPServerRequest, **_: Any) -> Any:
         """Tornado's handler, or a refusal that names the host or the origin at fault."""
@@ -42,19 +41,9 @@ class KnownHosts(BokehTornado):
             unknown = request.host
         elif origin is not None and self._hosts.isdisjoint(_with_port(urlsplit(origin).netloc)):
             unknown = origin
-        elif request.method == "HEAD" and request.path == "/":
-            return self.get_handler_delegate(request, Presence)
         else:
             return super().find_handler(request)
         return self.get_handler_delegate(request, Refusal, {"unknown": unknown})
-
-
-class Presence(RequestHandler):
-    """Answers HEAD, which Bokeh's pages refuse, without a session: whether the page is there."""
-
-    def head(self) -> None:
-        """Answer 200 without a body."""
-        self.finish()
 
 
 class Refusal(RequestHandler):

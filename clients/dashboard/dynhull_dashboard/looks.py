@@ -20,6 +20,11 @@ LOOKS = (
     Look("#CC79A7", (10, 3, 2, 3), "diamond"),
     Look("#E69F00", (14, 4), "inverted_triangle"),
     Look("#56B4E9", (5, 2, 5, 6), "hex"),
+    # Colours come again with another line and another marker.
+    Look("#0072B2", (2, 2), "diamond"),
+    Look("#D55E00", (16, 3, 2, 3), "hex"),
+    Look("#009E73", (6, 2), "inverted_triangle"),
+    Look("#CC79A7", (3, 6), "square"),
 )
 
 # Series of the whole server belong to no hull. This grey has a contrast above 3:1 with the light and the dark page.

@@ -1,26 +1,19 @@
-"""The dashboard's HTTP server, which is Bokeh's."""
+"""The dashboard's HTTP server."""
 
 import asyncio
 import errno
-import logging
 import signal
 import socket
 from collections.abc import Sequence
-from functools import partial
 
-from bokeh.application import Application
-from bokeh.application.handlers import FunctionHandler
-from bokeh.document import Document
-from bokeh.server.contexts import BokehSessionContext
-from bokeh.server.server import BaseServer
 from tornado.httpserver import HTTPServer
-from tornado.ioloop import IOLoop
 from tornado.netutil import bind_sockets
+from tornado.web import StaticFileHandler
 
 from .hub import Hub
-from .hull_socket import HullSocket
 from .known_hosts import KnownHosts
-from .page import Page
+from .live_socket import LiveSocket
+from .page import VENDOR, PageHandler, page
 
 LOOPBACK = "127.0.0.1", "localhost", "[::1]"
 
@@ -38,8 +31,6 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
         ValueError: if one of `origins` is not a name.
         OSError: it cannot listen there.
     """
-    # Bokeh warns of each message that it could not send to a page that was closed, which is no fault.
-    logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
@@ -47,16 +38,18 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     port = sockets[0].getsockname()[1]
     name = f"[{host}]" if ":" in host else host
     hosts = [f"{each}:{port}" for each in (name, *LOOPBACK)]
-    page = Application(FunctionHandler(partial(_show, hub)))
-    hulls = ("/hulls", HullSocket, {"hub": hub})
-    application = KnownHosts({"/": page}, [*hosts, *origins], extra_patterns=[hulls])
-    http = HTTPServer(application)
+    html, version = page(hub)
+    handlers = [
+        ("/", PageHandler, {"html": html}),
+        ("/live", LiveSocket, {"hub": hub, "version": version}),
+        ("/vendor/(.*)", StaticFileHandler, {"path": VENDOR}),
+    ]
+    http = HTTPServer(KnownHosts(handlers, [*hosts, *origins], compress_response=True))
     http.add_sockets(sockets)
-    server = BaseServer(IOLoop.current(), application, http)
-    server.start()
     print(f"dynhull dashboard on http://{name}:{port}", flush=True)  # noqa: T201  # the address is the command's output
     await stop.wait()
-    server.stop()
+    http.stop()
+    await http.close_all_connections()
     await hub.close()
 
 
@@ -68,15 +61,3 @@ def _listen(host: str, port: int) -> list[socket.socket]:
         if error.errno == errno.EADDRINUSE:
             reason = "another program uses this port: choose another with --port"
         raise OSError(f"cannot listen on {host}:{port}: {reason}") from None
-
-
-def _show(hub: Hub, document: Document) -> None:
-    context = document.session_context
-    assert isinstance(context, BokehSessionContext)
-    assert context.request is not None
-    arguments = context.request.arguments
-    hulls, fences, keys = (
-        list(dict.fromkeys(each.decode(errors="replace") for each in arguments.get(name, [])))
-        for name in ("hull", "fence", "key")
-    )
-    Page(document, hub, hulls, fences, keys[0] if keys else "")

@@ -24,8 +24,3 @@ class Units:
 
 
 NO_UNITS = Units()
-
-
-def axis_label(name: str, unit: str) -> str:
-    """The label of an axis."""
-    return f"{name} ({unit})" if unit else name

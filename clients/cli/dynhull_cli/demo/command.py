@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # Snow: the longest mean delay of the year, 180 flights cancelled.
 DEFAULT_DAY = "2013-03-08"
+DEFAULT_SPEED = 120.0
 
 
 def demo(
@@ -61,6 +62,15 @@ def demo(
     out: Annotated[Path, typer.Option(dir_okay=False, help="PNG file to write the picture to.")] = Path(
         "dynhull-demo.png"
     ),
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live", help="Show the flights on a dashboard until Ctrl-C, over and over, with a gateway beside it."
+        ),
+    ] = False,
+    speed: Annotated[
+        float, typer.Option(min=1, max=6000, help="With --live: how many times as fast as the day was.")
+    ] = DEFAULT_SPEED,
 ) -> None:
     """Replay real points through a real server and verify every step.
 
@@ -70,6 +80,8 @@ def demo(
     positions with those sent, and the watcher's copy with the live hull. Fences around three airports and between the
     hulls of two airlines report who enters and leaves; every event is compared with a recomputation. It ends with
     VERIFIED and exit code 0, or with the first difference and exit code 1.
+
+    To look at: dynhull demo --live. It prints the address of a dashboard, and of a gateway for HTTP.
 
     Your own points: dynhull demo --points fleet.csv --x lon --y lat --id vehicle --time minute
     """
@@ -82,6 +94,13 @@ def demo(
 
     console = Console(highlight=False, soft_wrap=True)
     try:
+        if live:
+            if points is not None or window is not None:
+                raise ValueError("--live is for the flights, without --points and --window")
+            from .live import live as show_live
+
+            show_live(console, _flights(day, hours, None), speed)
+            return
         check_out(out, [".png"])
         max_age = duration(window, "--window")
         if points is not None:

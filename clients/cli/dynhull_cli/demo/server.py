@@ -1,4 +1,4 @@
-"""The server process of the demo."""
+"""The processes of the demo: the server and, where the demo is live, its gateway and dashboard."""
 
 import subprocess
 import sys
@@ -6,22 +6,58 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 STOP_SECONDS = 10
+SERVE = "-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"
+
+
+class Process:
+    """A running command.
+
+    Attributes:
+        addresses: the last words of the lines that it has printed.
+    """
+
+    def __init__(self, name: str, process: "subprocess.Popen[str]", lines: int) -> None:
+        self._name = name
+        self._process = process
+        assert process.stdout is not None
+        self.addresses = []
+        for _ in range(lines):
+            line = process.stdout.readline()
+            if " on " not in line:
+                raise RuntimeError(f"the {name} did not start: {line.strip() or 'see its message above'}")
+            self.addresses.append(line.split()[-1])
+
+    def check(self) -> None:
+        """Raise a RuntimeError if the command has ended."""
+        code = self._process.poll()
+        if code is not None:
+            raise RuntimeError(f"the {self._name} has ended with exit code {code}: see its message above")
 
 
 @contextmanager
-def server_process() -> Iterator[str]:
-    """Start `dynhull serve` on a free port, yield its address, and stop it at the end."""
-    command = [sys.executable, "-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:  # noqa: S603  (our own module)
+def running(name: str, *arguments: str, lines: int = 1, apart: bool = False) -> Iterator[Process]:
+    """Run Python with these arguments, and stop it at the end.
+
+    Args:
+        name: what it is, for errors.
+        arguments: those of Python.
+        lines: how many lines with addresses it prints when it has started.
+        apart: whether Ctrl-C on the terminal does not reach it, so that it ends when the block ends.
+    """
+    command = [sys.executable, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=apart) as process:  # noqa: S603  (our own module)
         try:
-            assert process.stdout is not None
-            first_line = process.stdout.readline()
-            if "serving on" not in first_line:
-                raise RuntimeError(f"the server did not start: {first_line.strip() or 'see its message above'}")
-            yield first_line.split()[-1]
+            yield Process(name, process, lines)
         finally:
             process.terminate()
             try:
                 process.wait(STOP_SECONDS)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+@contextmanager
+def server_process() -> Iterator[str]:
+    """Start `dynhull serve` on a free port, yield its address, and stop it at the end."""
+    with running("server", *SERVE) as server:
+        yield server.addresses[0]

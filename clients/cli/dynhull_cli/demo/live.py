@@ -1,0 +1,99 @@
+"""The day of flights live: a server with its gateway and dashboard, until they are ended."""
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from urllib.parse import urlencode
+
+from rich.console import Console
+
+from dynhull_client import Circle, HullClient
+
+from .scene import Frame, Scene
+from .server import SERVE, Process, running
+
+MINUTE = 60.0  # seconds from a frame to the next
+# Until six in the morning hardly any flight is in the air.
+FIRST_FRAME = 6 * 60
+SIGNALS = "SIGINT", "SIGTERM", "SIGHUP"  # not every system has the last
+
+
+def live(console: Console, scene: Scene, speed: float) -> None:
+    """Start all, print the addresses, and replay the scene over and over until SIGINT, SIGTERM or SIGHUP.
+
+    Args:
+        console: for the addresses.
+        scene: minutes of keys that move.
+        speed: how many times as fast as they were.
+
+    Raises:
+        RuntimeError: one of the processes did not start, or has ended.
+    """
+    with _stopped_by_signals() as stop, running("server", *SERVE, "--metrics-port", "0", lines=2, apart=True) as server:
+        address, metrics = server.addresses
+        client = "-m", "dynhull_cli"
+        where = "--port", "0", "--address", address
+        with (
+            running("gateway", *client, "gateway", *where, apart=True) as gateway,
+            running("dashboard", *client, "dashboard", *where, "--metrics", metrics, apart=True) as dashboard,
+            HullClient(address) as hulls,
+        ):
+            _create(hulls, scene)
+            query = urlencode([("hull", scene.hull_name), *(("fence", name) for name in scene.circles)])
+            console.print(f"[bold]{scene.title}[/bold]")
+            console.print(f"Look at it:  {dashboard.addresses[0]}/?{query}", markup=False)
+            console.print(f"Over HTTP:   {gateway.addresses[0]}/hulls", markup=False)
+            console.print(f"Over gRPC:   dynhull list --address {address}", markup=False)
+            console.print(
+                f"{speed:g} times as fast as the day was. It begins again when it has ended. Ctrl-C ends all.",
+                markup=False,
+            )
+            _replay(hulls, scene, MINUTE / speed, stop, (server, gateway, dashboard))
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[threading.Event]:
+    """An event that is set by the signals that would end the process."""
+    stop = threading.Event()
+    numbers = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
+    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    try:
+        yield stop
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _create(client: HullClient, scene: Scene) -> None:
+    client.create_hull(scene.hull_name, keyed="str", geographic=scene.center is not None, center=scene.center)
+    for name, circle in scene.circles.items():
+        client.create_fence(name, Circle(*circle), scene.hull_name)
+
+
+def _replay(
+    client: HullClient, scene: Scene, pause: float, stop: threading.Event, processes: tuple[Process, ...]
+) -> None:
+    there: set[str] = set()
+    due = time.monotonic()
+    for frame in _forever(scene):
+        gone = sorted(there - set(frame.keys))
+        client.put(scene.hull_name, frame.keys, frame.points, remove=gone)
+        there = set(frame.keys)
+        # After a standstill of the machine the day goes on from where it was, and does not catch up.
+        due = max(due + pause, time.monotonic())
+        if stop.wait(due - time.monotonic()):
+            return
+        for process in processes:
+            process.check()
+
+
+def _forever(scene: Scene) -> Iterator[Frame]:
+    """The frames over and over; the first time from the morning."""
+    first = FIRST_FRAME if scene.length > FIRST_FRAME else 0
+    while True:
+        for number, frame in enumerate(scene.frames()):
+            if number >= first:
+                yield frame
+        first = 0

@@ -1,0 +1,48 @@
+// Room for text: boxes that do not overlap.
+const LABEL_HEIGHT = 15, LABEL_GAP = 3, CELL_WIDTH = 96, CELL_HEIGHT = 32
+const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif"
+const LABEL_FONT = `12px ${FONT}`, FOUND_LABEL_FONT = `bold ${LABEL_FONT}`
+const MOST_WIDTHS = 20_000
+const ruler = document.createElement("canvas").getContext("2d")
+const widths = new Map()
+function text_width(text, font) {
+  const id = font + text
+  let width = widths.get(id)
+  if (width == undefined) {
+    if (widths.size >= MOST_WIDTHS) widths.clear()
+    ruler.font = font
+    widths.set(id, width = ruler.measureText(text).width)
+  }
+  return width
+}
+// The box of a text whose left or right end is at x.
+function label_box(x, bottom, width, side) {
+  const left = side == "left" ? x : x - width
+  return {left: left - LABEL_GAP, right: left + width + LABEL_GAP, top: bottom - LABEL_HEIGHT, bottom, side}
+}
+function square_box(across, down, radius) {
+  return {left: across - radius, right: across + radius, top: down - radius, bottom: down + radius}
+}
+function is_inside(box, {left, top, width, height}) {
+  return box.left >= left && box.right <= left + width && box.top >= top && box.bottom <= top + height
+}
+class Boxes {
+  cells = new Map()
+  add(box) {
+    for (const cell of this.around(box)) {
+      const boxes = this.cells.get(cell)
+      if (boxes) boxes.push(box)
+      else this.cells.set(cell, [box])
+    }
+  }
+  is_free(box) {
+    for (const cell of this.around(box))
+      for (const other of this.cells.get(cell) ?? [])
+        if (box.left < other.right && other.left < box.right && box.top < other.bottom && other.top < box.bottom) return false
+    return true
+  }
+  *around({left, right, top, bottom}) {
+    for (let across = Math.floor(left / CELL_WIDTH); across * CELL_WIDTH <= right; across++)
+      for (let down = Math.floor(top / CELL_HEIGHT); down * CELL_HEIGHT <= bottom; down++) yield across * 10_000 + down
+  }
+}

@@ -1,0 +1,80 @@
+// Coasts and borders of Natural Earth, drawn again for each view. Great circles between their points would look the same.
+const COARSE = "vendor/countries-110m.json", FINE = "vendor/countries-50m.json", PIECE = 48
+// Pixels in a radian from which the fine coasts are drawn. Most of them are out of sight when the scale is larger still:
+// then they can be drawn while the picture moves, too.
+const FINE_SCALE = 900, FINE_MOVING_SCALE = 5000
+class Coasts {
+  constructor(changed) {
+    this.changed = changed
+    this.known = new Map()
+  }
+  // The lines to draw, once they are loaded.
+  lines(scale, moving) {
+    const name = scale > (moving ? FINE_MOVING_SCALE : FINE_SCALE) ? FINE : COARSE
+    if (!this.known.has(name)) {
+      this.known.set(name, undefined)
+      fetch(name).then(answer => answer.json()).then(atlas => {
+        this.known.set(name, decoded(atlas))
+        this.changed()
+      }).catch(() => this.known.delete(name))  // the next view asks again
+    }
+    return this.known.get(name) ?? this.known.get(COARSE) ?? this.known.get(FINE) ?? {coasts: [], borders: []}
+  }
+  draw(canvas, view, colours, moving) {
+    const {coasts, borders} = this.lines(view.scale, moving)
+    for (const [pieces, colour] of [[borders, colours.border], [coasts, colours.coast]]) {
+      canvas.beginPath()
+      for (const piece of pieces) trace(canvas, view, piece)
+      canvas.strokeStyle = colour
+      canvas.lineWidth = 1
+      canvas.stroke()
+    }
+  }
+}
+function decoded(atlas) {
+  const {countries} = atlas.objects
+  const lines = filter => topojson.mesh(atlas, countries, filter).coordinates.flatMap(pieces)
+  return {coasts: lines((one, two) => one == two), borders: lines((one, two) => one != two)}
+}
+// A line as pieces of few points: unit vectors, with a ball around them, so that what is out of sight costs little.
+function pieces(line) {
+  const found = []
+  for (let first = 0; first + 1 < line.length; first += PIECE) {
+    const part = line.slice(first, first + PIECE + 1)
+    const points = new Float64Array(3 * part.length), middle = [0, 0, 0]
+    part.forEach(([lon, lat], row) => {
+      const cos = Math.cos(lat * RADIAN)
+      const vector = [cos * Math.cos(lon * RADIAN), cos * Math.sin(lon * RADIAN), Math.sin(lat * RADIAN)]
+      vector.forEach((each, axis) => {
+        points[3 * row + axis] = each
+        middle[axis] += each / part.length
+      })
+    })
+    let reach = 0
+    for (let i = 0; i < points.length; i += 3)
+      reach = Math.max(reach, Math.hypot(points[i] - middle[0], points[i + 1] - middle[1], points[i + 2] - middle[2]))
+    found.push({points, middle, reach})
+  }
+  return found
+}
+function trace(canvas, view, {points, middle, reach}) {
+  const lon = view.middle[0] * RADIAN, sin_lon = Math.sin(lon), cos_lon = Math.cos(lon), {sin, cos, scale, rect} = view
+  const [center, center_down] = view.center()
+  const [x, y, z] = middle, front = x * cos_lon + y * sin_lon
+  const across = y * cos_lon - x * sin_lon, up = cos * z - sin * front
+  if (sin * z + cos * front + reach < 0) return
+  if ((Math.abs(across) - reach) * scale > rect.width / 2 || (Math.abs(up) - reach) * scale > rect.height / 2) return
+  let pen = false
+  for (let i = 0; i < points.length; i += 3) {
+    const front = points[i] * cos_lon + points[i + 1] * sin_lon
+    if (sin * points[i + 2] + cos * front < 0) {
+      pen = false
+      continue
+    }
+    const right = center + scale * (points[i + 1] * cos_lon - points[i] * sin_lon)
+    const down = center_down - scale * (cos * points[i + 2] - sin * front)
+    if (pen) canvas.lineTo(right, down)
+    else canvas.moveTo(right, down)
+    pen = true
+  }
+}

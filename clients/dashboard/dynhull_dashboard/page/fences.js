@@ -1,0 +1,107 @@
+// The fences in the picture: areas, margins, names, and the subjects inside.
+const ARC_STEPS = 96, NAME_FONT = `bold 13px ${FONT}`, NAME_HEIGHT = 18, NAME_GAP = 9, LONGEST_NAME = 28
+const AREA_ALPHA = 0.08, HALO_ALPHA = 0.25, HALO_WIDTH = 8, MARGIN_DASH = [3, 3], MARK_RADIUS = 6
+const NO_AREA = {hulls: [], margin: 0, polygons: [], around: [], globe: false}, NOBODY = {hull: [], key: [], x: [], y: []}
+class Fence {
+  constructor(name, look) {
+    this.name = name
+    this.look = look
+    this.area = NO_AREA
+    this.inside = NOBODY
+  }
+  take(message) {
+    if (message.kind == "area" && message.globe) message.polygons = message.polygons.map(wound)
+    this[message.kind] = message
+  }
+  // The polygons of the area, each a list of rings: its own, and those of hulls.
+  polygons(view, hulls) {
+    const own = view.globe == this.area.globe || !view.globe ? this.area.polygons : []
+    return [...own, ...this.area.hulls.flatMap(name => hulls.get(name)?.polygons(view) ?? [])]
+  }
+  margins(view, hulls) {
+    const hull = this.area.margin && !view.globe && hulls.get(this.area.hulls[0])
+    const outer = hull && hull.corners?.length ? [[offset_outline(hull.corners, this.area.margin)]] : []
+    return [...this.area.around, ...outer]
+  }
+  // The subjects inside: where the hulls draw them, which are newer than what the fence knows.
+  marks(hulls) {
+    const {hull, key, x, y} = this.inside
+    return key.map((text, row) => ({key: text, hull: hull[row], place: hulls.get(hull[row])?.place_of(text) ?? [x[row], y[row]]}))
+  }
+}
+function draw_fences(canvas, {view, hulls, fences}) {
+  const stroke = (polygons, width, alpha, dash) => {
+    canvas.beginPath()
+    for (const rings of polygons) view.polygon(canvas, rings)
+    canvas.globalAlpha = alpha
+    canvas.lineWidth = width
+    canvas.setLineDash(dash)
+    canvas.stroke()
+    canvas.globalAlpha = 1
+    canvas.setLineDash([])
+  }
+  for (const fence of fences.values()) {
+    canvas.strokeStyle = canvas.fillStyle = fence.look.colour
+    const polygons = fence.polygons(view, hulls)
+    // Below the hulls, some of which are the areas: their own lines stay visible in the middle of the halo.
+    stroke(polygons, HALO_WIDTH, HALO_ALPHA, [])
+    canvas.globalAlpha = AREA_ALPHA
+    for (const rings of polygons) {  // one by one, for overlaps are no holes
+      canvas.beginPath()
+      view.polygon(canvas, rings)
+      canvas.fill("evenodd")
+    }
+    stroke(polygons, 2, 1, fence.look.dash)
+    stroke(fence.margins(view, hulls), 1, 0.8, MARGIN_DASH)
+  }
+}
+function draw_marks(canvas, {view, hulls, fences, colours}) {
+  for (const fence of fences.values()) {
+    canvas.beginPath()
+    for (const {place} of fence.marks(hulls)) {
+      const [across, down] = view.place(...place)
+      if (!isNaN(across)) add_marker(canvas, "star", across, down)
+    }
+    canvas.fillStyle = fence.look.colour
+    canvas.strokeStyle = colours.paper
+    canvas.lineWidth = 1
+    canvas.fill()
+    canvas.stroke()
+  }
+}
+// The name above or below each area; where neither has room, in its middle, or not at all.
+function draw_fence_names(canvas, {view, hulls, fences, taken}) {
+  canvas.font = NAME_FONT
+  canvas.textAlign = "center"
+  for (const fence of fences.values()) {
+    const around = fence.margins(view, hulls)
+    const places = (around.length ? around : fence.polygons(view, hulls)).flat(2).map(([x, y]) => view.place(x, y))
+      .filter(([across]) => !isNaN(across))
+    if (!places.length) continue
+    const [left, top, right, low] = box_around(places), name = fence.name
+    const label = name.length > LONGEST_NAME ? `…${name.slice(1 - LONGEST_NAME)}` : name
+    const width = text_width(label, NAME_FONT), at = down => places.find(place => place[1] == down)[0]
+    for (const [across, bottom] of [[at(top), top - NAME_GAP], [at(low), low + NAME_GAP + NAME_HEIGHT],
+      [(left + right) / 2, (top + low + NAME_HEIGHT) / 2]]) {
+      const box = {left: across - width / 2, right: across + width / 2, top: bottom - NAME_HEIGHT, bottom}
+      if (!is_inside(box, view.rect) || !taken.is_free(box)) continue
+      taken.add(box)
+      canvas.fillStyle = fence.look.colour
+      canvas.fillText(label, across, bottom - 4)
+      break
+    }
+  }
+  canvas.textAlign = "left"
+}
+// The outline at a distance from a convex polygon whose vertices are counterclockwise.
+function offset_outline(corners, distance) {
+  const outline = []
+  let at = corners.reduce((best, [x], row) => x > corners[best][0] ? row : best, 0)
+  for (let step = 0; step < ARC_STEPS; step++) {
+    const angle = 2 * Math.PI * step / ARC_STEPS, across = Math.cos(angle), up = Math.sin(angle)
+    const height = row => corners[row][0] * across + corners[row][1] * up
+    for (let next = (at + 1) % corners.length; height(next) > height(at); next = (at + 1) % corners.length) at = next
+    outline.push([corners[at][0] + distance * across, corners[at][1] + distance * up])
+  }
+  return outline
+}

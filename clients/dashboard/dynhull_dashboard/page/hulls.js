@@ -1,0 +1,95 @@
+// The hulls in the picture.
+const SURFACE_ALPHA = 0.12, POINT_ALPHA = 0.65, POINT_SIZE = 4, VERTEX_SIZE = 8
+const NOTHING = {revision: 0, x: [], y: [], keys: null, rings: null}
+const SHAPES = {
+  square: [[-4, -4], [4, -4], [4, 4], [-4, 4]],
+  triangle: [[0, -5], [4.5, 3.5], [-4.5, 3.5]],
+  inverted_triangle: [[0, 5], [4.5, -3.5], [-4.5, -3.5]],
+  diamond: [[0, -5.5], [4, 0], [0, 5.5], [-4, 0]],
+  hex: [0, 1, 2, 3, 4, 5].map(i => [4.6 * Math.sin(i * Math.PI / 3), -4.6 * Math.cos(i * Math.PI / 3)]),
+  star: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(i => [(i % 2 ? 3.4 : 8) * Math.sin(i * Math.PI / 5), -(i % 2 ? 3.4 : 8) * Math.cos(i * Math.PI / 5)]),
+}
+// Adds a marker to the path of a canvas.
+function add_marker(canvas, marker, across, down) {
+  const shape = SHAPES[marker]
+  if (!shape) {
+    canvas.moveTo(across + VERTEX_SIZE / 2, down)
+    canvas.arc(across, down, VERTEX_SIZE / 2, 0, 2 * Math.PI)
+    return
+  }
+  shape.forEach(([x, y], row) => row ? canvas.lineTo(across + x, down + y) : canvas.moveTo(across + x, down + y))
+  canvas.closePath()
+}
+class Hull {
+  constructor(name, look) {
+    this.name = name
+    this.look = look
+    this.vertices = this.points = NOTHING
+  }
+  take(message) {
+    this[message.kind] = message
+    this.places = undefined
+    if (message.kind == "vertices") {
+      this.corners = message.x.map((x, row) => [x, message.y[row]])
+      // Counterclockwise, but d3-geo wants the inside of rings on the globe at the right.
+      this.outline = message.rings && [...this.corners].reverse()
+    }
+  }
+  get globe() {
+    return this.vertices.rings != null
+  }
+  // The polygons that the hull fills, each a list of rings.
+  polygons(view) {
+    if (!this.vertices.x.length) return []
+    if (view.globe) return this.outline ? [[this.outline]] : []
+    return (this.vertices.rings ?? [this.corners]).map(ring => [ring])
+  }
+  // Where a key is, if it is drawn.
+  place_of(key) {
+    if (!this.places) {
+      this.places = new Map()
+      for (const {keys, x, y} of [this.points, this.vertices])
+        keys?.forEach((each, row) => this.places.set(each, [x[row], y[row]]))
+    }
+    return this.places.get(key)
+  }
+}
+// Of all functions that draw: the canvas in CSS pixels, and the picture.
+function draw_surfaces(canvas, {view, hulls}) {
+  for (const hull of hulls.values()) {
+    canvas.beginPath()
+    for (const rings of hull.polygons(view)) view.polygon(canvas, rings)
+    canvas.fillStyle = canvas.strokeStyle = hull.look.colour
+    canvas.globalAlpha = SURFACE_ALPHA
+    canvas.fill()
+    canvas.globalAlpha = 1
+    canvas.lineWidth = 2
+    canvas.setLineDash(hull.look.dash)
+    canvas.stroke()
+    canvas.setLineDash([])
+  }
+}
+function draw_points(canvas, {view, hulls}) {
+  canvas.globalAlpha = POINT_ALPHA
+  for (const {points: {x, y}, look} of hulls.values()) {
+    canvas.beginPath()
+    for (let row = 0; row < x.length; row++) {
+      const [across, down] = view.place(x[row], y[row])
+      canvas.rect(across - POINT_SIZE / 2, down - POINT_SIZE / 2, POINT_SIZE, POINT_SIZE)
+    }
+    canvas.fillStyle = look.colour
+    canvas.fill()
+  }
+  canvas.globalAlpha = 1
+}
+function draw_vertices(canvas, {view, hulls}) {
+  for (const {vertices: {x, y}, look} of hulls.values()) {
+    canvas.beginPath()
+    for (let row = 0; row < x.length; row++) {
+      const [across, down] = view.place(x[row], y[row])
+      if (!isNaN(across)) add_marker(canvas, look.marker, across, down)
+    }
+    canvas.fillStyle = look.colour
+    canvas.fill()
+  }
+}

@@ -1,0 +1,79 @@
+// The names beside vertices, subjects of fences and points: as many as fit without overlap. Hovering shows the others.
+const LABEL_OFFSET = 8, RING_RADIUS = 13
+const MOST_HALOS = 100  // of more names, drawing takes too long
+class Labels {
+  shown = new Set()
+  all = false  // of points that are no vertices, too
+  draw(canvas, picture) {
+    const {view, taken, colours} = picture
+    // Names that are shown come first: otherwise they would come and go while the hull moves.
+    const names = this.names(picture).sort((one, two) => this.shown.has(two.id) - this.shown.has(one.id) || one.rank - two.rank)
+    this.shown.clear()
+    canvas.font = LABEL_FONT
+    canvas.lineWidth = 3
+    canvas.strokeStyle = colours.paper
+    const placed = []
+    for (const {text, id, boxes, colour} of names) {
+      if (this.shown.has(id)) continue  // a vertex, and a subject inside
+      const box = boxes.find(each => is_inside(each, view.rect) && taken.is_free(each))
+      if (!box) continue
+      taken.add(box)
+      this.shown.add(id)
+      placed.push([text, box.left + LABEL_GAP, box.bottom - 3, colour])
+    }
+    placed.sort((one, two) => one[3] < two[3] ? -1 : one[3] > two[3] ? 1 : 0)
+    for (const [text, across, down, colour] of placed) {
+      if (placed.length <= MOST_HALOS) canvas.strokeText(text, across, down)
+      if (canvas.fillStyle != colour) canvas.fillStyle = colour
+      canvas.fillText(text, across, down)
+    }
+  }
+  // The names, and the boxes that each can have: first towards the middle of the picture.
+  names({view, hulls, fences}) {
+    const found = [], {left, width, top, height} = view.rect, middle = left + width / 2
+    const add = (text, hull, [x, y], colour, rank) => {
+      const [across, down] = view.place(x, y)
+      if (!(across >= left && across <= left + width && down >= top && down <= top + height)) return
+      const wide = text_width(text, LABEL_FONT), bottom = down - LABEL_OFFSET + 2
+      const boxes = [label_box(across, bottom, wide, "left"), label_box(across, bottom, wide, "right")]
+      found.push({text, id: `${text} of ${hull}`, boxes: across > middle ? boxes.reverse() : boxes, colour, rank})
+    }
+    for (const fence of fences.values())
+      for (const {key, hull, place} of fence.marks(hulls)) add(key, hull, place, fence.look.colour.toLowerCase(), 0)
+    for (const {name, look, vertices, points} of hulls.values())
+      for (const [{keys, x, y}, rank] of this.all ? [[vertices, 1], [points, 2]] : [[vertices, 1]])
+        keys?.forEach((key, row) => add(key, name, [x[row], y[row]], look.colour.toLowerCase(), rank))
+    return found
+  }
+}
+// The rings around the key that the viewer looks for, and its name: where they are, before other text takes the room.
+function place_found(picture) {
+  const {view, sought, taken} = picture
+  return picture.found().flatMap(({place, colour}) => {
+    const [across, down] = view.place(...place)
+    if (isNaN(across)) return []
+    const side = across > view.rect.left + view.rect.width / 2 ? "right" : "left"
+    const box = label_box(across, down - RING_RADIUS - 3, text_width(sought, FOUND_LABEL_FONT), side)
+    taken.add(box)
+    taken.add(square_box(across, down, RING_RADIUS))
+    return [{across, down, colour, box}]
+  })
+}
+function draw_found(canvas, {rings, sought, colours}) {
+  canvas.font = FOUND_LABEL_FONT
+  for (const {across, down, colour, box: {left, top, right, bottom}} of rings) {
+    for (const [style, width] of [[colours.paper, 7], [colour, 3]]) {
+      canvas.beginPath()
+      canvas.arc(across, down, RING_RADIUS, 0, 2 * Math.PI)
+      canvas.strokeStyle = style
+      canvas.lineWidth = width
+      canvas.stroke()
+    }
+    canvas.fillStyle = colours.paper
+    canvas.lineWidth = 1
+    canvas.fillRect(left, top, right - left, LABEL_HEIGHT)
+    canvas.strokeRect(left, top, right - left, LABEL_HEIGHT)
+    canvas.fillStyle = colours.ink
+    canvas.fillText(sought, left + LABEL_GAP, bottom - 4)
+  }
+}

@@ -1,0 +1,177 @@
+// The page: what the server says about it, and what the viewer asks for.
+const find = selector => document.querySelector(selector)
+const write = (selector, text) => { if (find(selector).textContent != text) find(selector).textContent = text }
+const MOST_OFFERED = 20, RETRY_MILLISECONDS = 1000
+const SILENCE = "The dashboard does not answer. Check that dynhull dashboard still runs. The page shows what it last "
+  + "received, and reconnects by itself."
+const settings = find(".page").dataset
+const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], places: []}
+const picture = new Picture(find(".map"), {x_unit: settings.xUnit, y_unit: settings.yUnit})
+const events = new Events(key => seek(key))
+const recorder = new Recorder(show_drawing, () => {
+  picture.live = recorder.live
+  time_bar?.update()
+  picture.draw_soon()
+})
+let time_bar = null, socket
+time_bar = new TimeBar(recorder, find(".time"))
+const time_lines = new TimeLines([...document.querySelectorAll("canvas.line")], settings.neutral,
+  settings.percentileDash.split(" ").map(Number))
+picture.now = () => recorder.moment
+
+function connect() {
+  const address = new URL(`live${location.search}`, location.href)
+  address.protocol = address.protocol.replace("http", "ws")
+  socket = new WebSocket(address)
+  socket.onopen = () => time_lines.clear()
+  socket.onmessage = ({data}) => take(JSON.parse(data), data)
+  socket.onclose = () => {
+    write(".banner", SILENCE)
+    setTimeout(connect, RETRY_MILLISECONDS)
+  }
+}
+function ask(change) {
+  if (socket.readyState == WebSocket.OPEN) socket.send(JSON.stringify(change))
+}
+function take(message, text) {
+  if (message.kind == "page") return update(message)
+  if (message.kind == "lines") return time_lines.take(message)
+  if (message.kind == "vertices" || message.kind == "points") picture.trails.take(message, Date.now())
+  recorder.take(message, text)
+}
+// Now, or once more at a later time.
+function show_drawing(message) {
+  if (message.kind == "events") events.take(message)
+  else picture.take(message)
+}
+// What has changed of what the server says about the page.
+function update({kind: _, ...changes}) {
+  if (changes.version && changes.version != settings.version) return location.reload()
+  Object.assign(state, changes)
+  if (changes.hulls || changes.fences) {
+    const hulls = state.hulls.map(({name}) => name), fences = state.fences.map(({name}) => name)
+    picture.keep(state.hulls, state.fences)
+    recorder.keep([...hulls, ...fences])
+    events.keep(fences)
+    time_lines.keep(state.hulls)
+    find(".page").classList.toggle("fenced", fences.length > 0)
+    for (const picker of pickers) picker.show()
+  }
+  for (const picker of pickers) if (changes[picker.offered]) picker.offer()
+  write(".banner", state.banner)
+  for (const [name, selector] of [["note", ".note"], ["description", "#description"], ["fence_hint", ".hint"]])
+    if (changes[name] != undefined) write(selector, changes[name])
+  for (const [name, selector] of [["table", ".of_hulls"], ["fence_table", ".of_fences"]])
+    if (changes[name] != undefined) find(selector).innerHTML = changes[name]  // the server has escaped the names
+  if (changes.found) show_found()
+  if (changes.places || changes.sought != undefined) {
+    picture.places = state.places
+    picture.sought = state.sought
+    picture.draw_soon()
+  }
+}
+function chip({name, key}, remove) {
+  const item = document.createElement("li"), line = document.createElement("span")
+  const button = document.createElement("button")
+  line.innerHTML = key
+  button.type = "button"
+  button.textContent = "✕"
+  button.ariaLabel = `Remove ${name}`
+  button.onclick = () => remove(name)
+  item.append(line, name, button)
+  return item
+}
+// The chips and the field of a picker. `picked` is what it shows and changes, of the state of the page.
+class Picker {
+  constructor({form, noun, most, offered, picked}) {
+    Object.assign(this, {form: find(form), noun, most, offered, picked})
+    this.field = find(`${form} [list]`)
+    this.field.addEventListener("change", () => state[offered].includes(this.field.value) && this.add())
+    this.form.addEventListener("submit", event => { event.preventDefault(); this.add() })
+    this.show()
+  }
+  get names() {
+    return state[this.picked].map(({name}) => name)
+  }
+  add() {
+    if (this.field.value && !this.names.includes(this.field.value)) this.pick([...this.names, this.field.value])
+    this.field.value = ""
+  }
+  // The address follows, so that the page shows the same when it is loaded or connects again.
+  pick(names) {
+    ask({[this.picked]: names})
+    const query = new URLSearchParams(location.search)
+    query.delete(this.noun)
+    for (const name of names.length ? names : [""]) query.append(this.noun, name)
+    history.replaceState(null, "", `?${query}`)
+  }
+  show() {
+    const full = this.names.length >= this.most
+    const remove = removed => this.pick(this.names.filter(name => name != removed))
+    this.form.querySelector("ul").replaceChildren(...state[this.picked].map(each => chip(each, remove)))
+    this.field.disabled = full
+    this.field.placeholder = full ? `Remove a ${this.noun} to pick another` : `Pick ${this.noun}s`
+  }
+  offer() {
+    this.field.list.replaceChildren(...state[this.offered].map(name => new Option(name, name)))
+  }
+}
+const pickers = [
+  new Picker({form: ".hulls", noun: "hull", most: settings.mostHulls, offered: "offered", picked: "hulls"}),
+  new Picker({form: ".fences", noun: "fence", most: settings.mostFences, offered: "offered_fences", picked: "fences"}),
+]
+const finder = find(".finder input")
+function seek(key) {
+  finder.value = key
+  ask({sought: key})
+  const query = new URLSearchParams(location.search)
+  query.delete("key")
+  if (key) query.set("key", key)
+  history.replaceState(null, "", `?${query}`)
+}
+function offer_keys() {
+  const drawn = [...picture.hulls.values()].flatMap(({vertices, points}) => [...vertices.keys ?? [], ...points.keys ?? []])
+  const inside = [...picture.fences.values()].flatMap(fence => fence.inside.key)
+  const names = [...drawn, ...inside].filter(key => key.startsWith(finder.value))
+  const offered = [...new Set(names)].sort().slice(0, MOST_OFFERED)
+  find("#keys").replaceChildren(...offered.map(key => new Option(key, key)))
+}
+function show_found() {
+  const lines = state.found.map(([sentence, place]) => {
+    const line = document.createElement("li"), numbers = document.createElement("span")
+    numbers.textContent = place
+    line.append(sentence, place && ": ", numbers)
+    return line
+  })
+  find(".finder ul").replaceChildren(...lines)
+  write("#found", state.found.map(([sentence]) => sentence).join(". "))
+}
+finder.value = new URLSearchParams(location.search).get("key") ?? ""
+finder.addEventListener("focus", offer_keys)
+finder.addEventListener("input", () => finder.value ? offer_keys() : seek(""))
+finder.addEventListener("change", () => seek(finder.value))
+find(".finder").addEventListener("submit", event => { event.preventDefault(); seek(finder.value) })
+find(".verify button").onclick = () => ask({verify: ""})
+const hands = new Hands(picture, find(".tip"), () => recorder.toggle())
+const tick = (name, checked, change) => {
+  const box = find(`[name=${name}]`)
+  box.checked = checked
+  box.onchange = () => {
+    change(box.checked)
+    picture.draw_all()
+  }
+}
+tick("all_names", false, checked => picture.labels.all = checked)
+tick("trails", false, checked => picture.trails.shown = checked)
+tick("same_scale", picture.plane.same_scale, checked => {
+  picture.plane.same_scale = checked
+  picture.follow()
+})
+for (const [name, does] of [["in", () => hands.zoom(ZOOM_STEP)], ["out", () => hands.zoom(1 / ZOOM_STEP)], ["all", () => picture.follow()]]) {
+  const button = find(`.map [name=${name}]`)
+  button.onclick = does
+  button.onpointerdown = button.ondblclick = event => event.stopPropagation()
+}
+find(".map .buttons").onkeydown = event => event.stopPropagation()
+find(".time").onsubmit = event => event.preventDefault()
+connect()

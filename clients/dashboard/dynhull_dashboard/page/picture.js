@@ -1,0 +1,260 @@
+// The picture: two canvases, one for the ground (coasts or axes), one for what moves, and the order in which things are
+// drawn. A new layer is a function of the canvas and the picture, in its place in LAYERS.
+const LAYERS = [draw_fences, draw_surfaces, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
+  draw_found]
+const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
+const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
+function draw_trails(canvas, picture) {
+  picture.trails.draw(canvas, picture)
+}
+function draw_names(canvas, picture) {
+  picture.labels.draw(canvas, picture)
+}
+class Picture {
+  // `settings` are those of the page: units, and whether x and y have one scale.
+  constructor(element, {x_unit, y_unit}) {
+    this.element = element
+    this.units = {x: x_unit, y: y_unit}
+    this.canvases = [...element.querySelectorAll("canvas")]
+    this.plane = new PlaneView(x_unit == y_unit)
+    this.on_globe = new GlobeView()
+    this.view = this.plane
+    this.hulls = new Map()
+    this.fences = new Map()
+    this.labels = new Labels()
+    this.trails = new Trails()
+    this.coasts = new Coasts(() => this.draw_all())
+    this.following = true  // until the viewer moves the picture
+    this.moving = false
+    this.live = true  // or as it was before
+    this.sought = ""
+    this.places = []
+    this.now = Date.now
+    this.frames = 0
+    new ResizeObserver(() => this.resize()).observe(element)
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw_all())
+    this.resize()
+  }
+  resize() {
+    const {clientWidth: width, clientHeight: height} = this.element
+    this.width = width
+    this.height = height
+    this.ratio = Math.min(MOST_RATIO, devicePixelRatio)
+    for (const canvas of this.canvases) {
+      canvas.width = width * this.ratio
+      canvas.height = height * this.ratio
+    }
+    const size = (left, bottom, edge) => ({left, top: edge, width: Math.max(1, width - left - edge), height: Math.max(1, height - edge - bottom)})
+    this.plane.resize(size(AXIS_LEFT, AXIS_BOTTOM, EDGE))
+    this.on_globe.resize(size(0, 0, 0))
+    this.ground_drawn = false
+    this.draw()  // at once: an empty canvas would be seen
+  }
+  // What is on the page: names and looks.
+  keep(hulls, fences) {
+    for (const [known, looks, Kind] of [[this.hulls, hulls, Hull], [this.fences, fences, Fence]]) {
+      const names = looks.map(({name}) => name)
+      for (const name of known.keys()) if (!names.includes(name)) known.delete(name)
+      for (const look of looks) {
+        if (known.has(look.name)) known.get(look.name).look = look
+        else known.set(look.name, new Kind(look.name, look))
+      }
+    }
+    this.trails.keep([...this.hulls.keys()])
+    this.plane.refit()
+    this.on_globe.refit()
+    this.draw_soon()
+  }
+  // A drawing of a hull or of a fence.
+  take(message) {
+    const drawn = message.hull != undefined && !message.fence ? this.hulls.get(message.hull) : this.fences.get(message.fence)
+    drawn?.take(message)
+    this.draw_soon()
+  }
+  // Where the key is that the viewer looks for: as the server says, or as it was drawn at an earlier moment.
+  found() {
+    if (this.live) return this.places.map(([x, y, colour]) => ({place: [x, y], colour}))
+    const drawn = [...this.hulls.values()].map(hull => ({place: hull.place_of(this.sought), colour: hull.look.colour}))
+    return drawn.filter(({place}) => place)
+  }
+  draw_all() {
+    this.ground_drawn = false
+    this.draw_soon()
+  }
+  draw_soon() {
+    this.awaited ??= requestAnimationFrame(() => {
+      this.awaited = undefined
+      this.draw()
+    })
+  }
+  // Show all again, whatever comes.
+  follow() {
+    this.following = true
+    this.plane.refit()
+    this.on_globe.refit()
+    this.draw_soon()
+  }
+  move(change) {
+    this.following = false
+    this.moving = true
+    clearTimeout(this.resting)
+    this.resting = setTimeout(() => {
+      this.moving = false
+      this.draw_all()
+    }, REST_MILLISECONDS)
+    change(this.view)
+    this.draw_all()
+  }
+  choose_view() {
+    const hulls = [...this.hulls.values()].filter(hull => hull.vertices.x.length)
+    const areas = [...this.fences.values()].filter(fence => fence.area.polygons.length)
+    const globe = [...hulls.map(hull => hull.globe), ...areas.map(fence => fence.area.globe)]
+    const view = globe.length && globe.every(each => each) ? this.on_globe : this.plane
+    if (view != this.view) {
+      this.view = view
+      this.following = true
+      view.refit()
+      this.ground_drawn = false
+      this.element.closest(".page").classList.toggle("globe", view.globe)
+    }
+    if (!this.following) return
+    const points = hulls.flatMap(hull => view.globe ? hull.corners : hull.polygons(view).flat(2))
+    for (const fence of this.fences.values())
+      points.push(...(fence.area.globe || !view.globe ? fence.area.polygons.flat(2) : []), ...fence.margins(view, this.hulls).flat(2))
+    const before = this.where()
+    view.fit(points)
+    if (this.where() != before) this.ground_drawn = false
+  }
+  where() {
+    return String([this.view.middle, this.view.unit ?? this.view.scale])
+  }
+  draw() {
+    if (!this.width || !this.height) return
+    this.choose_view()
+    const [ground, things] = this.canvases.map(canvas => canvas.getContext("2d"))
+    if (!this.ground_drawn) {
+      this.read_colours()
+      this.clear(ground)
+      if (this.view.globe) this.draw_globe(ground)
+      else this.draw_axes(ground)
+      this.ground_drawn = true
+    }
+    this.clear(things)
+    this.taken = new Boxes()
+    this.rings = this.sought ? place_found(this) : []
+    for (const fence of this.fences.values())
+      for (const {place} of fence.marks(this.hulls)) {
+        const [across, down] = this.view.place(...place)
+        if (!isNaN(across)) this.taken.add(square_box(across, down, MARK_RADIUS))
+      }
+    const {left, top, width, height} = this.view.rect
+    things.save()
+    things.beginPath()
+    things.rect(left, top, width, height)
+    things.clip()
+    for (const layer of LAYERS) layer(things, this)
+    things.restore()
+    this.frames++
+  }
+  clear(canvas) {
+    canvas.setTransform(this.ratio, 0, 0, this.ratio, 0, 0)
+    canvas.clearRect(0, 0, this.width, this.height)
+    canvas.lineJoin = "round"
+  }
+  read_colours() {
+    const style = getComputedStyle(this.element)
+    const colour = name => style.getPropertyValue(`--${name}`).trim()
+    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea"].map(name => [name, colour(name)]))
+  }
+  draw_globe(canvas) {
+    const {view, colours, width, height} = this
+    const path = d3.geoPath(view.projection, canvas)
+    const fill = (shape, style) => {
+      canvas.beginPath()
+      path(shape)
+      canvas.fillStyle = style
+      canvas.fill()
+    }
+    fill({type: "Sphere"}, colours.sea)
+    const degrees = TICK_PIXELS / view.scale / RADIAN, step = GRID_STEPS.findLast(each => each > degrees) ?? GRID_STEPS[0]
+    if (degrees > GRID_STEPS.at(-1) / 2) {
+      const reach = Math.min(90, Math.hypot(width, height) / 2 / view.scale / RADIAN + step)
+      const [lon, lat] = view.middle, wide = Math.abs(lat) + reach >= 85 ? 180 : Math.min(180, reach / Math.cos((Math.abs(lat) + reach) * RADIAN) + step)
+      const round = (value, up) => (up ? Math.ceil : Math.floor)(value / step) * step
+      const extent = [[round(lon - wide), Math.max(-90, round(lat - reach))], [round(lon + wide, true), Math.min(90, round(lat + reach, true))]]
+      canvas.beginPath()
+      path(d3.geoGraticule().step([step, step]).extent(extent).precision(Math.max(0.1, step / 8))())
+      canvas.strokeStyle = colours.grid
+      canvas.lineWidth = 1
+      canvas.stroke()
+    }
+    this.coasts.draw(canvas, view, colours, this.moving)
+    this.draw_scale(canvas)
+  }
+  draw_scale(canvas) {
+    const metre = this.view.scale / EARTH_RADIUS, length = nice_below(SCALE_BAR_PIXELS / metre)
+    const text = length < 1000 ? `${+length.toPrecision(1)} m` : `${length / 1000} km`
+    const left = 12, bottom = this.height - 12
+    canvas.strokeStyle = canvas.fillStyle = this.colours.faint
+    canvas.lineWidth = 2
+    canvas.beginPath()
+    canvas.moveTo(left, bottom - 5)
+    canvas.lineTo(left, bottom)
+    canvas.lineTo(left + length * metre, bottom)
+    canvas.lineTo(left + length * metre, bottom - 5)
+    canvas.stroke()
+    canvas.font = FONT_OF_AXES
+    canvas.fillText(text, left + 6, bottom - 6)
+  }
+  draw_axes(canvas) {
+    const {view, colours, width, height} = this, {left, top, width: wide, height: high} = view.rect
+    const [x, y] = view.invert(left, top + high), [right, up] = view.invert(left + wide, top)
+    canvas.font = FONT_OF_AXES
+    canvas.fillStyle = colours.faint
+    canvas.strokeStyle = colours.grid
+    canvas.lineWidth = 1
+    canvas.beginPath()
+    canvas.textAlign = "center"
+    for (const tick of ticks(x, right, wide / TICK_PIXELS)) {
+      const [across] = view.place(tick, y)
+      canvas.moveTo(across, top)
+      canvas.lineTo(across, top + high)
+      canvas.fillText(compact(tick), across, top + high + 15)
+    }
+    canvas.textAlign = "right"
+    for (const tick of ticks(y, up, high / TICK_PIXELS * 1.5)) {
+      const [, down] = view.place(x, tick)
+      canvas.moveTo(left, down)
+      canvas.lineTo(left + wide, down)
+      canvas.fillText(compact(tick), left - 5, down + 4)
+    }
+    canvas.stroke()
+    const degrees = [...this.hulls.values()].some(hull => hull.globe)
+    const name = (axis, unit) => degrees ? "" : unit ? `${axis} (${unit})` : axis
+    canvas.textAlign = "center"
+    canvas.fillText(name("x", this.units.x), left + wide / 2, height - 6)
+    canvas.save()
+    canvas.translate(12, top + high / 2)
+    canvas.rotate(-Math.PI / 2)
+    canvas.fillText(name("y", this.units.y), 0, 0)
+    canvas.restore()
+    canvas.textAlign = "left"
+  }
+}
+// One, two or five times a power of ten.
+function nice_below(length) {
+  const power = 10 ** Math.floor(Math.log10(length))
+  return [5, 2, 1].find(each => each * power <= length) * power
+}
+function ticks(low, high, count) {
+  const step = nice_below(2 * (high - low) / Math.max(2, count))
+  const first = Math.ceil(low / step), last = Math.floor(high / step)
+  if (!(step > 0) || !isFinite(first) || last - first > 100) return []
+  return Array.from({length: last - first + 1}, (_, row) => (first + row) * step)
+}
+// 1.2K and 3.4M; very small and very large numbers with an exponent.
+const short_number = new Intl.NumberFormat("en", {notation: "compact", maximumSignificantDigits: 4})
+function compact(value) {
+  const size = Math.abs(value)
+  return size > 0 && (size < 1e-3 || size >= 1e15) ? value.toExponential(1) : short_number.format(value)
+}

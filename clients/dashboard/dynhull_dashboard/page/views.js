@@ -1,0 +1,175 @@
+// Where things are in the picture: in a plane, and on the globe. Both have the same methods.
+const FRAME_MARGIN = 0.08, LEAST_FILLED = 0.5, NO_FRAME = [0, 0, 1, 1]
+const EARTH_RADIUS = 6371008.8, ALONE_METRES = 100_000, LARGEST_SCALE = 1e10, RADIAN = Math.PI / 180
+// The smallest box around some points.
+function box_around(points) {
+  const box = [Infinity, Infinity, -Infinity, -Infinity]
+  for (const [x, y] of points) {
+    box[0] = Math.min(box[0], x)
+    box[1] = Math.min(box[1], y)
+    box[2] = Math.max(box[2], x)
+    box[3] = Math.max(box[3], y)
+  }
+  return box
+}
+// The region that a picture shows: the old frame while the box fits and fills it, else a new one, so that the picture
+// stands still while the hulls in it move. With one scale for both axes the box fills the frame along either of them,
+// otherwise along both.
+function frame_around(box, frame, same_scale = true) {
+  let size = [box[2] - box[0], box[3] - box[1]]
+  if (frame) {
+    const fits = box[0] >= frame[0] && box[1] >= frame[1] && box[2] <= frame[2] && box[3] <= frame[3]
+    const filled = size.map((each, axis) => each >= LEAST_FILLED * (frame[axis + 2] - frame[axis]))
+    if (fits && (same_scale ? filled.some(each => each) : filled.every(each => each))) return frame
+  }
+  if (same_scale || !(size[0] || size[1])) size = [Math.max(...size), Math.max(...size)]
+  // Points in a row, or a single point, have no size along an axis: their distance from zero serves instead.
+  const room = size.map((each, axis) => FRAME_MARGIN * (each || Math.max(Math.abs(box[axis]), Math.abs(box[axis + 2])) || 1))
+  return [box[0] - room[0], box[1] - room[1], box[2] + room[0], box[3] + room[1]]
+}
+class PlaneView {
+  globe = false
+  constructor(same_scale) {
+    this.same_scale = same_scale
+    this.rect = {left: 0, top: 0, width: 1, height: 1}
+    this.show(NO_FRAME)
+  }
+  resize(rect) {
+    this.rect = rect
+    if (this.frame) this.show(this.frame)
+  }
+  show(frame) {
+    const [wide, high] = [frame[2] - frame[0], frame[3] - frame[1]]
+    this.unit = [this.rect.width / wide, this.rect.height / high]
+    if (this.same_scale) this.unit.fill(Math.min(...this.unit))
+    this.middle = [frame[0] + wide / 2, frame[1] + high / 2]
+  }
+  fit(points) {
+    if (!points.length) return
+    const frame = frame_around(box_around(points), this.frame, this.same_scale)
+    if (frame != this.frame) this.show(this.frame = frame)
+  }
+  refit() {
+    this.frame = undefined
+  }
+  place(x, y) {
+    const {left, top, width, height} = this.rect
+    return [left + width / 2 + (x - this.middle[0]) * this.unit[0], top + height / 2 - (y - this.middle[1]) * this.unit[1]]
+  }
+  invert(across, down) {
+    const {left, top, width, height} = this.rect
+    return [this.middle[0] + (across - left - width / 2) / this.unit[0], this.middle[1] - (down - top - height / 2) / this.unit[1]]
+  }
+  pan(across, down) {
+    this.frame = undefined
+    this.middle = [this.middle[0] - across / this.unit[0], this.middle[1] + down / this.unit[1]]
+  }
+  zoom(factor, across, down) {
+    const [x, y] = this.invert(across, down)
+    this.unit = this.unit.map(each => each * factor)
+    const [now_across, now_down] = this.place(x, y)
+    this.pan(across - now_across, down - now_down)
+  }
+  // Adds a polygon, exterior first, to the path of a canvas.
+  polygon(canvas, rings) {
+    for (const ring of rings) {
+      ring.forEach(([x, y], row) => row ? canvas.lineTo(...this.place(x, y)) : canvas.moveTo(...this.place(x, y)))
+      canvas.closePath()
+    }
+  }
+}
+// The globe as seen from far away (orthographic), from above the middle of the picture: there the scale is right in all
+// directions, and poles and 180 degrees are places like others. d3-geo follows great circles to within half a pixel.
+class GlobeView {
+  globe = true
+  constructor() {
+    this.projection = d3.geoOrthographic().precision(0.5)
+    this.rect = {left: 0, top: 0, width: 1, height: 1}
+    this.turn([0, 0])
+    this.scale = 1
+  }
+  resize(rect) {
+    this.rect = rect
+    this.projection.translate(this.center())
+      .clipExtent([[rect.left - 20, rect.top - 20], [rect.left + rect.width + 20, rect.top + rect.height + 20]])
+    this.fitted = false
+  }
+  center() {
+    return [this.rect.left + this.rect.width / 2, this.rect.top + this.rect.height / 2]
+  }
+  turn([lon, lat]) {
+    this.middle = [lon - 360 * Math.round(lon / 360), Math.max(-90, Math.min(90, lat))]
+    this.projection.rotate([-this.middle[0], -this.middle[1]])
+    this.sin = Math.sin(this.middle[1] * RADIAN)
+    this.cos = Math.cos(this.middle[1] * RADIAN)
+  }
+  get scale() {
+    return this.projection.scale()
+  }
+  set scale(scale) {
+    this.projection.scale(Math.max(Math.min(this.rect.width, this.rect.height) / 8, Math.min(LARGEST_SCALE, scale)))
+  }
+  // NaN for what is on the other side.
+  place(lon, lat) {
+    const east = (lon - this.middle[0]) * RADIAN, north = lat * RADIAN
+    const sin = Math.sin(north), cos = Math.cos(north), front = cos * Math.cos(east)
+    if (this.sin * sin + this.cos * front < 0) return [NaN, NaN]
+    const [across, down] = this.center(), scale = this.scale
+    return [across + scale * cos * Math.sin(east), down - scale * (this.cos * sin - this.sin * front)]
+  }
+  invert(across, down) {
+    return this.projection.invert([across, down])
+  }
+  fit(places) {
+    if (!places.length || this.fitted && this.filled(places)) return
+    this.turn(d3.geoCentroid({type: "MultiPoint", coordinates: places}).map(each => each || 0))
+    this.projection.scale(1)
+    let reach
+    for (let step = 0; step < 4; step++) {
+      const seen = places.map(([lon, lat]) => this.place(lon, lat)).filter(([across]) => !isNaN(across))
+      const box = box_around(seen), [across, down] = this.center()
+      reach = [Math.max(across - box[0], box[2] - across), Math.max(down - box[1], box[3] - down)]
+      const middle = this.projection.invert([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2])
+      if (step < 3 && middle.every(isFinite)) this.turn(middle)
+    }
+    const room = 1 + 2 * FRAME_MARGIN
+    const scales = [this.rect.width, this.rect.height].map((each, axis) => each / 2 / (room * reach[axis]))
+    const alone = this.rect.width * EARTH_RADIUS / ALONE_METRES
+    this.scale = Math.max(...reach) > 1e-9 ? Math.min(...scales) : alone
+    this.fitted = true
+  }
+  filled(places) {
+    const {left, top, width, height} = this.rect
+    const box = box_around(places.map(([lon, lat]) => this.place(lon, lat)))  // NaN of what is hidden
+    const fits = box[0] >= left && box[1] >= top && box[2] <= left + width && box[3] <= top + height
+    return fits && (box[2] - box[0] >= LEAST_FILLED * width || box[3] - box[1] >= LEAST_FILLED * height
+      || Math.max(box[2] - box[0], box[3] - box[1]) == 0)
+  }
+  refit() {
+    this.fitted = false
+  }
+  pan(across, down) {
+    const [lon, lat] = this.middle, turn = 1 / this.scale / RADIAN
+    const widest = Math.max(this.cos, 0.05)
+    this.turn([lon - Math.max(-90, Math.min(90, across * turn / widest)), lat + Math.max(-90, Math.min(90, down * turn))])
+  }
+  zoom(factor, across, down) {
+    const under = this.invert(across, down)
+    this.scale *= factor
+    if (!under.every(isFinite)) return
+    const [now_across, now_down] = this.place(...under)
+    if (!isNaN(now_across)) this.pan(across - now_across, down - now_down)
+  }
+  polygon(canvas, rings) {
+    const coordinates = rings.map(ring => [...ring, ring[0]])
+    const line = rings[0].length < 3
+    d3.geoPath(this.projection, canvas)(line ? {type: "LineString", coordinates: coordinates[0]} : {type: "Polygon", coordinates})
+  }
+}
+// Rings as d3-geo wants them: the exterior, which is smaller than half the globe, clockwise, and the holes the other way.
+function wound(rings) {
+  return rings.map((ring, row) => {
+    const large = d3.geoArea({type: "Polygon", coordinates: [[...ring, ring[0]]]}) > 2 * Math.PI
+    return large == (row == 0) ? [...ring].reverse() : ring
+  })
+}

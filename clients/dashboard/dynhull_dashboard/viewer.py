@@ -1,0 +1,213 @@
+"""The page of one viewer: what is on it, and what it has not been sent yet."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .advice import about_fences, about_metrics, about_picture, about_server
+from .cards import key, table
+from .describe import describe, describe_key
+from .feed import HullFeed
+from .fence_picks import FencePicks
+from .hub import Hub
+from .looks import LOOKS, Look
+
+# Text changes slower than the picture: nobody reads ten times a second.
+TICKS_OF_TEXT = 5
+WHOLE_SERVER = ""  # instead of the name of a hull
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A hull on the page."""
+
+    feed: HullFeed
+    look: Look
+
+
+class Viewer:
+    """One page.
+
+    Args:
+        hub: the source of the hulls.
+        hulls: the hulls to begin with; None for those of the fences, or the largest one.
+        fences: the fences to begin with; None for the first ones of these hulls.
+        sought: the key to look for to begin with; empty for none.
+        version: names the version of the page's scripts, which a page of another version loads.
+    """
+
+    def __init__(
+        self, hub: Hub, hulls: list[str] | None, fences: list[str] | None, sought: str = "", version: str = ""
+    ) -> None:
+        self._hub = hub
+        self._shown: dict[str, Shown] = {}
+        self._version = version
+        self._sought = sought
+        self._ticks = 0
+        self._properties: dict[str, Any] = {}
+        self._drawn: dict[tuple[str, str], str] = {}
+        self._rows: dict[str, tuple[object, int]] = {}  # of each history, how many rows have been sent
+        self._untouched = hulls is None and not fences
+        self._fences = FencePicks(hub, fences)
+        self._show(hub.server.largest() if self._untouched else hulls or ())
+        self._takes: Mapping[str, Callable[[Any], None]] = {
+            "hulls": self._pick_hulls,
+            "fences": self._pick_fences,
+            "sought": self._seek,
+            "verify": self._verify,
+        }
+
+    def close(self) -> None:
+        """Let go of all feeds."""
+        self._show(())
+        self._fences.close()
+
+    def take(self, message: str) -> None:
+        """Do what the page asks for: a JSON object with one or more of hulls, fences, sought and verify.
+
+        Raises:
+            ValueError: if it is none; then nothing is changed.
+        """
+        asked = json.loads(message)
+        if not isinstance(asked, dict) or not asked.keys() <= self._takes.keys():
+            raise ValueError(f"the page sent {message[:100]!r}: expected an object with {', '.join(self._takes)}")
+        for name, value in asked.items():
+            if not (_is_text(value) if name in ("sought", "verify") else _are_names(value)):
+                raise ValueError(f"the page sent {name} {str(value)[:100]!r}: expected text, or a list of names")
+        for name, value in asked.items():
+            self._takes[name](value)
+        self._ticks = 0  # the answer at once
+
+    def messages(self) -> list[str]:
+        """What is new since the last call, as JSON. Called ten times a second."""
+        found: list[str] = []
+        if self._ticks % TICKS_OF_TEXT == 0:
+            self._choose()
+            found += self._page({"version": self._version, **self._looks(), **self._text()})
+            found += self._lines()
+        self._ticks += 1
+        found += self._page(self._found())
+        for name, message in self._drawings():
+            # All viewers are sent the same text, which a feed makes once.
+            if self._drawn.get(name) is not message:
+                self._drawn[name] = message
+                found.append(message)
+        return found
+
+    def _page(self, properties: Mapping[str, Any]) -> Iterator[str]:
+        """The properties of the page that have changed."""
+        new = {name: value for name, value in properties.items() if self._properties.get(name) != value}
+        self._properties |= new
+        if new:
+            yield json.dumps({"kind": "page", **new})
+
+    def _drawings(self) -> Iterator[tuple[tuple[str, str], str]]:
+        # Hulls first: fences may have their outlines.
+        for name, shown in self._shown.items():
+            for drawing in shown.feed.drawings():
+                yield (drawing.kind, name), drawing.message
+        for feed in self._fences.feeds:
+            for kind, message in feed.messages().items():
+                yield (kind, feed.name), message
+
+    def _lines(self) -> Iterator[str]:
+        """The new rows of the time lines."""
+        histories = {name: shown.feed.history for name, shown in self._shown.items()}
+        if self._hub.metrics is not None:
+            histories[WHOLE_SERVER] = self._hub.metrics.history
+        for name, history in histories.items():
+            known, seen = self._rows.get(name, (history, 0))
+            new = history.since(seen if known is history else 0)
+            self._rows[name] = history, history.length
+            if new["time"]:
+                yield json.dumps({"kind": "lines", "hull": name, **new})
+
+    def _pick_hulls(self, names: list[str]) -> None:
+        self._untouched = False
+        self._show(names)
+
+    def _pick_fences(self, names: list[str]) -> None:
+        self._fences.untouched = False
+        self._fences.show(names)
+        self._forget(self._shown.keys() | set(self._fences.names))
+
+    def _seek(self, key: str) -> None:
+        self._sought = key
+
+    def _verify(self, _: str) -> None:
+        for shown in self._shown.values():
+            shown.feed.verify_now()
+
+    def _show(self, picked: Iterable[str]) -> None:
+        names = list(dict.fromkeys(picked))[: len(LOOKS)]
+        for name in self._shown.keys() - set(names):
+            del self._shown[name]
+            self._hub.hulls.release(name)
+        for name in names:
+            if name not in self._shown:
+                taken = [shown.look for shown in self._shown.values()]
+                look = next(look for look in LOOKS if look not in taken)
+                self._shown[name] = Shown(self._hub.hulls.open(name), look)
+        self._forget(set(names) | set(self._fences.names))
+
+    def _forget(self, names: set[str]) -> None:
+        """What the page no longer shows, it has to be sent again when it shows it again."""
+        self._drawn = {each: message for each, message in self._drawn.items() if each[1] in names}
+        self._rows = {name: row for name, row in self._rows.items() if name in names | {WHOLE_SERVER}}
+
+    def _choose(self) -> None:
+        """Show what belongs to the viewer's choice, and something where there is none."""
+        if self._untouched and not self._shown:
+            self._show(self._hub.server.largest())
+        if self._fences.untouched and not self._fences.names and (fences := self._fences.some(self._shown)):
+            self._fences.show(fences)
+        hulls = self._fences.new_hulls()
+        if hulls and (self._untouched or not self._fences.untouched):
+            self._show([*self._shown, *hulls])
+
+    def _found(self) -> dict[str, Any]:
+        """Where the key is that the viewer looks for: in words, and for the picture."""
+        sought = self._sought
+        sightings = [(shown.feed.search.find(sought), shown) for shown in self._shown.values()] if sought else []
+        words = [describe_key(sought, shown.feed, sighting) for sighting, shown in sightings]
+        places = [[each.x, each.y, shown.look.colour] for each, shown in sightings if each.present]
+        return {"sought": sought, "found": words, "places": places}
+
+    def _looks(self) -> dict[str, Any]:
+        return {
+            "hulls": [_look(name, shown.look) for name, shown in self._shown.items()],
+            "fences": [_look(name, look) for name, look in self._fences.looks.items()],
+        }
+
+    def _text(self) -> dict[str, Any]:
+        """The words and the figures."""
+        server, fences = self._hub.server, self._hub.fence_list
+        feeds = [shown.feed for shown in self._shown.values()]
+        connected = server.error is None
+        rows = ((shown.feed, shown.look) for shown in self._shown.values())
+        return {
+            "offered": sorted(server.hulls),
+            "offered_fences": sorted(fences.fences),
+            "banner": about_server(self._hub.address, server.error)
+            if server.error
+            else about_metrics(self._hub.metrics),
+            "note": about_picture(self._hub.address, server, feeds, self._fences.feeds),
+            "fence_hint": about_fences(self._hub.address, fences, shown=bool(self._fences.names)),
+            "description": describe(feeds, self._fences.feeds),
+            "table": table(rows, connected=connected, area_unit=self._hub.units.area),
+            "fence_table": self._fences.table(self._shown, connected=connected),
+        }
+
+
+def _look(name: str, look: Look) -> dict[str, Any]:
+    return {"name": name, "key": key(look), "colour": look.colour, "dash": look.dash, "marker": look.marker}
+
+
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
+def _is_text(value: object) -> bool:
+    """Whether it is text without halves of surrogate pairs, which JavaScript's text may hold."""
+    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
