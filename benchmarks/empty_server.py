@@ -1,12 +1,16 @@
 """The fastest handlers that grpcio allows: they read, acknowledge and do nothing else. `server.py` measures them.
 
-With a port as the last argument, several of these processes share it.
+gRPC has the options of our server, so that only the handlers differ. With a port as the last argument, several of these
+processes share it.
 """
 
 import asyncio
 import sys
 
 import grpc
+
+from dynhull_server.entrance import grpc_server
+from dynhull_server.settings import Settings
 
 ACKNOWLEDGEMENT = b"\x0a\x02\x08\x01"
 
@@ -21,7 +25,7 @@ async def unary(_request, _context):
 
 
 async def main() -> None:
-    server = grpc.aio.server(options=[("grpc.max_receive_message_length", 64 * 2**20)])
+    server = grpc_server(Settings(), shared_port=True)
     handlers = {
         "Stream": grpc.stream_stream_rpc_method_handler(stream),
         "Locate": grpc.unary_unary_rpc_method_handler(unary),

@@ -138,7 +138,7 @@ class Gateway:
             if method.client_streaming or method.server_streaming:  # the relay writes what the worker answers
                 make = grpc.stream_stream_rpc_method_handler
             handlers[method.name] = make(
-                partial(self._calls.serve, method.name, self._calls.admit, self._work(service, method)),
+                self._calls.handler(method.name, self._calls.admit, self._work(service, method)),
                 request_deserializer=within(self._settings.max_message_bytes),
             )
         return grpc.method_handlers_generic_handler(service.full_name, handlers)

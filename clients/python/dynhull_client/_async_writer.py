@@ -123,7 +123,8 @@ class AsyncWriter:
                 if self._closed:
                     raise RuntimeError(CLOSED)
                 outcome = window.put(part, monotonic(), number)
-            self._turn.notify_all()
+            if window.ready:  # otherwise each put would wake the sender in vain
+                self._turn.notify_all()
         return outcome
 
     def _may_put(self, window: Window[asyncio.Future[Applied]], part: Part) -> bool:

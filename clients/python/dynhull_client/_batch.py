@@ -33,6 +33,7 @@ CONDITIONS = {
 }
 BYTES_PER_POINT = 16
 BYTES_PER_TIME = 8
+DOUBLE = np.dtype("<f8")
 
 
 class Batch:
@@ -113,7 +114,7 @@ class Batch:
         return f"<Batch of {self._rows} rows>"
 
     def _fill(self, message: points_pb2.Points, xy: npt.NDArray[Any]) -> None:
-        message.packed = np.asarray(xy, "<f8").tobytes()
+        message.packed = np.asarray(xy, DOUBLE).tobytes()
         self._rows += len(xy)
 
     def _set_policy(self, missing: Missing) -> None:

@@ -61,10 +61,19 @@ def put_parts(
 
     A new part begins with a row that must not go into the same batch as the rows before it.
     """
-    options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move}
     if keys is None or points is None:
-        batch = Batch(**options, keys=keys, points=points, times=times, expire_times=expire_times)
+        batch = Batch(
+            keys=keys,
+            points=points,
+            times=times,
+            insert=insert,
+            delete=delete,
+            move=move,
+            expire_times=expire_times,
+            missing=missing,
+        )
         return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
+    options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move}
     checked, xy = checked_keys(keys), as_points(points, "points")
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
@@ -102,22 +111,28 @@ def remove_parts(keys: Any, missing: Missing | None) -> list[Part]:
 class Gathering:
     """Parts gathered for one batch.
 
+    Args:
+        part: the first one, which this changes.
+        coalesce: whether only the last row of each key is kept.
+
     Attributes:
         rows: the number of their rows.
     """
 
-    def __init__(self, *, coalesce: bool) -> None:
-        self.rows = 0
+    __slots__ = ("_coalesce", "_expiring", "_kind", "_latest", "_messages", "_timed", "rows")
+
+    def __init__(self, part: Part, *, coalesce: bool) -> None:
+        self.rows = part.rows
         self._coalesce = coalesce
-        self._messages: list[batch_pb2.Batch] = []
-        self._latest: dict[Key, int | None] = {}
-        self._timed: bool | None = None
-        self._expiring: bool | None = None
-        self._kind: type[Key] | None = None
+        self._messages = [part.message]
+        self._latest = part.latest
+        self._timed = part.timed
+        self._expiring = part.expiring
+        self._kind = part.kind
 
     def admits(self, part: Part) -> bool:
         """Whether the part may go into the same batch."""
-        if self._messages and part.kind is not self._kind:  # the server refuses one of them, for the hull has one kind
+        if part.kind is not self._kind:  # the server refuses one of them, for the hull has one kind
             return False
         if _differ(self._timed, part.timed) or _differ(self._expiring, part.expiring):
             return False
@@ -128,7 +143,6 @@ class Gathering:
     def add(self, part: Part) -> None:
         """Add a part."""
         self._messages.append(part.message)
-        self._kind = part.kind
         self._latest.update(part.latest)
         self.rows += part.rows
         self._timed = part.timed if self._timed is None else self._timed

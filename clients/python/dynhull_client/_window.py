@@ -94,7 +94,9 @@ class Window(Generic[Future]):
         self._last = sequence  # the last number given
         self._before = sequence  # that of the batch before the next one
         self._next: Next[Future] | None = None
+        self._awaited: Next[Future] | None = None  # the one whose time the sender waits for
         self._waiting: deque[Batch[Future]] = deque()  # to be sent on this connection
+        self._waiting_bytes = 0
         self._sent: deque[Batch[Future]] = deque()  # on this connection
         self._most_batches = self._most_bytes = 0  # of a message, once the server has announced that it takes several
         self._one_at_a_time = False
@@ -137,10 +139,11 @@ class Window(Generic[Future]):
             self._complete(following)
             following = None
         if following is None:
-            gathering = Gathering(coalesce=self._writing.coalesce == "last")
+            gathering = Gathering(part, coalesce=self._writing.coalesce == "last")
             following = self._next = Next(self._new_outcome(), now + self._writing.linger, gathering)
             self.begun += 1
-        following.gathering.add(part)
+        else:
+            following.gathering.add(part)
         following.number = number
         if self._full(following) and self._room:
             self._complete(following)
@@ -158,15 +161,17 @@ class Window(Generic[Future]):
             name=writing.name, producer=writing.producer, accept_results=True, may_skip=writing.may_skip
         )
 
+    @property
+    def ready(self) -> bool:
+        """Whether there is a message for the sender, or a batch is being gathered that it does not wait for yet."""
+        return self._sendable or self._next is not self._awaited
+
     def take(self, now: float) -> pb.StreamRequest | None:
         """The next message to send on this connection, with all batches that fit; None if there is none yet."""
-        if self._one_at_a_time and self._sent:
-            return None
         following = self._next
         if following is not None and self._room and (following.due <= now or self._full(following)):
             self._complete(following)
-        waiting = self._waiting
-        if not waiting:
+        if not self._sendable:
             return None
         if not self._most_batches or self._one_at_a_time:
             message = self._send()
@@ -174,19 +179,17 @@ class Window(Generic[Future]):
             if message.HasField("after_sequence"):
                 alone.after_sequence = message.after_sequence
             return alone
-        count, size = 1, waiting[0].size
-        while count < len(waiting) and count < self._most_batches and size + waiting[count].size <= self._most_bytes:
-            size += waiting[count].size
-            count += 1
-        # While others are under way, a message waits until it is full or as large as those: then messages grow as long
-        # as batches come faster than they are acknowledged.
-        if count == len(waiting) < len(self._sent) and size < self._most_bytes and count < self._most_batches:
-            return None
-        return pb.StreamRequest(batches=[self._send() for _ in range(count)])
+        waiting, batches = self._waiting, [self._send()]
+        room = self._most_bytes - self._sent[-1].size
+        while waiting and len(batches) < self._most_batches and waiting[0].size <= room:
+            room -= waiting[0].size
+            batches.append(self._send())
+        return pb.StreamRequest(batches=batches)
 
     def due_in(self, now: float) -> float | None:
-        """Seconds until the gathered points are due; None if nothing waits for that."""
-        return max(0.0, self._next.due - now) if self._next is not None and self._room else None
+        """Seconds for the sender to wait until the gathered points are due; None if nothing waits for that."""
+        self._awaited = following = self._next
+        return max(0.0, following.due - now) if following is not None and self._room else None
 
     def acknowledge(self, response: pb.StreamResponse) -> Settled:
         """Settle the first batches sent, which were applied."""
@@ -218,6 +221,7 @@ class Window(Generic[Future]):
         """Handle the end of a connection: what it settles, and the seconds until the next one; None for no next one."""
         alone = len(self._sent) == 1
         self._waiting.extendleft(reversed(self._sent))
+        self._waiting_bytes += sum(batch.size for batch in self._sent)
         self._sent.clear()
         self._most_batches = 0  # the next server may be an older one
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
@@ -243,6 +247,7 @@ class Window(Generic[Future]):
         self._next = None
         self._sent.clear()
         self._waiting.clear()
+        self._waiting_bytes = 0
         return left
 
     def raise_refusal(self) -> None:
@@ -255,6 +260,21 @@ class Window(Generic[Future]):
     def _room(self) -> bool:
         """Whether another batch can wait to be sent."""
         return len(self._sent) + len(self._waiting) < self._writing.in_flight
+
+    @property
+    def _sendable(self) -> bool:
+        """Whether a message can be sent now.
+
+        While others are under way, it waits until it is full or has as many batches as those: then messages grow as
+        long as batches come faster than they are acknowledged.
+        """
+        sent = len(self._sent)
+        if self._one_at_a_time and sent:
+            return False
+        waiting = len(self._waiting)
+        if not waiting or not self._most_batches:
+            return waiting > 0
+        return waiting >= sent or waiting >= self._most_batches or self._waiting_bytes >= self._most_bytes
 
     def _full(self, following: Next[Future]) -> bool:
         return following.gathering.rows >= self._writing.batch_points
@@ -270,10 +290,13 @@ class Window(Generic[Future]):
         if self._writing.may_skip:
             message.after_sequence = self._before
             self._before = self._last
-        self._waiting.append(Batch(following.outcome, message, message.ByteSize() + FRAME_BYTES))
+        size = message.ByteSize() + FRAME_BYTES
+        self._waiting.append(Batch(following.outcome, message, size))
+        self._waiting_bytes += size
 
     def _send(self) -> pb.NumberedBatch:
         batch = self._waiting.popleft()
+        self._waiting_bytes -= batch.size
         self._sent.append(batch)
         batch.sent += 1
         return batch.message
@@ -286,6 +309,7 @@ class Window(Generic[Future]):
         if not self._waiting:  # nothing was sent: it is the call that was refused
             return self._end(error), None
         refused = self._waiting.popleft()
+        self._waiting_bytes -= refused.size
         self.settled += 1
         self._lost_since = None
         for batch in self._waiting:

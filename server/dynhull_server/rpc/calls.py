@@ -166,7 +166,7 @@ class Call:
 
 
 class Calls:
-    """Every call goes through `serve`.
+    """Every call goes through a `handler`.
 
     Args:
         authenticate: returns the caller, or raises UnauthenticatedError.
@@ -249,38 +249,44 @@ class Calls:
         self._short.add(task)
         task.add_done_callback(self._short.discard)
 
-    async def serve(
-        self, method: str, admit: Callable[[Context], Call], work: Work, _: object, context: Context
-    ) -> Any:
-        """Run `work` on an admitted call. Refusals become statuses.
+    def handler(
+        self, method: str, admit: Callable[[Context], Call], work: Work
+    ) -> Callable[[object, Context], Awaitable[Any]]:
+        """What gRPC calls for a method: runs `work` on an admitted call. Refusals become statuses.
 
         No message of the call is in memory before `work` reads it.
         """
-        begun = time.perf_counter()
-        code = "OK"
-        call = None
-        try:
-            call = admit(context)
-            return await work(call)
-        except ANSWERED as error:
-            status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
-            code = status.code.name
-            self.note(status.details, method, code, context)
-            await context.abort(status.code, status.details, status.trailing_metadata)
-        except asyncio.CancelledError:
-            code = "CANCELLED"
-            raise
-        except Exception as error:
-            if caller_has_left(error):
+        open_calls, ended = self._open, self._metrics.calls.ended
+
+        # A plain function, because gRPC asks at each call what a handler is, and of a partial that takes longer.
+        async def handle(_: object, context: Context) -> Any:
+            begun = time.perf_counter()
+            code = "OK"
+            call = None
+            try:
+                call = admit(context)
+                return await work(call)
+            except ANSWERED as error:
+                status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
+                code = status.code.name
+                self.note(status.details, method, code, context)
+                await context.abort(status.code, status.details, status.trailing_metadata)
+            except asyncio.CancelledError:
                 code = "CANCELLED"
-                raise asyncio.CancelledError from None
-            code = "INTERNAL"
-            log.exception("a call failed; this is a bug", extra={"method": method})
-            await context.abort(grpc.StatusCode.INTERNAL, "internal error, see the server's log")
-        finally:
-            if call is not None:
-                self._open.discard(call)
-            self._metrics.calls.ended(method, code, time.perf_counter() - begun)
+                raise
+            except Exception as error:
+                if caller_has_left(error):
+                    code = "CANCELLED"
+                    raise asyncio.CancelledError from None
+                code = "INTERNAL"
+                log.exception("a call failed; this is a bug", extra={"method": method})
+                await context.abort(grpc.StatusCode.INTERNAL, "internal error, see the server's log")
+            finally:
+                if call is not None:
+                    open_calls.discard(call)
+                ended(method, code, time.perf_counter() - begun)
+
+        return handle
 
 
 def refusals_elsewhere(refusals: RefusalLog, calls: CallCounts) -> Callable[[str, str, str], None]:

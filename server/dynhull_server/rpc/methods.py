@@ -1,4 +1,4 @@
-"""The handlers of all methods for gRPC: each runs through `Calls.serve`, and refuses bytes that are no message.
+"""The handlers of all methods for gRPC: each is made by `Calls.handler`, and refuses bytes that are no message.
 
 All of them are stream handlers, even those of single messages: gRPC reads the message of a unary call before it calls
 the handler, so callers without permission could fill the memory.
@@ -6,7 +6,6 @@ the handler, so callers without permission could fill the memory.
 
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import aclosing
-from functools import partial
 from typing import Any
 
 import grpc
@@ -87,9 +86,8 @@ class UnknownMethods(grpc.GenericRpcHandler):
     """Refuses and counts all other methods."""
 
     def __init__(self, calls: Calls) -> None:
-        self._handler: Any = grpc.stream_stream_rpc_method_handler(
-            partial(calls.serve, UNKNOWN_METHOD, calls.admit, _refuse_method)
-        )
+        refuse = calls.handler(UNKNOWN_METHOD, calls.admit, _refuse_method)
+        self._handler: Any = grpc.stream_stream_rpc_method_handler(refuse)
 
     def service(self, _: grpc.HandlerCallDetails) -> Any:
         """The handler, the same for all methods."""
@@ -126,7 +124,7 @@ def _handlers(
         if method.server_streaming:
             make = grpc.stream_stream_rpc_method_handler
         handlers[method.name] = make(
-            partial(calls.serve, prefix + method.name, admit, works[method.name]),
+            calls.handler(prefix + method.name, admit, works[method.name]),
             request_deserializer=_received(GetMessageClass(method.input_type), max_bytes),
         )
     return grpc.method_handlers_generic_handler(service.full_name, handlers)

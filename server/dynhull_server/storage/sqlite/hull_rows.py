@@ -5,12 +5,16 @@ import sqlite3
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
-from ...state.records import HullRow, HullSettings, Window
+from ...state.records import DEFAULT, HullRow, HullSettings, Window
 from .encoding import checksum
 
 Values = tuple[int, str, str, float, str, int]
+
+# Ten thousand hulls have few different settings, and share the objects.
+SETTINGS_KEPT = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +41,15 @@ def values(row: HullRow) -> Values:
 
 def settings_text(settings: HullSettings) -> str:
     """Settings as JSON, without those that have their default value."""
+    if settings == DEFAULT:  # as of most hulls
+        return "{}"
     given = _given(settings)
     if settings.window is not None:
         given["window"] = _given(settings.window)
     return json.dumps(given, sort_keys=True)
 
 
+@lru_cache(SETTINGS_KEPT)
 def settings_from(text: str) -> HullSettings:
     """The inverse of `settings_text`; ValueError or TypeError for other texts."""
     given = json.loads(text)

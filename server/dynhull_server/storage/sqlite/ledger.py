@@ -3,7 +3,7 @@
 from array import array
 from bisect import bisect_right, insort
 from collections.abc import Callable, Iterable, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, Self
 
@@ -76,7 +76,7 @@ class HullRows:
 
     def copy(self) -> Self:
         """A copy of the present state."""
-        return replace(self, firsts=self.firsts[:], ids=self.ids[:], snapshots=self.snapshots[:])
+        return type(self)(self.row, self.sum, self.firsts[:], self.ids[:], self.last, self.snapshots[:])
 
     def between(self, after: int, until: int) -> "array[int]":
         """The rows with the revisions `after` + 1 to `until`."""
