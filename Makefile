@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-reference fuzz-server fuzz-gateway workers properties robustness simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers properties robustness simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -31,13 +31,12 @@ demo: .venv/.demo  ## replay a real day of flights through a real server and ver
 test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
 	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),$(WORKERS) $(COVERAGE))
 
-FUZZ := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined \
-	-DDYNHULL_FAIL_ALLOCATIONS
+FUZZ_THREADS := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -pthread -DDYNHULL_FAIL_ALLOCATIONS
+FUZZ := $(FUZZ_THREADS) -fsanitize=address,undefined -fno-sanitize-recover=undefined
 SECONDS ?= 60
 OPERATIONS ?= 1000000
 
-fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kernel, under sanitizers, SECONDS a leaf size
-	mkdir -p build
+fuzz: fuzz-reference fuzz-threads  ## random lives: OPERATIONS of the reference; of the kernel, under sanitizers, SECONDS a leaf size
 	for leaf in 4 62; do \
 		$(FUZZ) -DDYNHULL_LEAF=$$leaf tests/kernel/fuzz.cpp -o build/fuzz$$leaf \
 		&& build/fuzz$$leaf $$(cat tests/kernel/seeds.txt) && build/fuzz$$leaf --seconds $(SECONDS) || exit 1; \
@@ -47,6 +46,14 @@ fuzz: fuzz-reference  ## random lives: OPERATIONS of the reference; of the kerne
 	$(FUZZ) -DDYNHULL_LEAF=4 tests/kernel/fuzz_window.cpp -o build/fuzz_window && build/fuzz_window --seconds $(SECONDS)
 	$(FUZZ) -DDYNHULL_HASH_SEED=1 -DDYNHULL_LEAF=4 tests/kernel/fuzz_fences.cpp -o build/fuzz_fences \
 	&& build/fuzz_fences --seconds $(SECONDS)
+
+fuzz-threads:  ## the kernel's lives with batches of a few rows on several threads, under each of the sanitizers, SECONDS each
+	mkdir -p build
+	for sanitizers in address,undefined thread; do \
+		$(FUZZ_THREADS) -fsanitize=$$sanitizers -fno-sanitize-recover=undefined -DDYNHULL_LEAF=4 -DDYNHULL_ROWS_A_THREAD=3 \
+			tests/kernel/fuzz.cpp -o build/fuzz_threads \
+		&& build/fuzz_threads $$(cat tests/kernel/seeds.txt) && build/fuzz_threads --seconds $(SECONDS) || exit 1; \
+	done
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it
 	$(BIN)/python tests/support/lives.py --operations $(OPERATIONS)

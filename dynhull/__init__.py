@@ -7,7 +7,7 @@ from ._entities import DuplicateKeyError, MissingKeyError
 from ._fence_index import Crossings, FenceIndex
 from ._geo import GeoHull, GeoKeyedHull, GeoWindowHull
 from ._hull import DynamicHull, MissingPointError
-from ._implementation import KERNEL
+from ._implementation import KERNEL, set_threads
 from ._keyed import KeyedHull, Put
 from ._predicates import orient2d
 from ._window import WindowHull
@@ -30,6 +30,7 @@ __all__ = [
     "__version__",
     "convex_hull",
     "orient2d",
+    "set_threads",
     "static",
 ]
 

@@ -1,9 +1,11 @@
 """Chooses the implementation: the C++ kernel if it is built, otherwise the reference in Python.
 
-The environment variable DYNHULL_KERNEL, read at import, forces one of them: "python" or "cpp".
+Environment variables, read at import: DYNHULL_KERNEL forces one of them, "python" or "cpp"; DYNHULL_THREADS is the
+number of threads that one call of the kernel may use, by default one for each processor available to the process.
 """
 
 import os
+from operator import index
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
 
     from . import _kernel
     from .arrays import Points
+
+MOST_THREADS = 64
 
 
 class _Kernel(Protocol):
@@ -32,12 +36,14 @@ class _Kernel(Protocol):
     def chan(self, xy: "Points") -> "tuple[Points, list[tuple[int, int, int, bool]]]": ...
     def orientations(self, a: "Points", b: "Points", c: "Points") -> "npt.NDArray[np.int8]": ...
     def turning_if_simple(self, ring: "Points") -> int: ...
+    def set_threads(self, threads: int) -> None: ...
 
 
 def _load() -> _Kernel | None:
     wanted = os.environ.get("DYNHULL_KERNEL") or "any"
     if wanted not in ("any", "cpp", "python"):
         raise ValueError(f'DYNHULL_KERNEL must be "cpp" or "python", got {wanted!r}')
+    threads = _threads()
     if wanted == "python":
         return None
     try:
@@ -46,8 +52,34 @@ def _load() -> _Kernel | None:
         if wanted == "cpp":
             raise
         return None
+    built.set_threads(threads)
     return built
+
+
+def _threads() -> int:
+    """The number set by DYNHULL_THREADS; 0 if it is not set."""
+    given = os.environ.get("DYNHULL_THREADS")
+    if not given:
+        return 0
+    if given not in map(str, range(1, MOST_THREADS + 1)):
+        raise ValueError(f"DYNHULL_THREADS must be a number from 1 to {MOST_THREADS}, got {given!r}")
+    return int(given)
 
 
 kernel = _load()
 KERNEL: Literal["cpp", "python"] = "python" if kernel is None else "cpp"
+
+
+def set_threads(threads: int | None) -> None:
+    """Set how many threads one call may use, from 1 to 64.
+
+    Batches of 1,024 rows and more, builds of 32,768 points and more and `locate` of 16,384 points and more use several
+    threads of the kernel, with the results of one. At most one call of a process has them at a time; the others work
+    alone. None: as many as processors are available to the process, or for some time one, if others use these. That is
+    the default, unless the environment variable DYNHULL_THREADS has another number at import. ValueError for other
+    numbers. Without the kernel there is no effect.
+    """
+    if threads is not None and not 1 <= index(threads) <= MOST_THREADS:
+        raise ValueError(f"threads must be from 1 to {MOST_THREADS}, got {threads}")
+    if kernel is not None:
+        kernel.set_threads(index(threads or 0))

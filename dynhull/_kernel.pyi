@@ -490,3 +490,11 @@ def chan(xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', 
     """
     The same by Chan's algorithm, with its rounds (guess, groups, steps, closed). O(n log h).
     """
+
+def set_threads(threads: int) -> None:
+    """
+    How many threads one call may use; 0 for one on each processor available to the process.
+    """
+
+def threads() -> int:
+    """How many threads one call may use."""

@@ -9,8 +9,7 @@
 
 #include <optional>
 
-#include "batch/divide.hpp"
-#include "batch/in_order.hpp"
+#include "batch/parts.hpp"
 #include "sort/distinct.hpp"
 
 namespace dynhull {
@@ -29,12 +28,11 @@ class HullTree {
   HullTree() = default;
   HullTree(const Point* points, std::size_t count) : HullTree(Distinct(points, count)) {}
   explicit HullTree(const Distinct& points) : size_(points.count()), distinct_(points.size()) {
-    const auto build = [&] { nodes_ = built(points.data(), points.size(), points.repeated()); };
-    const auto note_copies = [&] {
+    Threads threads(threads_for(size_));
+    nodes_ = built(threads, points.data(), points.size(), points.repeated(), [&] {
       copies_.reserve(points.repeated().size());
       for (const auto& [number, copies] : points.repeated()) copies_.emplace(points.data()[number], copies);
-    };
-    both(two_threads_for(size_), build, note_copies);
+    });
   }
 
   std::size_t size() const { return size_; }
@@ -99,22 +97,24 @@ class HullTree {
   Applied apply(Ops ops, const Point* points, std::size_t count, bool ignore_missing,
                 std::optional<bool> together = {}) {
     if (count > 0 && nodes_.root == NONE && ops.all_insert()) return fill(points, count);
-    Groups groups(ops, points, count);
-    groups.descend(nodes_);
-    Plan plan(nodes_, copies_, groups);
-    if (groups.first_missing >= 0 && !ignore_missing) return {0, groups.first_missing};
-    make_room_for_copies(plan);
-    try {
-      if (apply(plan, together)) changed();
-    } catch (...) {
-      drop_room_for_copies();
-      throw;
+    Threads threads(threads_for_batch(count));
+    if (threads.count() > 1) {
+      const std::vector<Point> cuts = cuts_of(nodes_, points, count, threads.count());
+      if (!cuts.empty()) {
+        BatchInParts batch(threads, cuts, nodes_, copies_, ops, points, count, together);
+        return commit(threads, batch.plans(), ignore_missing, together, [&](std::size_t extra_leaves) {
+          nodes_.reserve(extra_leaves);
+          recount(batch.plans());
+          return batch.apply();
+        });
+      }
     }
-    size_ += groups.growth;
-    distinct_ += 2 * plan.inserts - plan.changes().size();
-    for (const Recount& entry : plan.recounts)
-      if (entry.before == 0 && entry.after > 1) mark(find(nodes_, entry.p), true);
-    return {groups.rows_applied, groups.first_missing};
+    const Scratch<Row> rows(count);
+    copy_rows(ops, points, count, [next = rows.data()](Point) mutable { return next++; });
+    Plan plan(nodes_, copies_, rows.data(), count);
+    Plan* const plans[] = {&plan};
+    return commit(threads, plans, ignore_missing, together,
+                  [&](std::size_t extra_leaves) { return apply(plan, extra_leaves, together); });
   }
 
   // Takes over the points of another tree.
@@ -165,20 +165,61 @@ class HullTree {
     return {static_cast<std::int64_t>(count), -1};
   }
 
-  // True if the hull changed.
-  bool apply(const Plan& plan, std::optional<bool> together) {
-    if (plan.changes().empty()) return recount(plan), false;
-    const bool as_large = plan.inserts >= distinct_;
-    if (nodes_.root != NONE && !together.value_or(as_large || plan.crowded())) {
-      nodes_.reserve(plan.extra_leaves);
-      recount(plan);
-      return apply_in_order(nodes_, plan.changes());
+  using Plans = std::span<Plan* const>;  // of the parts of a batch, in order
+
+  // Checks the plans and makes room for copies; `apply` gets the number of leaves to make room for, changes the tree
+  // and returns whether the hull changed. If that throws, nothing has changed.
+  template <class Apply>
+  Applied commit(Threads& threads, Plans plans, bool ignore_missing, std::optional<bool> together, Apply apply) {
+    Applied applied{0, -1};
+    std::int64_t growth = 0, distinct_growth = 0;
+    std::size_t inserts = 0, changes = 0, extra_leaves = 0;
+    for (const Plan* plan : plans) {
+      applied.rows += plan->rows_applied;
+      if (plan->first_missing >= 0 && (applied.first_missing < 0 || plan->first_missing < applied.first_missing))
+        applied.first_missing = plan->first_missing;
+      growth += plan->growth;
+      distinct_growth += plan->distinct_growth();
+      inserts += plan->inserts;
+      changes += plan->changes().size();
+      extra_leaves += plan->extra_leaves;
     }
-    if (as_large) return rebuild(plan);
-    nodes_.reserve(plan.extra_leaves);
-    DividedBatch commit(nodes_, plan);
-    recount(plan);
-    return commit.apply();
+    if (applied.first_missing >= 0 && !ignore_missing) return {0, applied.first_missing};
+    const bool anew = nodes_.root == NONE || (inserts >= distinct_ && together.value_or(true));
+    make_room_for_copies(plans);
+    try {
+      if (changes == 0)
+        recount(plans);
+      else if (anew ? rebuild(threads, plans) : apply(extra_leaves))
+        changed();
+    } catch (...) {
+      drop_room_for_copies();
+      throw;
+    }
+    size_ += growth;
+    distinct_ += distinct_growth;
+    for (const Plan* plan : plans)
+      for (const Recount& entry : plan->recounts)
+        if (entry.before == 0 && entry.after > 1) mark(find(nodes_, entry.p), true);
+    return applied;
+  }
+
+  // True if the hull changed.
+  bool apply(Plan& plan, std::size_t extra_leaves, std::optional<bool> together) {
+    Plan* const plans[] = {&plan};
+    bool changed = false;
+    const auto reached = [&](const Change&, unsigned) { changed = true; };
+    nodes_.reserve(extra_leaves);
+    const std::size_t changes = plan.changes().size();
+    if (together.value_or(plan.crowded())) {
+      DividedBatch batch(nodes_, plan.changes());
+      recount(plans);
+      batch.apply(0, changes, reached);
+    } else {
+      recount(plans);
+      apply_in_order(nodes_, plan.changes(), nodes_.leaf_count() / (changes + 1), reached);
+    }
+    return changed;
   }
 
   bool changed() {
@@ -187,13 +228,16 @@ class HullTree {
     return true;
   }
 
-  static Nodes built(const Point* points, std::size_t count, std::span<const Repeated> repeated = {}) {
+  // The tree of sorted distinct points; calls `beside` meanwhile.
+  template <class Beside>
+  static Nodes built(Threads& threads, const Point* points, std::size_t count, std::span<const Repeated> repeated,
+                     Beside beside) {
     Nodes nodes;
     if (count == 0) return nodes;
     std::vector<Ref> refs(2 * leaves_for(count));
     nodes.reserve(leaves_for(count));
     const Building building(nodes, points, count, refs.data());
-    nodes.root = building.tree(two_threads_for(count));
+    nodes.root = building.tree(threads, beside);
     for (const Repeated& point : repeated) building.mark_repeated(point.number);
     return nodes;
   }
@@ -205,24 +249,29 @@ class HullTree {
   }
 
   // Applies a batch as large as the tree: merges it with the points and builds a new tree.
-  bool rebuild(const Plan& plan) {
-    std::vector<Point> merged;
-    merged.reserve(distinct_ + plan.inserts);
-    auto next = plan.changes().begin();
-    const auto last = plan.changes().end();
-    for_each([&](Point p, std::uint64_t) {
-      for (; next != last && next->p < p; ++next) merged.push_back(next->p);
-      if (next != last && next->p == p)
-        ++next;  // removed
-      else
-        merged.push_back(p);
-    });
-    for (; next != last; ++next) merged.push_back(next->p);
+  bool rebuild(Threads& threads, Plans plans) {
+    std::vector<Point> old, merged;
+    old.reserve(distinct_);
+    for_each([&](Point p, std::uint64_t) { old.push_back(p); });
+    std::size_t most = distinct_;
+    for (const Plan* plan : plans) most += plan->inserts;
+    merged.reserve(most);
+    auto next = old.begin();
+    for (const Plan* plan : plans) {
+      for (const Change& change : plan->changes()) {
+        while (next != old.end() && *next < change.p) merged.push_back(*next++);
+        if (change.insert)
+          merged.push_back(change.p);
+        else
+          ++next;
+      }
+    }
+    merged.insert(merged.end(), next, old.end());
     const std::vector<Point> before[] = {chain(UPPER), chain(LOWER)};
-    Nodes fresh = built(merged.data(), merged.size());
+    Nodes fresh = built(threads, merged.data(), merged.size(), {}, [] {});
     std::vector<Point> after[2];
     for (Side side : SIDES) collect(fresh, fresh.root, side, LOWEST, HIGHEST, after[side]);
-    recount(plan);
+    recount(plans);
     nodes_ = std::move(fresh);
     for (const auto& [p, copies] : copies_) {
       const Place place = find(nodes_, p);
@@ -232,10 +281,11 @@ class HullTree {
   }
 
   // Allocates entries so that recount() cannot fail. An entry of one is only room.
-  void make_room_for_copies(Plan& plan) {
+  void make_room_for_copies(Plans plans) {
     try {
-      for (Recount& entry : plan.recounts)
-        if (entry.copies == nullptr) entry.copies = &copies_.try_emplace(entry.p, 1).first->second;
+      for (Plan* plan : plans)
+        for (Recount& entry : plan->recounts)
+          if (entry.copies == nullptr) entry.copies = &copies_.try_emplace(entry.p, 1).first->second;
     } catch (...) {
       drop_room_for_copies();
       throw;
@@ -247,13 +297,15 @@ class HullTree {
 
   // Updates the numbers of copies. To be called before the changes are applied, once nothing can fail any more; new
   // points are marked afterwards.
-  void recount(const Plan& plan) {
-    for (const Recount& entry : plan.recounts) {
-      if (entry.after > 1)
-        *entry.copies = entry.after;
-      else
-        copies_.erase(entry.p);
-      if (entry.before > 0 && entry.after > 0) mark(entry.place, entry.after > 1);
+  void recount(Plans plans) {
+    for (const Plan* plan : plans) {
+      for (const Recount& entry : plan->recounts) {
+        if (entry.after > 1)
+          *entry.copies = entry.after;
+        else
+          copies_.erase(entry.p);
+        if (entry.before > 0 && entry.after > 0) mark(entry.place, entry.after > 1);
+      }
     }
   }
 

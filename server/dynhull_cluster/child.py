@@ -13,7 +13,7 @@ from dynhull_server import logs
 from dynhull_server.app import Server
 from dynhull_server.failure import code_of, fail, text_of
 from dynhull_server.malloc import return_large_blocks
-from dynhull_server.process import allow_connections, stop_signal
+from dynhull_server.process import allow_connections, share_processors, stop_signal
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import StorageError
 
@@ -41,6 +41,7 @@ async def _run(end: socket.socket) -> None:
     logs.configure(settings.log_level, settings.log_format, begin["process"])
     _name_process(begin["process"])
     return_large_blocks()
+    share_processors(settings)
     allow_connections(settings.max_connections)
     role, _, number = begin["process"].partition("-")
     sockets = Sockets(Path(begin["sockets"]))

@@ -3,11 +3,14 @@
 import asyncio
 import gc
 import logging
+import os
 import resource
 import signal
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from dynhull import set_threads
 
 from . import logs
 from .app import Server
@@ -26,11 +29,18 @@ def run(settings: Settings) -> None:
     """Serve, then return; an error of the settings, the storage or the operating system ends the process."""
     logs.configure(settings.log_level, settings.log_format)
     return_large_blocks()
+    share_processors(settings)
     allow_connections(settings.max_connections)
     try:
         asyncio.run(_serve(settings))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
+
+
+def share_processors(settings: Settings) -> None:
+    """Let a batch use so many threads; by default the processors, divided by the workers, less one for other work."""
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    set_threads(settings.threads or min(64, max(1, processors // (settings.workers or 1) - 1)))
 
 
 def allow_connections(most: int) -> None:

@@ -36,6 +36,13 @@ class Settings(BaseModel):
     gateways: int | None = Field(
         None, ge=1, le=256, description="Number of processes that take the calls for the workers; by default 1."
     )
+    threads: int | None = Field(
+        None,
+        ge=1,
+        le=64,
+        description="Number of threads that a process may use for one batch; by default the processors, divided by the "
+        "workers, less one for the rest of the process, and at least one.",
+    )
     create_on_write: bool = Field(False, description="Create a missing hull with its first batch.")
     snapshot_points: int = Field(
         250_000,

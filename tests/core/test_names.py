@@ -15,7 +15,7 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library.md"
 
 PACKAGES = {
     "dynhull": {
-        *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d"),
+        *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d", "set_threads"),
         *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings"),
         *("GeoHull", "GeoKeyedHull", "GeoWindowHull"),
         *("arrays", "keys", "measure", "robust", "static"),  # imported with it

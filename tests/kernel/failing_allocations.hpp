@@ -1,6 +1,7 @@
 // Allocations that fail on purpose: every kind that the kernel makes. For a program of one source file.
 #pragma once
 
+#include <atomic>
 #include <cstdlib>
 #include <new>
 
@@ -8,7 +9,7 @@
 
 namespace {
 
-long allocations_left = -1;  // until one fails; negative: none does
+std::atomic<long> allocations_left = -1;  // until one fails, of any thread; negative: none does
 bool fails() { return allocations_left >= 0 && allocations_left-- == 0; }
 
 }  // namespace

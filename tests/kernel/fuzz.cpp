@@ -34,7 +34,9 @@ std::vector<Point> chain_of(const Model& model, Side side) {
 
 class Life {
  public:
-  explicit Life(std::uint64_t seed) : random_(seed), kind_(below(8)), calm_(below(3) == 0) {}
+  explicit Life(std::uint64_t seed) : random_(seed), kind_(below(8)), calm_(below(3) == 0) {
+    Team::set_limit(1 + static_cast<unsigned>(seed % 4));
+  }
 
   void live() {
     const int steps = 10 + static_cast<int>(below(60));

@@ -57,7 +57,16 @@ def test_the_build_forbids_fusing(compiler, tmp_path):
 def test_fuzz(compiler, tmp_path):
     """A short run of `make fuzz`, without sanitizers to be quick: kept seeds, then random ones."""
     program = tmp_path / "fuzz"
-    build = [compiler, "-std=c++20", "-O0", "-ffp-contract=off", "-DDYNHULL_FAIL_ALLOCATIONS", "-DDYNHULL_LEAF=4"]
+    build = [
+        compiler,
+        "-std=c++20",
+        "-O0",
+        "-ffp-contract=off",
+        "-pthread",
+        "-DDYNHULL_ROWS_A_THREAD=3",
+        "-DDYNHULL_FAIL_ALLOCATIONS",
+        "-DDYNHULL_LEAF=4",
+    ]
     subprocess.run([*build, str(HERE / "fuzz.cpp"), "-o", str(program)], check=True)
     for arguments in (SEEDS, ["--seconds", "1"]):
         run = subprocess.run([str(program), *arguments], capture_output=True, text=True, check=False)

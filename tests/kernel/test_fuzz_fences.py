@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-FLAGS = ["-std=c++20", "-O0", "-ffp-contract=off", "-DDYNHULL_FAIL_ALLOCATIONS", "-DDYNHULL_LEAF=4"]
+FLAGS = ["-std=c++20", "-O0", "-ffp-contract=off", "-pthread", "-DDYNHULL_FAIL_ALLOCATIONS", "-DDYNHULL_LEAF=4"]
 
 
 @pytest.mark.long

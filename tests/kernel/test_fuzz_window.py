@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-FLAGS = ["-std=c++20", "-O0", "-ffp-contract=off", "-DDYNHULL_FAIL_ALLOCATIONS", "-DDYNHULL_LEAF=4"]
+FLAGS = ["-std=c++20", "-O0", "-ffp-contract=off", "-pthread", "-DDYNHULL_FAIL_ALLOCATIONS", "-DDYNHULL_LEAF=4"]
 
 
 def test_random_lives(compiler, tmp_path):

@@ -67,6 +67,14 @@ def test_which_implementation():
     assert 'DYNHULL_KERNEL must be "cpp" or "python", got \'rust\'' in wrong.stderr
 
 
+@pytest.mark.parametrize("given", ["0", "65", "-1", "two", "1.5"])
+def test_a_wrong_number_of_threads(given):
+    wrong = subprocess.run(
+        [sys.executable, "-c", "import dynhull"], env={"DYNHULL_THREADS": given}, capture_output=True, text=True
+    )
+    assert f"DYNHULL_THREADS must be a number from 1 to 64, got {given!r}" in wrong.stderr
+
+
 def test_a_number_that_is_not_a_double_is_still_checked(hull):
     """The kernel takes floats and small integers itself, and leaves the rest to dynhull.arrays."""
     with pytest.raises(ValueError, match="x is 9007199254740993: no double has this value"):

@@ -17,9 +17,9 @@ namespace dynhull {
 
 class DividedBatch {
  public:
-  // Needs room in `nodes` for the plan's extra leaves. Allocates all other memory, so that apply() cannot fail.
-  DividedBatch(Nodes& nodes, const Plan& plan)
-      : nodes_(nodes), changes_(plan.changes().data()), count_(plan.changes().size()) {
+  // Allocates all memory but that of leaves and nodes, so that apply() cannot fail.
+  DividedBatch(Nodes& nodes, std::span<const Change> changes)
+      : nodes_(nodes), changes_(changes.data()), count_(changes.size()) {
     for (Side side : SIDES) candidates_[side].resize(count_);
     if (count_ > FEW) {
       points_.resize(LEAF + count_);
@@ -29,14 +29,19 @@ class DividedBatch {
     small_.reserve(count_);
   }
 
-  // True if the hull changed.
-  bool apply() {
-    const Found found = run(nodes_.root, 0, count_);
+  // Applies the changes from..to to the tree at nodes.root; calls `reached` with those that reach its top, and on which
+  // side, as a bit. Needs room in `nodes` for the plan's extra leaves.
+  template <class Reached>
+  void apply(std::size_t from, std::size_t to, Reached reached) {
+    const Found found = run(nodes_.root, from, to);
     nodes_.root = found.tree;
     if (found.tree != NONE) nodes_.set_parent(found.tree, NONE);
     for (Ref leaf : small_)
       if (nodes_.leaf(leaf).size > 0 && nodes_.leaf(leaf).size < LOW) merge(nodes_, leaf);
-    return found.candidates[UPPER] + found.candidates[LOWER] > 0;
+    small_.clear();
+    for (Side side : SIDES)
+      for (std::size_t i = 0; i < found.candidates[side]; ++i)
+        reached(changes_[candidates_[side][from + i]], 1u << side);
   }
 
  private:

@@ -24,41 +24,46 @@ struct Ops {
 
 struct NotFinite {};  // thrown if a coordinate is not finite
 
+// Copies the rows of a batch, each to where `place` says, so that other threads may change them meanwhile.
+template <class Place>
+void copy_rows(Ops ops, const Point* points, std::size_t count, Place place) {
+  if (count >= NONE) throw std::bad_alloc();
+  Plain plain;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point p = plain(points[i]);
+    *place(p) = {p, static_cast<std::int64_t>(2 * i + ops.deletes(i))};
+  }
+  if (!plain.finite()) throw NotFinite();
+}
+
 class Groups {
  public:
   std::int64_t rows_applied;
   std::int64_t first_missing = -1;  // the first row that deletes a missing point
   std::int64_t growth = 0;          // the change of the number of points, with multiplicity
 
-  Groups(Ops ops, const Point* points, std::size_t count)
-      : rows_applied(static_cast<std::int64_t>(count)), rows_(few(count)), groups_(count + 1) {
+  // Sorts the rows, which must outlive it, and finds the leaf of each group.
+  Groups(const Nodes& nodes, Row* rows, std::size_t count)
+      : rows_applied(static_cast<std::int64_t>(count)), rows_(rows), groups_(count + 1) {
     const Scratch<Row> scratch(count);
-    Plain plain;
-    for (std::size_t i = 0; i < count; ++i)
-      rows_[i] = {plain(points[i]), static_cast<std::int64_t>(2 * i + ops.deletes(i))};
-    if (!plain.finite()) throw NotFinite();
-    sort_by_point(rows_.data(), scratch.data(), count);
+    sort_by_point(rows, scratch.data(), count);
     Group* next = groups_.data();
     for (std::size_t i = 0; i < count; ++i)
-      if (i == 0 || !(rows_[i].p == rows_[i - 1].p)) *next++ = {rows_[i].p, NONE, static_cast<std::uint32_t>(i)};
+      if (i == 0 || !(rows[i].p == rows[i - 1].p)) *next++ = {rows[i].p, NONE, static_cast<std::uint32_t>(i)};
     next->first = static_cast<std::uint32_t>(count);
     size_ = static_cast<std::size_t>(next - groups_.data());
+    if (nodes.root != NONE) descend(nodes, nodes.root, 0, size_);
   }
 
   std::size_t size() const { return size_; }
   const Group& operator[](std::size_t i) const { return groups_[i]; }
 
-  // Finds the leaf of each group.
-  void descend(const Nodes& nodes) {
-    if (nodes.root != NONE) descend(nodes, nodes.root, 0, size_);
-  }
-
   bool new_leaf(std::size_t i) const { return i == 0 || groups_[i].leaf != groups_[i - 1].leaf; }
 
   // The number of copies of a group's point after its rows, given the number before. Records deletes that find none.
   std::uint64_t settle(std::size_t i, std::uint64_t before) {
-    const Row* const first = rows_.data() + groups_[i].first;
-    const Row* const last = rows_.data() + groups_[i + 1].first;
+    const Row* const first = rows_ + groups_[i].first;
+    const Row* const last = rows_ + groups_[i + 1].first;
     std::uint64_t available = before;
     for (const Row* row = first; row < last; ++row) available += inserts(*row);
     const std::uint64_t deletes = before + static_cast<std::uint64_t>(last - first) - available;
@@ -72,10 +77,6 @@ class Groups {
  private:
   static constexpr std::size_t TOGETHER = 32;  // interleaved descents
 
-  static std::size_t few(std::size_t count) {
-    if (count >= NONE) throw std::bad_alloc();
-    return count;
-  }
   static bool inserts(const Row& row) { return row.row % 2 == 0; }
 
   // Records the surplus deletes of a group: its first deletes find the available points, the others none.
@@ -115,7 +116,7 @@ class Groups {
     for (; from < to; from += TOGETHER) descend_together(nodes, tree, from, std::min(from + TOGETHER, to));
   }
 
-  Scratch<Row> rows_;
+  const Row* rows_;
   Scratch<Group> groups_;
   std::size_t size_;
 };

@@ -36,21 +36,36 @@ struct Recount {
 
 class Plan {
  public:
-  std::size_t inserts = 0;  // changes that insert
-  std::size_t leaves = 0;   // leaves with a change
+  std::int64_t rows_applied;
+  std::int64_t first_missing;  // the first row that deletes a missing point, or -1
+  std::int64_t growth;         // the change of the number of points, with multiplicity
+  std::size_t inserts = 0;     // changes that insert
+  std::size_t leaves = 0;      // leaves with a change
   // The changes need at most this many new leaves: one if everything is removed before something is inserted, one for
   // each leaf that overflows, and one for every half leaf of inserts, the least that splits a leaf from a split again.
   // A leaf from a merge may split too, but the merge has given a leaf back.
   std::size_t extra_leaves = 1;
   std::vector<Recount> recounts;
 
-  Plan(const Nodes& nodes, Copies& copies, Groups& groups) : changes_(groups.size()), changes_end_(changes_.data()) {
+  // Of these rows, which it sorts.
+  Plan(const Nodes& nodes, Copies& copies, Row* rows, std::size_t count)
+      : Plan(nodes, copies, Groups(nodes, rows, count)) {}
+  Plan(const Nodes& nodes, Copies& copies, Groups&& groups) : changes_(groups.size()), changes_end_(changes_.data()) {
     for (std::size_t from = 0; from < groups.size(); from += BLOCK)
       read(nodes, copies, groups, from, std::min(from + BLOCK, groups.size()));
     extra_leaves += inserts / (LEAF / 2);
+    rows_applied = groups.rows_applied;
+    first_missing = groups.first_missing;
+    growth = groups.growth;
   }
 
   std::span<const Change> changes() const { return {changes_.data(), changes_end_}; }
+  std::int64_t distinct_growth() const { return static_cast<std::int64_t>(2 * inserts - changes().size()); }
+
+  void forget_changes() {
+    const Scratch<Change> gone(std::move(changes_));
+    changes_end_ = changes_.data();
+  }
 
   // Whether enough changes share a leaf that divide and conquer is faster: measured, see docs/performance.md.
   bool crowded() const { return changes().size() >= LEAF / 2 * leaves; }

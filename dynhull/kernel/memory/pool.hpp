@@ -16,7 +16,7 @@ class Pool {
  public:
   Pool() = default;
   Pool(Pool&& other) noexcept { swap(other); }
-  Pool(const Pool& other) : used_(other.used_), freed_(other.freed_), free_(other.free_) {
+  Pool(const Pool& other) : used_(other.used_), freed_(other.freed_), free_(other.free_), last_(other.last_) {
     if (used_ == 0) return;
     data_ = static_cast<Record*>(memory::resize(nullptr, 0, whole_pages(used_)));
     capacity_ = used_;
@@ -55,8 +55,42 @@ class Pool {
 
   void give_back(std::uint32_t i) {
     link(i) = free_;
+    if (freed_++ == 0) last_ = i;
     free_ = i;
-    ++freed_;
+  }
+
+  // Free slots, so many, as a pool of its own over the same records: another thread takes and gives back its own slots,
+  // while this one does too. Needs room for them. `take_back` ends that.
+  Pool lend(std::size_t count) {
+    Pool lent;
+    lent.data_ = data_;
+    if (count > 0 && freed_ > 0) {
+      lent.free_ = lent.last_ = free_;
+      lent.freed_ = static_cast<std::uint32_t>(std::min<std::size_t>(count, freed_));
+      for (std::uint32_t i = 1; i < lent.freed_; ++i) lent.last_ = link(lent.last_);
+      free_ = link(lent.last_);
+      freed_ -= lent.freed_;
+    }
+    lent.used_ = used_;
+    used_ += static_cast<std::uint32_t>(count - lent.freed_);
+    lent.capacity_ = used_;
+    return lent;
+  }
+  void take_back(Pool& lent) {
+    if (used_ == lent.capacity_)
+      used_ = lent.used_;
+    else
+      while (lent.used_ < lent.capacity_) lent.give_back(lent.used_++);
+    if (lent.freed_ > 0) {
+      if (freed_ == 0)
+        last_ = lent.last_;
+      else
+        link(lent.last_) = free_;
+      free_ = lent.free_;
+      freed_ += lent.freed_;
+    }
+    lent.data_ = nullptr;
+    lent.capacity_ = 0;
   }
 
   std::size_t used() const { return used_ - freed_; }
@@ -69,6 +103,7 @@ class Pool {
     std::swap(used_, other.used_);
     std::swap(freed_, other.freed_);
     std::swap(free_, other.free_);
+    std::swap(last_, other.last_);
   }
 
  private:
@@ -80,7 +115,8 @@ class Pool {
   std::uint32_t& link(std::uint32_t i) { return reinterpret_cast<std::uint32_t&>(data_[i]); }
 
   Record* data_ = nullptr;
-  std::uint32_t capacity_ = 0, used_ = 0, freed_ = 0, free_ = NOWHERE;
+  std::uint32_t capacity_ = 0, used_ = 0, freed_ = 0;
+  std::uint32_t free_ = NOWHERE, last_ = NOWHERE;  // the first and the last of the freed slots
 };
 
 }  // namespace dynhull

@@ -67,7 +67,7 @@ template <class Record>
 class Scratch {
  public:
   explicit Scratch(std::size_t count) : block_(BlockCache::take(memory::whole_pages(count * sizeof(Record)))) {}
-  Scratch(const Scratch&) = delete;
+  Scratch(Scratch&& other) noexcept : block_(std::exchange(other.block_, {})) {}
   ~Scratch() { BlockCache::give_back(block_); }
 
   Record* data() const { return static_cast<Record*>(block_.data); }

@@ -354,10 +354,14 @@ class Hull {
   ReadWriteLock lock_;
 
  private:
+  static constexpr std::size_t LOCATE_A_THREAD = 8192;
+
   void locate_places(const Point* points, std::size_t count, std::int8_t* where) const {
-    if (index_.fresh(tree_.plane())) return index_.locate(tree_.plane(), points, count, where);
-    for (std::size_t i = 0; i < count; ++i)
-      where[i] = static_cast<std::int8_t>(dynhull::locate(tree_.plane().nodes(), points[i]).where);
+    for_ranges(count, LOCATE_A_THREAD, [&](std::size_t from, std::size_t to) {
+      if (index_.fresh(tree_.plane())) return index_.locate(tree_.plane(), points + from, to - from, where + from);
+      for (std::size_t i = from; i < to; ++i)
+        where[i] = static_cast<std::int8_t>(dynhull::locate(tree_.plane().nodes(), points[i]).where);
+    });
   }
 
   void locate_projected(const Point* points, std::size_t count, std::int8_t* where) const {
@@ -365,7 +369,9 @@ class Hull {
     if (!tree_.frame().projection()) return;
     const Scratch<Point> places(count);
     const Scratch<bool> has_place(count);
-    (*tree_.frame().projection())(points, count, places.data(), has_place.data());
+    for_ranges(count, LOCATE_A_THREAD, [&](std::size_t from, std::size_t to) {
+      (*tree_.frame().projection())(points + from, to - from, places.data() + from, has_place.data() + from);
+    });
     const Scratch<std::uint32_t> rows(count);
     std::size_t near = 0;
     for (std::size_t i = 0; i < count; ++i) {

@@ -320,6 +320,12 @@ void add_arrays_and_static_hulls(nb::module_& module) {
              "The same by Chan's algorithm, with its rounds (guess, groups, steps, closed). O(n log h).");
 }
 
+void add_threads(nb::module_& module) {
+  module.def("set_threads", &Team::set_limit, "threads"_a,
+             "How many threads one call may use; 0 for one on each processor available to the process.");
+  module.def("threads", &Team::limit, "How many threads one call may use.");
+}
+
 void add_fork_hooks(nb::module_& module) {
   module.def("_before_fork", &ReadWriteLock::before_fork);
   module.def("_after_fork_in_parent", &ReadWriteLock::after_fork_in_parent);
@@ -344,5 +350,6 @@ NB_MODULE(_kernel, module) {
   dynhull::add_globe(module);
   dynhull::add_predicates(module);
   dynhull::add_arrays_and_static_hulls(module);
+  dynhull::add_threads(module);
   dynhull::add_fork_hooks(module);
 }

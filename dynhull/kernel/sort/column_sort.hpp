@@ -1,5 +1,7 @@
-// Sorting many points with one or two threads: in columns of x, each small enough to be sorted in the cache.
+// Sorting many points on several threads: in columns of x, each small enough to be sorted in the cache.
 #pragma once
+
+#include <deque>
 
 #include "../memory/scratch.hpp"
 #include "../threads.hpp"
@@ -11,42 +13,50 @@ namespace dynhull {
 // meanwhile.
 class ColumnSort {
  public:
-  ColumnSort(const Point* from, Point* to, std::size_t count, bool threads)
-      : to_(to),
-        half_(count / 2),
-        width_(static_cast<unsigned>(std::min(count / A_COLUMN + 1, MOST))),
-        threads_(threads),
-        parts_{{from, half_}, {from + half_, count - half_}} {
+  ColumnSort(const Point* from, Point* to, std::size_t count, Threads& threads)
+      : to_(to), width_(static_cast<unsigned>(std::min(count / A_COLUMN + 1, MOST))), threads_(threads) {
+    const std::size_t parts = threads.count();
+    for (std::size_t i = 0; i < parts; ++i)
+      parts_.emplace_back(from + count * i / parts, count * (i + 1) / parts - count * i / parts);
     choose_columns();
     place();
     if (finite()) sort();
   }
 
-  bool finite() const { return parts_[0].finite && parts_[1].finite; }        // if false, nothing else holds
-  bool repeated() const { return parts_[0].repeated || parts_[1].repeated; }  // whether some points are equal
+  // If false, nothing else holds.
+  bool finite() const {
+    return std::all_of(parts_.begin(), parts_.end(), [](const Part& part) { return part.finite; });
+  }
+  bool repeated() const { return repeated_; }  // whether some points are equal
 
  private:
   static constexpr std::size_t MOST = 256, A_COLUMN = 2048;
 
-  // The share of one thread: half of the points as given, then the columns with about half of them.
+  // The share of one thread: some of the points as given.
   struct Part {
+    Part(const Point* points, std::size_t count) : points(points), count(count) {}
+
     const Point* points;
     std::size_t count;
     Range range = {};
     Scratch<std::uint16_t> columns{count};    // of each point
     std::array<std::size_t, MOST> next = {};  // counts of each column, then the place of its next point
-    bool finite = true, repeated = false;
+    bool finite = true;
   };
 
   template <class Work>
   void for_each_part(Work work) {
-    both(threads_, [&] { work(parts_[0]); }, [&] { work(parts_[1]); });
+    threads_.run(parts_.size(), [&](std::size_t i) { work(parts_[i]); });
   }
 
   void choose_columns() {
     for_each_part([](Part& part) { part.range = Range::of<&Point::x>(part.points, part.count); });
-    const Columns columns(std::min(parts_[0].range.least, parts_[1].range.least),
-                          std::max(parts_[0].range.greatest, parts_[1].range.greatest), width_);
+    Range range;
+    for (const Part& part : parts_) {
+      range.add(part.range.least);
+      range.add(part.range.greatest);
+    }
+    const Columns columns(range.least, range.greatest, width_);
     for_each_part([&](Part& part) {
       for (std::size_t i = 0; i < part.count; ++i) {
         const unsigned column = columns(part.points[i].x);
@@ -71,13 +81,18 @@ class ColumnSort {
   }
 
   void sort() {
-    const auto middle = std::lower_bound(starts_.begin(), starts_.begin() + width_, half_) - starts_.begin();
-    const auto cut = static_cast<unsigned>(middle);
-    both(threads_, [&] { parts_[0].repeated = sort(0, cut); }, [&] { parts_[1].repeated = sort(cut, width_); });
+    const std::size_t shares = parts_.size() > 1 ? 4 * parts_.size() : 1;
+    const auto first_of = [&](std::size_t share) {
+      const auto from = std::lower_bound(starts_.begin(), starts_.begin() + width_, starts_[width_] * share / shares);
+      return share < shares ? static_cast<unsigned>(from - starts_.begin()) : width_;
+    };
+    threads_.run(shares, [&](std::size_t i) {
+      if (sort(first_of(i), first_of(i + 1))) repeated_ = true;
+    });
     if (in_order()) return;
     Point* const end = to_ + starts_[width_];
     std::sort(to_, end);
-    parts_[0].repeated = std::adjacent_find(to_, end) != end;
+    repeated_ = std::adjacent_find(to_, end) != end;
   }
 
   // Whether the columns are in order. They are not if another thread changed a point between the two reads.
@@ -105,10 +120,10 @@ class ColumnSort {
   }
 
   Point* to_;
-  std::size_t half_;
   unsigned width_;
-  bool threads_;
-  Part parts_[2];
+  Threads& threads_;
+  std::deque<Part> parts_;
+  std::atomic<bool> repeated_ = false;
   std::array<std::size_t, MOST + 1> starts_;
 };
 

@@ -15,9 +15,10 @@ struct Repeated {
 // The sorted distinct points, and the number of copies of the repeated ones.
 class Distinct {
  public:
-  Distinct(const Point* points, std::size_t count)
+  Distinct(const Point* points, std::size_t count) : Distinct(points, count, Threads(threads_for(count))) {}
+  Distinct(const Point* points, std::size_t count, Threads&& threads)
       : count_(count), size_(count), points_(count), repeated_(count / 2 + 1) {
-    const ColumnSort sort(points, points_.data(), count, two_threads_for(count));
+    const ColumnSort sort(points, points_.data(), count, threads);
     finite_ = sort.finite();
     if (sort.repeated()) count_copies();
   }

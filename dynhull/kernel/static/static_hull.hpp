@@ -166,7 +166,7 @@ inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t
 // O(n log n), and O(n) if few points are near the hull.
 inline StaticHull static_hull(const Point* points, std::size_t count, StaticOptions options = {}) {
   constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // at the same cost
-  const auto threads = [&](std::size_t placed) { return options.threads.value_or(two_threads_for(placed)); };
+  const auto threads = [&](std::size_t placed) { return options.threads.value_or(threads_for(placed) > 1); };
   const std::size_t half = count / 2;
   const StaticHull::Part first(points, half), second(points + half, count - half);
   const bool may_discard = options.discard.value_or(true);

@@ -104,6 +104,21 @@ class Nodes {
     }
   }
 
+  // Room for `count` leaves and nodes, as Nodes of their own over the same memory: another thread may change subtrees
+  // through them while this one changes others. Needs that much room; `take_back` ends it.
+  Nodes lend(std::size_t count) {
+    Nodes lent;
+    lent.leaves_ = leaves_.lend(count);
+    lent.nodes_ = nodes_.lend(count);
+    lent.bridges_ = bridges_.lend(count);
+    return lent;
+  }
+  void take_back(Nodes& lent) {
+    leaves_.take_back(lent.leaves_);
+    nodes_.take_back(lent.nodes_);
+    bridges_.take_back(lent.bridges_);
+  }
+
   // Greater than the number of every leaf and of every node.
   std::uint32_t leaf_end() const { return leaves_.end(); }
   std::uint32_t node_end() const { return nodes_.end(); }

@@ -1,0 +1,139 @@
+"""Calls that use several threads of their own give the results of one thread."""
+
+import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from inputs import cloud
+
+from dynhull import DynamicHull, set_threads
+
+
+@pytest.fixture(autouse=True)
+def three_threads():
+    set_threads(3)
+    yield
+    set_threads(None)
+
+
+def alone(work):
+    set_threads(1)
+    try:
+        return work()
+    finally:
+        set_threads(3)
+
+
+def state(hull):
+    return hull.points().tobytes(), hull.vertices().tobytes(), hull.changes, len(hull), hull.distinct
+
+
+def batch(hull, points, random):
+    """New points, in a narrow strip now and then; the same number of old ones leave."""
+    new = points(3000) * (0.01 if random.random() < 0.3 else 1, 1)
+    old = random.permutation(hull.points())[:3000]
+    return np.repeat(np.array([1, -1], np.int8), [len(new), len(old)]), np.concatenate([new, old])
+
+
+def test_the_number_of_threads():
+    for threads in (1, 64, None):
+        set_threads(threads)
+    for wrong in (0, 65, -1):
+        with pytest.raises(ValueError, match=f"threads must be from 1 to 64, got {wrong}"):
+            set_threads(wrong)
+    with pytest.raises(TypeError):
+        set_threads("two")
+
+
+@pytest.mark.parametrize("kind", ["square", "circle", "grid"])
+def test_batches(kind):
+    random = np.random.default_rng(0)
+
+    def points(count):
+        if kind == "grid":
+            return random.integers(0, 60, (count, 2)).astype(float)
+        return random.random((count, 2)) if kind == "square" else cloud("circle", count, random)
+
+    first = points(20_000)
+    together, one = DynamicHull(first), alone(lambda: DynamicHull(first))
+    assert state(together) == state(one)
+    for _ in range(10):
+        ops, rows = batch(one, points, random)
+        together.apply(ops, rows)
+        alone(lambda ops=ops, rows=rows: one.apply(ops, rows))
+        together.check()
+        assert state(together) == state(one)
+    for hull in (together, one):
+        hull.delete_many(hull.points())
+        assert state(hull)[:2] == (b"", b"")
+
+
+def test_a_bad_batch_changes_nothing():
+    random = np.random.default_rng(0)
+    hull = DynamicHull(random.random((20_000, 2)))
+    before = state(hull)
+    rows = np.concatenate([hull.points()[:5000], random.random((2, 2)), hull.points()[5000:9000]])
+    with pytest.raises(KeyError) as missing:
+        hull.delete_many(rows)
+    assert missing.value.args == (tuple(rows[5000].tolist()), 5000)
+    rows[7000, 1] = np.nan
+    with pytest.raises(ValueError, match="row 7000"):
+        hull.insert_many(rows)
+    hull.check()
+    assert state(hull) == before
+
+
+@pytest.mark.parametrize("kind", ["square", "circle"])
+def test_locate(kind):
+    random = np.random.default_rng(0)
+    hull = DynamicHull(cloud("circle", 2000, random) if kind == "circle" else random.random((2000, 2)))
+    queries = np.concatenate([2.4 * random.random((60_000, 2)) - 1.2, hull.points()])
+    assert (hull.locate(queries) == alone(lambda: hull.locate(queries))).all()
+
+
+def test_many_callers_share_the_threads():
+    """Who finds them busy works alone: nobody waits, and every hull is right."""
+    random = np.random.default_rng(0)
+    start = threading.Barrier(4)
+    rows = random.random((4, 30_000, 2))
+
+    def live(number):
+        hull = DynamicHull(rows[number])
+        start.wait()
+        for i in range(0, 30_000, 2000):
+            old = rows[number][i : i + 2000]
+            hull.apply(np.repeat(np.array([1, -1], np.int8), 2000), np.concatenate([1 - old, old]))
+            hull.locate(rows[number])
+        hull.check()
+        return hull
+
+    with ThreadPoolExecutor(4) as pool:
+        for number, hull in enumerate(pool.map(live, range(4))):
+            assert (hull.points() == DynamicHull(1 - rows[number]).points()).all()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_a_forked_child_has_threads_of_its_own():
+    random = np.random.default_rng(0)
+    hull = DynamicHull(random.random((40_000, 2)))
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            hull.insert_many(random.random((40_000, 2)))
+            hull.check()
+            status = 0 if threads_of_this_process() in (3, None) else 2
+        finally:
+            os._exit(status)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    hull.insert_many(random.random((40_000, 2)))
+    hull.check()
+
+
+def threads_of_this_process():
+    tasks = Path("/proc/self/task")
+    return len(list(tasks.iterdir())) if tasks.is_dir() else None
