@@ -3,9 +3,11 @@
     python benchmarks/core.py    everything at 10^4, 10^5 and 10^6: about an hour
     python benchmarks/core.py --sizes 1e6 --inputs uniform circle --works window locate
     python benchmarks/core.py --sizes 1e4 1e5 1e6 1e7 --works window --chart docs/images/core.png
+    python benchmarks/core.py --sizes 1e6 --inputs uniform circle ordered grid --works threads
 
-Processor time, medians of --repeat repetitions, everything on one core. An update is one insert or one delete. Rivals
-in C++ are compiled on the fly; CGAL joins where its headers are installed (Debian's libcgal-dev).
+Processor time, medians of --repeat repetitions, everything on one core but `build` and `threads`. An update is one
+insert or one delete. Rivals in C++ are compiled on the fly; CGAL joins where its headers are installed (Debian's
+libcgal-dev).
 """
 
 import argparse
@@ -219,12 +221,14 @@ def locate(n, make, random, rivals) -> Iterator[Row]:
 def build(n, make, random, rivals) -> Iterator[Row]:
     """Build from an array, and static hulls of it."""
     rows = make(n, random)
+    dynhull.set_threads(None)
     for name, work in (("DynamicHull", DynamicHull), ("convex_hull", dynhull.convex_hull)):
         began = time.perf_counter()
         processor = clocked(partial(work, rows), clock=time.process_time)
         elapsed = time.perf_counter() - began
         yield f"dynhull.{name}, elapsed", elapsed
         yield f"dynhull.{name}, processor time of its threads", processor
+    dynhull.set_threads(1)
     if rivals:
         import shapely
         from scipy.spatial import ConvexHull
@@ -232,6 +236,39 @@ def build(n, make, random, rivals) -> Iterator[Row]:
         yield "scipy ConvexHull", clocked(lambda: ConvexHull(rows))
         yield "shapely convex_hull", clocked(lambda: shapely.convex_hull(shapely.multipoints(rows)))
         yield from rivals("static", rows, n)
+
+
+def threads(n, make, random, rivals) -> Iterator[Row]:
+    """Batches, a build and locate on one thread and on all of them, in turn: elapsed time, which needs idle cores."""
+    half = n // 2
+    rows = make(n + max(16 * BATCHES[-1], 2 * half), random)
+    queries = random.random((n, 2))
+    numbers = {"one thread": 1, "all threads": None}
+    hulls = {who: DynamicHull(rows[:n]) for who in numbers}
+    spent: dict[str, float] = {}
+
+    def turn(who, name, work, count):
+        dynhull.set_threads(numbers[who])
+        name = f"{who}, {name}"
+        spent[name] = spent.get(name, 0) + clocked(work, count, time.perf_counter)
+
+    done = 0
+    for size in (1_024, *BATCHES[1:], 2 * half):
+        ops = np.repeat(np.array([1, -1], np.int8), size // 2)
+        steps = max(1, min(16, half // size))
+        for _ in range(steps):
+            new, old = (np.arange(at, at + size // 2) % len(rows) for at in (n + done, done))
+            batch, done = np.concatenate([rows[new], rows[old]]), done + size // 2
+            for who, hull in hulls.items():
+                turn(who, f"batches of {size:,}", partial(hull.apply, ops, batch), size * steps)
+    for count in (QUERIES, n):
+        for who, hull in hulls.items():
+            hull.locate(queries)
+            turn(who, f"locate of {count:,}", partial(hull.locate, queries[:count]), count)
+    for who in numbers:
+        turn(who, "a build, a point", partial(DynamicHull, rows[:n]), n)
+    dynhull.set_threads(1)
+    yield from spent.items()
 
 
 def grown(points) -> DynamicHull:
@@ -296,12 +333,13 @@ def latency(n, make, random, rivals) -> Iterator[Row]:
     yield "dynhull, max", float(times.max())
 
 
-WORKS = {f.__name__: f for f in (window, vertex, locate, build, memory, call, latency, crossover)}
+WORKS = {f.__name__: f for f in (window, vertex, locate, build, threads, memory, call, latency, crossover)}
 UNITS = {"build": (1e3, "ms"), "memory": (1, "bytes a point"), "locate": (1e9, "ns"), "call": (1e6, "µs")}
 
 
 def measure(arguments) -> list[dict]:
     rivals = None if arguments.no_rivals else Rivals()
+    dynhull.set_threads(1)
     results = []
     for work in arguments.works:
         for kind in arguments.inputs:

@@ -204,6 +204,7 @@ def measure(arguments: argparse.Namespace, works: list[str]) -> None:
 
 
 def main() -> None:
+    dynhull.set_threads(1)  # the clock counts one
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "--sizes", nargs="+", type=number, default=[10**5, 10**6], help="numbers of entities (default 1e5 1e6)"

@@ -114,6 +114,7 @@ def number(text: str) -> int:
 
 
 def main() -> None:
+    dynhull.set_threads(1)  # the clock counts one
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--subjects", type=number, default=10**6, help="entities of the hull (default 1e6)")
     parser.add_argument("--fences", type=number, default=23_000, help="polygon fences (default 23000)")

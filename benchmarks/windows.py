@@ -60,6 +60,7 @@ def pairs(n: int, size: int, updates: int, share: float, longest: float) -> list
 
 
 def main() -> None:
+    dynhull.set_threads(1)  # the clock counts one
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", nargs="+", default=["1e5", "1e6"])
     parser.add_argument("--batches", nargs="+", type=int, default=[64, 8192, 65536])

@@ -89,7 +89,7 @@ class Team {
   using Clock = std::chrono::steady_clock;
   static constexpr auto WHILE_TAKEN = std::chrono::microseconds(200);
   static constexpr auto AFTERWARDS = std::chrono::microseconds(20);  // about what it costs to wake a thread
-  static constexpr unsigned LONGEST_ALONE = 63;                      // calls
+  static constexpr unsigned FIRST_ALONE = 16, LONGEST_ALONE = 255;   // calls
 
   // The fields of open_: the number of the run, its tasks, and how many of them are claimed.
   static constexpr unsigned ROUND = 32, TASKS = 16;
@@ -142,10 +142,10 @@ class Team {
     waits_ = false;
   }
 
-  // Twice as many calls alone each time that helpers are late.
+  // More than twice as many calls alone each time that helpers are late: on a busy machine nearly all calls are.
   void note_wait(Clock::duration worked, Clock::duration waited) {
     const bool late = waited > worked + WHILE_TAKEN;
-    late_ = late ? std::min(2 * late_ + 1, LONGEST_ALONE) : late_ / 2;
+    late_ = late ? std::min(2 * late_ + FIRST_ALONE, LONGEST_ALONE) : late_ / 2;
     if (late) alone_ = late_;
   }
 
