@@ -90,7 +90,7 @@ def test_watch_of_a_layer_and_of_few_vertices(hull):
     done = dynhull("watch", hull, "--events", 1, "--layer", 2, "--json")
     assert json.loads(done.stdout)["added"] == [[1, 1]]
     done = dynhull("watch", hull, "--events", 1, "--max-vertices", 2)
-    assert done.stdout == "1\t6\t2\t16.0\t16.0\t2.828427124746191\n"
+    assert done.stdout == "1\t6\t2\t16.0\t16.0\t2.8284271247461903\n"
     event = json.loads(dynhull("watch", hull, "--events", 1, "--max-vertices", 4, "--layer", 1, "--json").stdout)
     assert (event["vertices"], event["error"]) == ([[0, 0], [4, 0], [4, 4], [0, 4]], 0)
 
