@@ -54,6 +54,7 @@ def every_kind(client: HullClient) -> None:
     client.create_fence("around", area="area", subjects=Prefix("fleet/"), margin=0.25)
     client.create_fence("pack", area="fleet/b", subjects="fleet/b", without_self=True, margin=1.0)
     client.create_fence("numbers", area="area", subjects="numbered", boundary="open")
+    client.create_fence("inner", area="area", subjects=Prefix("fleet/"), layer=2)
     client.create_fence("meeting", area="area", other_hull="other")
     client.create_fence("near", area="area", other_hull="other", near=2.0)
     client.create_fence("zone", area=[[179.5, -17.5], [-179.5, -17.5], [-179.5, -16.5]], subjects="ships")
@@ -98,15 +99,15 @@ def test_fences_of_every_kind_are_whole(folder: tuple[Path, dict[str, Verificati
     data, found = folder
     assert {name: each.fence_differences for name, each in found.items() if not each.whole} == {}
     assert {name: each.fences for name, each in found.items() if each.fences} == {
-        "fleet/a": 6,
-        "fleet/b": 3,
+        "fleet/a": 7,
+        "fleet/b": 4,
         "numbered": 1,
         "other": 2,
         "ships": 3,
     }
     checked = run("check", data)
     assert (checked.returncode, checked.stderr) == (0, "")
-    assert checked.stdout.count("fence ") == 13
+    assert checked.stdout.count("fence ") == 14
     assert "WRONG" not in checked.stdout
 
 

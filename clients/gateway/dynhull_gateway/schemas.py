@@ -579,6 +579,7 @@ class FenceSettings(Request):
     min_dwell: Seconds | None = None
     near: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
     without_self: StrictBool = False
+    layer: Annotated[int, Field(strict=True, ge=1, le=1000)] = 1
     max_events: Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)] = 0
     max_event_age: Seconds | None = None
 
@@ -643,6 +644,7 @@ class Fence(Response):
     confirmations: int
     min_dwell: Span
     without_self: bool
+    layer: int
     max_events: int
     max_event_age: Span
     created: datetime

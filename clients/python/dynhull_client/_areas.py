@@ -77,12 +77,12 @@ def as_area(area: Any) -> Area:
     return area if isinstance(area, str | Circle) else tuple(_polygons(area, "area"))
 
 
-def encode_area(area: Area, without_self: bool, config: fence_pb2.FenceConfig) -> None:
-    """Add an area to the settings of a fence."""
+def encode_area(area: Area, without_self: bool, layer: int, config: fence_pb2.FenceConfig) -> None:
+    """Add an area to the settings of a fence; the layer as it is sent, 0 for the hull itself."""
     if isinstance(area, str):
-        config.hull_area.name, config.hull_area.without_self = area, without_self
-    elif without_self:
-        raise ValueError("without_self is for an area that is a hull")
+        config.hull_area.CopyFrom(fence_pb2.HullArea(name=area, without_self=without_self, layer=layer))
+    elif without_self or layer:
+        raise ValueError(f"{'without_self' if without_self else 'layer'} is for an area that is a hull")
     elif isinstance(area, Circle):
         config.circle_area.CopyFrom(fence_pb2.CircleArea(center_x=area.x, center_y=area.y, radius=area.r))
     else:

@@ -106,6 +106,7 @@ class Fence:
         confirmations: the number of reports that must agree; 0 for no such rule.
         min_dwell: the time on the other side before a subject enters or leaves; None for no such rule.
         without_self: whether each subject is compared with the hull of the others.
+        layer: the convex layer of the hull that is the area; 1 for the hull itself.
         max_events: the number of events to keep; 0 for the limit of the server.
         max_event_age: how long events are kept; None for no limit.
         created: when it was created.
@@ -139,6 +140,7 @@ class Fence:
     inside: int
     subject_count: int
     consumers: tuple[FenceConsumer, ...]
+    layer: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +241,7 @@ def decode_fence(message: fence_pb2.Fence) -> Fence:
         confirmations=config.confirmations,
         min_dwell=config.min_dwell.ToTimedelta() if config.HasField("min_dwell") else None,
         without_self=config.hull_area.without_self,
+        layer=config.hull_area.layer or 1,
         max_events=config.max_events,
         max_event_age=config.max_event_age.ToTimedelta() if config.HasField("max_event_age") else None,
         created=decode_time(message.create_time),

@@ -14,7 +14,7 @@ from dynhull_proto.v1 import fence_pb2
 from dynhull_proto.v1 import fence_service_pb2 as pb
 
 from ._areas import Prefix, as_area, encode_area
-from ._calls import Call, choice, text, whole
+from ._calls import Call, choice, encode_layer, text, whole
 from ._errors import FenceExistsError, FenceNotFoundError
 from ._fence_messages import (
     BOUNDARIES,
@@ -45,6 +45,7 @@ SETTINGS = (
     "confirmations",
     "min_dwell",
     "without_self",
+    "layer",
     "max_events",
     "max_event_age",
 )
@@ -65,6 +66,7 @@ def create_fence(
     min_dwell: float | timedelta | None = None,
     near: float = 0.0,
     without_self: bool = False,
+    layer: int = 1,
     max_events: int = 0,
     max_event_age: float | timedelta | None = None,
     exist_ok: bool = False,
@@ -94,6 +96,8 @@ def create_fence(
         near: with `other_hull`: the hulls are near while their distance is at most this.
         without_self: compare each subject that is a point of the area's hull with the hull of the others. The area is
             then the subjects' own hull, and there is a margin.
+        layer: the convex layer of the area's hull, as in `layers`; 1 is the hull itself. Each batch of that hull then
+            finds the layer anew.
         max_events: the number of events to keep; 0 for the limit of the server.
         max_event_age: how long events are kept.
         exist_ok: whether to return an existing fence of that name and with these settings. FenceExistsError if it has
@@ -136,6 +140,7 @@ def replace_fence(
     min_dwell: float | timedelta | None = None,
     near: float = 0.0,
     without_self: bool = False,
+    layer: int = 1,
     max_events: int = 0,
     max_event_age: float | timedelta | None = None,
     timeout: float | None = None,
@@ -288,7 +293,7 @@ def _config(area: Any, subjects: str | Prefix | None, given: dict[str, Any]) -> 
         min_dwell=_span(given["min_dwell"], "min_dwell"),
         max_event_age=_span(given["max_event_age"], "max_event_age"),
     )
-    encode_area(as_area(area), _flag("without_self", given["without_self"]), config)
+    encode_area(as_area(area), _flag("without_self", given["without_self"]), encode_layer(given["layer"]), config)
     if isinstance(subjects, Prefix):
         config.subject_prefix = text("subjects", subjects.text)
     elif subjects is not None:

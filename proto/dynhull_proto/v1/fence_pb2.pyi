@@ -149,12 +149,14 @@ class FenceConfig(_message.Message):
     def __init__(self, hull_area: _Optional[_Union[HullArea, _Mapping]] = ..., polygon_area: _Optional[_Union[PolygonArea, _Mapping]] = ..., circle_area: _Optional[_Union[CircleArea, _Mapping]] = ..., subject_hull: _Optional[str] = ..., subject_prefix: _Optional[str] = ..., other_hull: _Optional[str] = ..., boundary: _Optional[_Union[FenceBoundary, str]] = ..., margin: _Optional[float] = ..., near_distance: _Optional[float] = ..., initial: _Optional[_Union[FenceInitial, str]] = ..., report_crosses: bool = ..., dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., confirmations: _Optional[int] = ..., min_dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_events: _Optional[int] = ..., max_event_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ...) -> None: ...
 
 class HullArea(_message.Message):
-    __slots__ = ("name", "without_self")
+    __slots__ = ("name", "without_self", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]
     WITHOUT_SELF_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
     name: str
     without_self: bool
-    def __init__(self, name: _Optional[str] = ..., without_self: bool = ...) -> None: ...
+    layer: int
+    def __init__(self, name: _Optional[str] = ..., without_self: bool = ..., layer: _Optional[int] = ...) -> None: ...
 
 class PolygonArea(_message.Message):
     __slots__ = ("polygons",)

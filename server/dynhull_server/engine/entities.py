@@ -13,13 +13,13 @@ from dynhull.keys import take_keys
 
 from ..state.batch import NO_POINTS
 from ..state.contents.keyed import Found, Keyed
+from ..state.contents.live import layer_of
 from ..state.errors import HullEmptyError
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.numbers import rows_of
 from ..state.outline import Outline
 from ..state.records import Contents, Keys
 from ..state.sample import sample_rows
-from .layers import layer_of
 from .live_hull import LiveHull
 from .steps import BLOCK, Run, in_blocks
 
@@ -74,7 +74,7 @@ async def ask_of_keys(
     def ask(state: HullState, keyed: HullState) -> tuple[Found, npt.NDArray[Any] | None, Points]:
         found = _keyed(keyed).find(keys)
         if layer > 1:
-            return found, None, layer_of(state, layer)
+            return found, None, layer_of(state.hull, layer)
         if len(keys) > BLOCK or hull.geographic:
             return found, None, state.vertices()
         return found, question(state.outline(), _known(found)), NO_POINTS

@@ -148,12 +148,6 @@ class Peeling:
         return Layers(peeled.counts, layers, keys)
 
 
-def layer_of(state: HullState, number: int) -> Points:
-    """The vertices of a layer, from 1, during a read; none if the points run out before."""
-    layers = state.hull.layers(number)
-    return layers[-1] if len(layers) == number else NO_POINTS
-
-
 def _copy(state: HullState) -> AnyHull:
     return state.hull.copy()
 

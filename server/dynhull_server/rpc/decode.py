@@ -218,10 +218,10 @@ def decode_view(view: hull_service_pb2.HullView) -> bool:
     return view != hull_service_pb2.HULL_VIEW_BASIC
 
 
-def decode_layer(request: Any) -> int:
+def decode_layer(request: Any, field: str = "layer") -> int:
     """The number of the convex layer that a request is about, from 1."""
     if request.layer > MOST_LAYERS:
-        raise InvalidFieldError("layer", request.layer, f"must be at most {MOST_LAYERS}")
+        raise InvalidFieldError(field, request.layer, f"must be at most {MOST_LAYERS}")
     return int(request.layer) or 1
 
 

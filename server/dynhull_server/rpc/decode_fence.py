@@ -8,7 +8,16 @@ import numpy as np
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
 from ..state.fences.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
-from .decode import LARGEST_INTEGER, NAME, NAME_CHARACTERS, NAME_WORDS, InvalidFieldError, decode_name, decode_points
+from .decode import (
+    LARGEST_INTEGER,
+    NAME,
+    NAME_CHARACTERS,
+    NAME_WORDS,
+    InvalidFieldError,
+    decode_layer,
+    decode_name,
+    decode_points,
+)
 from .decode_settings import decode_duration
 
 BOUNDARIES = {
@@ -88,7 +97,9 @@ def _decode_subjects(config: fence_pb2.FenceConfig) -> tuple[SubjectKind, str]:
 def _decode_area(config: fence_pb2.FenceConfig, most_corners: int) -> Area:
     match config.WhichOneof("area"):
         case "hull_area":
-            return HullArea(decode_name(config.hull_area.name, "config.hull_area.name"), config.hull_area.without_self)
+            area = config.hull_area
+            name = decode_name(area.name, "config.hull_area.name")
+            return HullArea(name, area.without_self, decode_layer(area, "config.hull_area.layer"))
         case "circle_area":
             return _decode_circle(config.circle_area)
         case "polygon_area":
@@ -142,6 +153,11 @@ def _refuse_contradictions(config: FenceConfig) -> None:
     area = config.area
     if config.kind == "other":
         _refuse_for_other_hull(config)
+    if config.area_layer > 1:
+        if config.kind == "other":
+            raise InvalidFieldError("config.hull_area.layer", config.area_layer, "only for keys, not with other_hull")
+        if isinstance(area, HullArea) and area.without_self:
+            raise InvalidFieldError("config.hull_area.layer", config.area_layer, "cannot be combined with without_self")
     if isinstance(area, HullArea) and area.without_self:
         field = "config.hull_area.without_self"
         if config.kind != "hull" or area.name != config.subjects:

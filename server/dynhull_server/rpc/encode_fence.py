@@ -59,6 +59,7 @@ def encode_config(config: FenceConfig) -> fence_pb2.FenceConfig:
     if isinstance(area, HullArea):
         message.hull_area.name = area.name
         message.hull_area.without_self = area.without_self
+        message.hull_area.layer = area.layer if area.layer > 1 else 0
     elif isinstance(area, CircleArea):
         message.circle_area.center_x, message.circle_area.center_y = area.x, area.y
         message.circle_area.radius = area.radius

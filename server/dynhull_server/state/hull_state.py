@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points
 
-from .batch import Applied
+from .batch import NO_POINTS, Applied
 from .contents import replayed
-from .contents.live import AnyKeyedHull
+from .contents.live import AnyKeyedHull, layer_of
 from .contents.places import GeographicHull
 from .errors import HullUnsuitableError, MisfitError, RefusedError
 from .history import History
@@ -79,6 +79,7 @@ class HullState:
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
         self._changed_at = self.counts.revision
+        self._layers: dict[int, tuple[int, Points]] = {}  # those that fences ask for
         self._vertex_keys: VertexKeys | None = None
         self._keys_as_of = -1
         self._history = History(limits.history_bytes, self._vertices, self.counts.revision)
@@ -252,6 +253,18 @@ class HullState:
             self._vertices_as_of = self.hull.changes
             self._history.record(self._changed_at, self._vertices)
         return self._vertices
+
+    def layer(self, number: int) -> Points:
+        """The vertices of a convex layer, from 1; none if the points run out. The same array until they change."""
+        if number == 1:
+            return self.vertices()
+        revision, vertices = self._layers.get(number, (-1, NO_POINTS))
+        if revision != self.counts.revision:
+            found = layer_of(self.hull, number)
+            if revision < 0 or not np.array_equal(found, vertices):
+                vertices = found
+            self._layers[number] = self.counts.revision, vertices
+        return vertices
 
     def outline(self) -> Outline:
         """What answers queries that depend on the vertices alone: the hull itself or, on the globe, its outline."""

@@ -70,6 +70,7 @@ WithoutSelf = Annotated[
     bool,
     typer.Option("--without-self", help="Compare each subject with the hull of the others; needs a margin."),
 ]
+Layer = Annotated[int, typer.Option(min=1, max=1000, help="The convex layer of --area; 1 is the hull itself.")]
 MaxEvents = Annotated[int, typer.Option(help="Number of events to keep; 0 for the limit of the server.")]
 MaxEventAge = Annotated[str | None, typer.Option(help="How long events are kept: 12h or 7d. Default: no limit.")]
 
@@ -89,6 +90,7 @@ def _settings(
     min_dwell: MinDwell = None,
     near: Near = 0.0,
     without_self: WithoutSelf = False,
+    layer: Layer = 1,
     max_events: MaxEvents = 0,
     max_event_age: MaxEventAge = None,
 ) -> dict[str, Any]:
@@ -116,6 +118,7 @@ def _settings(
         "min_dwell": duration(min_dwell, "--min-dwell"),
         "near": near,
         "without_self": without_self,
+        "layer": layer,
         "max_events": max_events,
         "max_event_age": duration(max_event_age, "--max-event-age"),
     }

@@ -87,6 +87,7 @@ def settings_text(fence: Fence) -> str:
     found += [f"margin {fence.margin:g}"] if fence.margin else []
     found += [f"near {fence.near:g}"] if fence.near else []
     found += ["without self"] if fence.without_self else []
+    found += [f"layer {fence.layer}"] if fence.layer > 1 else []
     found += ["crosses"] if fence.crosses else []
     found += [f"dwell {shown(fence.dwell)}"] if fence.dwell else []
     found += [f"{fence.confirmations} confirmations"] if fence.confirmations > 1 else []

@@ -4,8 +4,9 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 from dynhull import DynamicHull, GeoHull, GeoKeyedHull, GeoWindowHull, KeyedHull, WindowHull
+from dynhull.arrays import Points
 
-from ..batch import Applied
+from ..batch import NO_POINTS, Applied
 from ..frames import Globe
 from ..records import Center, Contents, Expiry, Record, Rows
 
@@ -80,3 +81,11 @@ class LiveContents(Protocol):
 
     def stored(self) -> Contents:
         """The points, for a snapshot. O(n log n)."""
+
+
+def layer_of(hull: AnyHull, number: int) -> Points:
+    """The vertices of a convex layer, from 1; none if the points run out before. O(log² n) for each of those before."""
+    if number == 1:
+        return hull.vertices()
+    layers = hull.layers(number)
+    return layers[-1] if len(layers) == number else NO_POINTS

@@ -11,10 +11,14 @@ Ring = bytes  # the corners as pairs of little-endian doubles
 
 @dataclass(frozen=True, slots=True)
 class HullArea:
-    """A live hull as an area. With `without_self` each subject is compared with the hull of the others."""
+    """A live hull as an area, or one of its convex layers, from 1.
+
+    With `without_self` each subject is compared with the hull of the others.
+    """
 
     name: str
     without_self: bool = False
+    layer: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +84,11 @@ class FenceConfig:
     def area_hull(self) -> str | None:
         """The name of the hull that is the area, None for other areas."""
         return self.area.name if isinstance(self.area, HullArea) else None
+
+    @property
+    def area_layer(self) -> int:
+        """The convex layer of the hull that is the area; 1 for other areas."""
+        return self.area.layer if isinstance(self.area, HullArea) else 1
 
     @property
     def corners(self) -> int:

@@ -7,7 +7,7 @@ from dynhull import FenceIndex, KeyedHull
 from ..errors import InvalidFenceError
 from ..hull import Hull
 from .config import CircleArea, FenceConfig, PolygonArea
-from .subjects import Subjects, lay
+from .subjects import Subjects, area_vertices, lay
 
 POINT_BYTES = 16
 # How the library names a ring.
@@ -17,16 +17,15 @@ RING = re.compile(r"polygon (\d+)(?: ring (\d+):?)? (.*)", re.DOTALL)
 def check(config: FenceConfig, area: Hull | None) -> None:
     """Raise InvalidFenceError if the area of a fence without subjects is invalid."""
     try:
-        lay(FenceIndex(KeyedHull("str")), 0, config, None if area is None else area.state.vertices())
+        lay(FenceIndex(KeyedHull("str")), 0, config, area_vertices(config, area))
     except ValueError as error:
         raise _invalid(config, str(error)) from None
 
 
 def lay_area(subjects: Subjects, number: int, config: FenceConfig, area: Hull | None) -> None:
     """Add the area of a fence, or replace it, or raise InvalidFenceError."""
-    vertices = None if area is None else area.state.vertices()
     try:
-        subjects.lay(number, config, vertices)
+        subjects.lay(number, config, area_vertices(config, area))
     except ValueError as error:
         raise _invalid(config, str(error)) from None
 

@@ -4,13 +4,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from dynhull import Crossings
+from dynhull.arrays import Points
 
 from ..hull import Hull
 from .fence import Fence
 from .on_globe import require_frames
 from .pair import Pair
 from .records import Cause
-from .subjects import Subjects
+from .subjects import Subjects, area_vertices
+
+# Finding an inner layer takes about as long as so many rows of a batch.
+PEELED = 2048
 
 
 @dataclass(slots=True)
@@ -21,11 +25,32 @@ class AreaHull:
         hull: the hull.
         fences: the fences by number.
         as_of: the hull's count of changes when the fences last got its vertices.
+        layers: the vertices of its inner layers that fences got last, by number.
     """
 
     hull: Hull
     fences: dict[int, Fence] = field(default_factory=dict)
     as_of: int = -1
+    layers: dict[int, Points] = field(default_factory=dict)
+
+    @property
+    def layered(self) -> bool:
+        """Whether an inner layer is the area of a fence, so that any point may change it."""
+        return any(fence.row.config.area_layer > 1 for fence in self.fences.values())
+
+    def moved(self) -> Iterator[tuple[Fence, Points]]:
+        """The fences whose area has perhaps changed since this was last called, with its vertices."""
+        state = self.hull.state
+        outline_changed, self.as_of = self.as_of != state.hull.changes, state.hull.changes
+        held, self.layers = self.layers, {}
+        for fence in self.fences.values():
+            number = fence.row.config.area_layer
+            if number > 1:
+                vertices = self.layers[number] = state.layer(number)
+                if vertices is not held.get(number):
+                    yield fence, vertices
+            elif outline_changed:
+                yield fence, state.vertices()
 
 
 class Line:
@@ -101,8 +126,7 @@ class Line:
         require_frames(fences[0].row.config, hull, None)
         subjects = self.subjects[hull.name] = Subjects(hull)
         for fence in fences:
-            vertices = None if fence.area is None else fence.area.state.vertices()
-            subjects.lay(fence.number, fence.row.config, vertices)
+            subjects.lay(fence.number, fence.row.config, area_vertices(fence.row.config, fence.area))
             subjects.fences[fence.number] = fence
             fence.subjects = fence.subjects | {hull.name: subjects}
 
@@ -116,7 +140,9 @@ class Line:
     def weight(self, name: str) -> int:
         """The number of subjects that a change of a hull may concern beside its own rows."""
         area = self.areas.get(name)
-        return 0 if area is None else sum(fence.subject_count for fence in area.fences.values())
+        if area is None:
+            return 0
+        return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0)
 
     def comparing(self, name: str) -> list[Fence]:
         """The fences that compare the keys of a hull, and those that compare it as a whole with their areas."""
@@ -133,13 +159,10 @@ class Line:
             if subjects is not None:
                 touched[name] = subjects
             area = self.areas.get(name)
-            if area is not None and area.as_of != hull.state.hull.changes:
-                vertices = hull.state.vertices()
-                for fence in area.fences.values():
-                    for each in fence.subjects.values():
-                        each.lay(fence.number, fence.row.config, vertices)
-                    touched |= fence.subjects
-                area.as_of = hull.state.hull.changes
+            for fence, vertices in () if area is None else area.moved():
+                for each in fence.subjects.values():
+                    each.lay(fence.number, fence.row.config, vertices)
+                touched |= fence.subjects
         for _, subjects in sorted(touched.items()):
             crossings = subjects.take()
             if len(crossings):

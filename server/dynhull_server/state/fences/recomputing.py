@@ -20,6 +20,7 @@ from .fence import Fence
 from .on_globe import outline, projected, rings_of
 from .pair import nearness
 from .records import Delay, Key
+from .subjects import area_vertices
 
 Rows = npt.NDArray[np.intp]
 NO_ROW = -1
@@ -92,7 +93,7 @@ def sides_of(name: str, fences: Iterable[Fence]) -> Sides:
         subjects = fence.subjects[name]
         if found.contents is None:
             found.contents, found.center = subjects.hull.state.entities(), subjects.hull.state.center
-        vertices_of_area = None if fence.area is None else fence.area.state.vertices()
+        vertices_of_area = area_vertices(config, fence.area)
         delays = {} if fence.delays is None else dict(fence.delays.of(name))
         inside = subjects.index.inside(fence.number)
         found.sides.append(Side(fence.name, config, vertices_of_area, inside, delays))

@@ -56,7 +56,7 @@ def restore(subjects: Iterable[Subjects], states: Mapping[str, HullState], kept:
             config = kept[number].row.config
             vertices = None
             if fence.area is not None:
-                vertices = states.get(fence.area.name, fence.area.state).vertices()
+                vertices = states.get(fence.area.name, fence.area.state).layer(config.area_layer)
             reported = inside[number].get(each.hull.name, set())
             members = each.keys(reported ^ delayed[number, each.hull.name])
             lay(index, number, config, vertices, members, frame_of(state))

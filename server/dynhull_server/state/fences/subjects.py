@@ -100,7 +100,7 @@ class Subjects:
             hull = fence.area if replaced is None else area
             away = (crossings.fences == number) & (distances > 0) & (distances < np.inf)
             if away.any():
-                rings = rings_of(config.area, None if hull is None else hull.state.vertices())
+                rings = rings_of(config.area, area_vertices(config, hull))
                 distances[away] = metres(rings, points[away])
         return replace(crossings, points=points, previous=before, distances=distances)
 
@@ -132,7 +132,7 @@ class Subjects:
         if not config.margin and not outside.any():
             return [0.0] * len(keys)
         own = isinstance(config.area, HullArea) and config.area.without_self
-        vertices = None if area is None else area.state.vertices()
+        vertices = area_vertices(config, area)
         if self.hull.state.center is not None:  # there are no margins
             found = np.zeros(len(keys))
             empty = vertices is not None and not len(vertices)
@@ -158,6 +158,11 @@ class Subjects:
         if self.hull.row.settings.identity == "str":
             return PackedKeys.pack(sorted(map(str, keys), key=str.encode))
         return np.array(sorted(map(int, keys)), np.uint64)
+
+
+def area_vertices(config: FenceConfig, area: Hull | None) -> Points | None:
+    """The vertices of the hull that is the area of a fence, or of its layer; None for other areas."""
+    return None if area is None else area.state.layer(config.area_layer)
 
 
 def lay(

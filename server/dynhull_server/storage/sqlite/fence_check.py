@@ -11,6 +11,7 @@ from dynhull.arrays import Points
 from dynhull.keys import Keys, PackedKeys
 
 from ...state.contents import replayed
+from ...state.contents.live import layer_of
 from ...state.fences.config import FenceConfig
 from ...state.fences.event_order import EventOrder
 from ...state.fences.faults import FenceFault
@@ -72,7 +73,7 @@ class _Check:
         self._ledger = ledger
         self._hulls = {hull.row.name: hull for hull in ledger.hulls.values()}
         self._names = sorted(self._hulls)
-        self._outlines: dict[str, tuple[Points, Center | None]] = {}
+        self._outlines: dict[tuple[str, int], tuple[Points, Center | None]] = {}
 
     def run(self) -> list[FenceReport]:
         fences = sorted(self._ledger.fences.values(), key=lambda fence: fence.row.name)
@@ -142,7 +143,7 @@ class _Check:
                 continue
             if found.contents is None:
                 found.contents, found.center = self._contents(hull)
-            corners = None if area is None else self._outline(area)[0]
+            corners = None if area is None else self._outline(area, config.area_layer)[0]
             keys = _packed(each.sides.get(name, []), identity)
             delays = {key: delay for (of, key), delay in each.kept.delays.items() if of == name}
             found.sides.append(Side(each.report.name, config, corners, keys, delays))
@@ -152,14 +153,14 @@ class _Check:
         contents = replayed(read_hull(self._connection, hull, NEWEST), hull.row.settings)
         return contents.stored(), None if contents.globe is None else contents.globe.center
 
-    def _outline(self, name: str) -> tuple[Points, Center | None]:
-        """The vertices of a hull, and its centre."""
-        if name not in self._outlines:
+    def _outline(self, name: str, layer: int = 1) -> tuple[Points, Center | None]:
+        """The vertices of a hull, or of another convex layer, and its centre."""
+        if (name, layer) not in self._outlines:
             hull = self._hulls[name]
             contents = replayed(read_hull(self._connection, hull, NEWEST), hull.row.settings)
             center = None if contents.globe is None else contents.globe.center
-            self._outlines[name] = contents.hull.vertices(), center
-        return self._outlines[name]
+            self._outlines[name, layer] = layer_of(contents.hull, layer), center
+        return self._outlines[name, layer]
 
 
 def _packed(keys: list[Key], identity: str) -> Keys:

@@ -89,6 +89,8 @@ def _area_as_json(area: Area) -> dict[str, Any]:
         rings = [[base64.b64encode(ring).decode() for ring in polygon] for polygon in area.polygons]
         return {"polygons": rings}
     if isinstance(area, HullArea):
+        if area.layer > 1:  # no "hull": servers that know no layers are not to take it for the hull itself
+            return {"layer": area.layer, "of": area.name}
         return {"hull": area.name, "without_self": area.without_self}
     return {"circle": [area.x, area.y, area.radius]}
 
@@ -99,6 +101,8 @@ def _area_from_json(found: dict[str, Any]) -> Area:
         return PolygonArea(tuple(rings))
     if "hull" in found:
         return HullArea(found["hull"], found["without_self"])
+    if "layer" in found:
+        return HullArea(found["of"], layer=found["layer"])
     return CircleArea(*found["circle"])
 
 
