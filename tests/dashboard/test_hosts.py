@@ -1,15 +1,18 @@
 """The dashboard answers only under its own names, and only to its own pages."""
 
+import asyncio
 import http.client
 import re
 import urllib.request
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import urlsplit
 
 import pytest
 from dashboard_process import dashboard_process
 from patience import PATIENCE
 from server_process import run
+from tornado.websocket import websocket_connect
 
 from dynhull_dashboard.page import VENDOR
 
@@ -120,3 +123,22 @@ def page_and_scripts(dashboard: str) -> str:
     with urllib.request.urlopen(f"http://{dashboard}/", timeout=PATIENCE) as answered:
         text: str = answered.read().decode()
     return text
+
+
+@pytest.mark.parametrize(
+    "sent", ["{", "[]", '{"hulls": 3}', '{"fences": [1]}', '{"hulls": ["\\ud800"]}', '{"other": ""}']
+)
+def test_a_page_that_asks_for_nonsense_is_closed(dashboard: str, sent: str) -> None:
+    async def closed() -> tuple[int | None, str | None]:
+        async with asyncio.timeout(PATIENCE):
+            socket = await websocket_connect(f"ws://{dashboard}/live?hull=none")
+            await socket.read_message()
+            await socket.write_message(sent)
+            while await socket.read_message() is not None:
+                pass
+            return socket.close_code, socket.close_reason
+
+    with ThreadPoolExecutor() as threads:  # in this one, the event loop of a browser may be running
+        code, _ = threads.submit(asyncio.run, closed()).result()
+    assert code == 1003
+    assert status(dashboard, "/") == http.HTTPStatus.OK

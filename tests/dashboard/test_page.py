@@ -350,6 +350,19 @@ def test_old_drawings_are_thinned_and_forgotten(browser: Browser, url: str) -> N
     assert 3350 < kept["revision"] <= 3400
 
 
+def test_a_trail_goes_back_for_a_minute(browser: Browser, url: str) -> None:
+    with opened(browser, url, "none") as page:
+        places = page.evaluate("""() => {
+            const trails = new Trails(), traced = []
+            for (let second = 0; second < 200; second += 0.5)
+                trails.take({kind: "points", hull: "a", keys: ["k"], x: [second], y: [0]}, 1000 * second)
+            const canvas = {moveTo: across => traced.push(across), lineTo: across => traced.push(across)}
+            trace_back(canvas, {place: (x, y) => [x, y]}, [150.5, 0], trails.hulls.get("a").get("k"), 150_500)
+            return traced
+        }""")
+        assert places == [150.5, *range(150, 90, -1)]
+
+
 def test_no_page_asks_another_host(browser: Browser, url: str, client: HullClient, name: str) -> None:
     client.create_hull(name, keyed="str", geographic=True, center=(10, 50))
     client.put(name, ["a", "b", "c"], [[10, 50], [10.1, 50], [10, 50.1]])
