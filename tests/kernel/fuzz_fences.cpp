@@ -4,7 +4,8 @@
 //
 // Without seeds, random ones until the time is up. Two hulls with an index each live the same life; in one of them some
 // allocations fail on purpose: then everything has to be as it was. Who is inside is compared with a model that looks
-// at every subject for every fence, except around the subjects' own hull.
+// at every subject for every fence, except around the subjects' own hull. In every fourth life keys go over between
+// hulls.
 #include <cstring>
 #include <map>
 #include <random>
@@ -48,6 +49,17 @@ struct Modelled {
 };
 // What a hull answers, in a form that two of them share.
 using Row = std::tuple<std::int64_t, std::string, int, int, std::array<std::uint64_t, 5>>;
+
+// Whether a subject is inside, given whether it was.
+bool stays(const Area& area, Point p, bool was) {
+  if (area.holds(p)) return true;
+  if (!was || area.margin == 0) return false;
+  if (area.where(p) == 0) return true;
+  if (area.kind == Area::Kind::DISK) return compare_distance(p, area.center, area.radius, area.margin) <= 0;
+  bool near = false;
+  area.for_each_edge([&](Edge edge) { near = near || compare_distance(p, nearest_part(p, edge), area.margin) <= 0; });
+  return near;
+}
 
 // A hull and its index.
 struct Indexed {
@@ -315,15 +327,6 @@ class Life {
     frail_.fences->check();
     compare_with_model();
   }
-  static bool stays(const Area& area, Point p, bool was) {
-    if (area.holds(p)) return true;
-    if (!was || area.margin == 0) return false;
-    if (area.where(p) == 0) return true;
-    if (area.kind == Area::Kind::DISK) return compare_distance(p, area.center, area.radius, area.margin) <= 0;
-    bool near = false;
-    area.for_each_edge([&](Edge edge) { near = near || compare_distance(p, nearest_part(p, edge), area.margin) <= 0; });
-    return near;
-  }
 
   // Both hulls report the same, and as the model: at any time, the state of the last decision.
   void compare() {
@@ -360,9 +363,172 @@ class Life {
   std::map<std::int64_t, Modelled> fences_;
 };
 
+// Keys that go over between two hulls, whose indexes have some of their fences in common.
+class Transfers {
+ public:
+  explicit Transfers(std::uint64_t seed)
+      : random_(seed),
+        strings_(below(2) == 0),
+        keys_(1 + below(below(2) == 0 ? 12 : 300)),
+        sides_{Side(strings_), Side(strings_)} {}
+
+  void live() {
+    for (std::uint64_t round = 3 + below(30); round > 0; --round) {
+      if (below(3) == 0) set();
+      change();
+      carry(0, 1);
+      carry(1, 0);
+      for (Side& side : sides_) take(side);
+    }
+  }
+
+ private:
+  // A hull, its index, and what both should have.
+  struct Side {
+    explicit Side(bool strings) : hull(strings) {}
+    Indexed hull;
+    std::map<std::string, Point> before, now;  // as of the last decision, and since then
+    std::map<std::int64_t, Area> areas;
+    std::map<std::int64_t, std::set<std::string>> inside;
+    std::set<std::string> removed, carried;  // since then
+  };
+
+  std::uint64_t below(std::uint64_t n) { return n > 0 ? random_() % n : 0; }
+  std::string key() {
+    const std::string number = std::to_string(below(keys_));
+    return strings_ ? "k" + number : number;
+  }
+  Point point() { return {static_cast<double>(below(13)), static_cast<double>(below(13))}; }
+
+  template <class Work>
+  void with_keys(const std::vector<std::string>& rows, Work work) {
+    std::vector<std::uint8_t> lengths;
+    std::string data;
+    std::vector<std::uint64_t> integers;
+    for (const std::string& key : rows) {
+      lengths.push_back(static_cast<std::uint8_t>(key.size()));
+      data += key;
+      integers.push_back(strings_ ? 0 : std::stoull(key));
+    }
+    if (strings_)
+      work(StringKeys(lengths.data(), data.data(), rows.size()));
+    else
+      work(IntegerKeys(integers.data(), rows.size()));
+  }
+
+  // A fence of one hull or of both.
+  void set() {
+    const auto number = static_cast<std::int64_t>(below(6));
+    const double margin = below(3) == 0 ? static_cast<double>(below(3)) : 0;
+    const Area area = Area::of_disk(point(), static_cast<double>(below(6)), below(2) == 0, margin);
+    for (Side& side : sides_) {
+      if (below(4) == 0) continue;
+      if (side.areas.contains(number)) side.hull.fences->drop(number);
+      side.hull.fences->set(side.hull.tree.plane(), number, area, false, false, nullptr);
+      side.areas.insert_or_assign(number, area);
+      std::set<std::string>& inside = side.inside[number];
+      inside.clear();
+      for (const auto& [key, place] : side.now)
+        if (area.holds(place)) inside.insert(key);
+    }
+  }
+
+  // Each key changes at most once in each hull, mostly so that it goes over.
+  void change() {
+    std::set<std::string> chosen;
+    for (std::uint64_t count = below(20); count > 0; --count) chosen.insert(key());
+    for (const std::string& key : chosen)
+      for (Side& side : sides_) {
+        const bool there = side.now.contains(key);
+        if (below(6) == 0) continue;
+        if (there && below(4) != 0) {
+          with_keys({key}, [&](const auto& keys) { side.hull.entities.remove(side.hull.tree, keys, true); });
+          side.now.erase(key);
+          side.removed.insert(key);
+        } else {
+          const Point place = point();
+          const double time = 0;
+          with_keys({key}, [&](const auto& keys) {
+            Puts puts(side.hull.tree.frame(), &place, &time, false, 1);
+            side.hull.entities.put(side.hull.tree, keys, puts, Only::ALL);
+          });
+          side.now[key] = place;
+        }
+      }
+  }
+
+  // As the binding does it.
+  void carry(int from, int to) {
+    Side &source = sides_[from], &target = sides_[to];
+    std::set<std::string> asked;
+    for (std::uint64_t count = below(2 * keys_); count > 0; --count) asked.insert(key());
+    const std::vector<std::string> rows(asked.begin(), asked.end());
+    std::set<std::string> carried;
+    with_keys(rows, [&](const auto& keys) {
+      std::vector<std::string> names;
+      for (std::size_t row = 0; row < keys.size(); ++row) names.emplace_back(keys.bytes_of(row));
+      Departures departures = source.hull.fences->departures(names), arrived;
+      target.hull.entities.find(keys, [&](std::size_t row, std::uint32_t, std::uint32_t slot) {
+        const auto departure = departures.find(names[row]);
+        if (slot == NONE || departure == departures.end()) return;
+        if (!target.hull.fences->arrive(slot, departure->second)) return;
+        carried.insert(rows[row]);
+        arrived.insert(departures.extract(departure));
+      });
+      source.hull.fences->give(arrived);
+    });
+    std::set<std::string> expected;
+    for (const std::string& key : rows)
+      if (source.removed.contains(key) && source.before.contains(key) && target.now.contains(key) &&
+          !target.before.contains(key))
+        expected.insert(key);
+    require(carried == expected, "other keys go over than in the model");
+    for (auto& [number, inside] : source.inside) {
+      const auto there = target.inside.find(number);
+      if (there == target.inside.end()) continue;
+      for (const std::string& key : expected)
+        if (inside.erase(key) > 0) there->second.insert(key);
+    }
+    target.carried.insert(expected.begin(), expected.end());
+  }
+
+  void take(Side& side) {
+    std::set<std::tuple<std::int64_t, std::string, int>> found, expected;
+    for (const Row& row : side.hull.take()) found.emplace(std::get<0>(row), std::get<1>(row), std::get<2>(row));
+    for (auto& [number, inside] : side.inside) {
+      std::set<std::string> now;
+      for (const auto& [key, place] : side.now)
+        if (stays(side.areas.at(number), place, inside.contains(key))) now.insert(key);
+      for (const std::string& key : now) {
+        if (!inside.contains(key)) expected.emplace(number, key, +1);
+        if (inside.contains(key) && side.carried.contains(key)) expected.emplace(number, key, 2);
+      }
+      for (const std::string& key : inside)
+        if (!now.contains(key)) expected.emplace(number, key, -1);
+      inside = std::move(now);
+      const std::vector<std::string> keys = side.hull.inside(number);
+      require(std::set<std::string>(keys.begin(), keys.end()) == inside, "who is inside differs from the model");
+    }
+    require(found == expected, "crossings of keys that go over differ from the model");
+    side.hull.fences->check();
+    side.before = side.now;
+    side.removed.clear();
+    side.carried.clear();
+  }
+
+  std::mt19937_64 random_;
+  bool strings_;
+  std::uint64_t keys_;
+  std::array<Side, 2> sides_;
+};
+
 }  // namespace
 
 int main(int count, char** words) {
-  return fuzz_lives(count, words, "lives of fences, leaves of " + std::to_string(LEAF),
-                    [](std::uint64_t seed) { Life(seed).live(); });
+  return fuzz_lives(count, words, "lives of fences, leaves of " + std::to_string(LEAF), [](std::uint64_t seed) {
+    if (seed % 4 == 3)
+      Transfers(seed).live();
+    else
+      Life(seed).live();
+  });
 }

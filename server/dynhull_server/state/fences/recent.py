@@ -31,18 +31,27 @@ class RecentEvents:
 
     def add(self, block: EventBlock, number: int) -> None:
         """Add the events of a trip; `number` is the number of fences that there are. O(runs), as a rule O(1)."""
-        self._small.append(block)
-        self._waiting += len(block)
         self._bytes += block.bytes
+        if len(block) >= LEAST_EVENTS:  # it is not copied
+            self._join()
+            self._blocks.append(block)
+        else:
+            self._small.append(block)
+            self._waiting += len(block)
         if self._waiting >= LEAST_EVENTS or len(self._small) == MOST_SMALL:
-            self._blocks.append(joined(self._small))
-            self._small, self._waiting = [], 0
+            self._join()
         most = min(self._bytes_a_fence * number, MOST_BYTES)
         while self._bytes > most and len(self._blocks) + len(self._small) > 1:
             if not self._blocks:
                 self._blocks.append(self._small.pop(0))
                 self._waiting -= len(self._blocks[0])
             self._bytes -= self._blocks.popleft().bytes
+
+    def _join(self) -> None:
+        """Let the small blocks be one of the others."""
+        if self._small:
+            self._blocks.append(joined(self._small))
+            self._small, self._waiting = [], 0
 
     def events(self, number: int, after: int, most: int) -> list[FenceEvent] | None:
         """At most that many events of a fence after a sequence that is not the last; None if the next is not there.
