@@ -128,6 +128,7 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/fences/fence_torture.py --steps 1000000
 	$(BIN)/python tests/robustness/fences/kill_torture.py --steps 1000000 --kills 1000
 	$(BIN)/python tests/robustness/bridges/relay_torture.py --kills 100
+	$(BIN)/python tests/robustness/bridges/ingest_torture.py --kills 50
 
 SEED ?= 1
 MUTANTS ?= 200

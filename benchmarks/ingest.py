@@ -8,10 +8,12 @@ Broker, ingest and a durable server share the machine. Keys are those of 10,000 
   one acknowledged.
 * `JetStream, 100 points`: 100 points in a message.
 * `reading alone`: a program that only reads the same messages, with nats-py's pull consumer.
-* `MQTT`: Mosquitto, QoS 1, a message for each point, published meanwhile by another process as fast as the broker takes
+* `MQTT`: Mosquitto, QoS 1, a message for each point, published meanwhile by `mosquitto_pub` as fast as the broker takes
   them, until the server has the last one; `max_inflight_messages 1000`.
+* `reading alone` of MQTT: `mosquitto_sub` reads the same messages at QoS 1, published in the same way.
 
-Points a second: the median, the least and the greatest of the runs. Debian: `apt-get install nats-server mosquitto`.
+Points a second: the median, the least and the greatest of the runs. Debian: `apt-get install nats-server mosquitto
+mosquitto-clients`.
 """
 
 import argparse
@@ -30,8 +32,6 @@ from pathlib import Path
 
 import nats
 from nats.js.api import AckPolicy, ConsumerConfig
-from paho.mqtt.client import Client
-from paho.mqtt.enums import CallbackAPIVersion
 
 from dynhull_client import HullClient, HullNotFoundError
 
@@ -107,15 +107,49 @@ def jetstream(address: str, folder: Path, messages: int, points: int) -> tuple[f
     return taken, alone
 
 
-def mqtt(address: str, folder: Path, messages: int) -> float:
+@contextmanager
+def mosquitto(folder: Path) -> Iterator[int]:
+    """A broker that holds back nothing; yields its port."""
     config = folder / "mosquitto.conf"
-    hull = f"h{time.time_ns()}"
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     settings = ["user root", f"listener {port} 127.0.0.1", "allow_anonymous true"]
     config.write_text("\n".join([*settings, "max_inflight_messages 1000", "max_queued_messages 0", ""]))
     with subprocess.Popen(["mosquitto", "-c", str(config)], stderr=subprocess.DEVNULL) as broker:
-        time.sleep(1)
+        try:
+            while subprocess.run(publisher(port), input=b"", stderr=subprocess.DEVNULL, check=False).returncode:
+                time.sleep(0.05)
+            yield port
+        finally:
+            broker.terminate()
+
+
+def publisher(port: int) -> list[str]:
+    """A command that publishes each line of its input."""
+    return [
+        "mosquitto_pub",
+        "-p",
+        str(port),
+        "-V",
+        "5",
+        "-q",
+        "1",
+        "-D",
+        "connect",
+        "receive-maximum",
+        "1000",
+        "-t",
+        "s",
+        "-l",
+    ]
+
+
+def mqtt(address: str, folder: Path, messages: int) -> tuple[float, float]:
+    """Points a second that are taken, and messages a second that a program takes which only reads."""
+    hull = f"h{time.time_ns()}"
+    mark = {"id": VEHICLES, "x": 0, "y": 0}
+    lines = "".join(json.dumps(each) + "\n" for each in (*map(fix, range(messages)), mark)).encode()
+    with mosquitto(folder) as port:
         command = [DYNHULL, "ingest", f"mqtt://127.0.0.1:{port}/s", "--address", address, "--hull", hull]
         keys = ["--key", "$.id", "--x", "$.x", "--y", "$.y"]
         with (
@@ -124,25 +158,20 @@ def mqtt(address: str, folder: Path, messages: int) -> float:
         ):
             assert taking.stderr is not None
             taking.stderr.readline()
-            publisher = Client(CallbackAPIVersion.VERSION2)
-            publisher.max_queued_messages_set(0)
-            publisher.max_inflight_messages_set(1000)
-            publisher.connect("127.0.0.1", port)
-            publisher.loop_start()
             begun = time.perf_counter()
-            for number in range(messages):
-                last = publisher.publish("s", json.dumps(fix(number)).encode(), 1)
-            mark = {"id": VEHICLES, "x": 0, "y": 0}
-            last = publisher.publish("s", json.dumps(mark).encode(), 1)
-            last.wait_for_publish(300)
+            subprocess.run(publisher(port), input=lines, check=True)
             while not present(client, hull):
                 time.sleep(0.02)
-            took = time.perf_counter() - begun
-            publisher.disconnect()
-            publisher.loop_stop()
+            taken = messages / (time.perf_counter() - begun)
             taking.terminate()
-        broker.terminate()
-    return messages / took
+    with mosquitto(folder) as port:
+        alone = ["mosquitto_sub", "-p", str(port), "-V", "5", "-q", "1", "-t", "s", "-c", "-i", "reader", "-x", "60"]
+        subprocess.run([*alone, "-E"], check=True)  # so that the broker keeps what comes before it reads
+        begun = time.perf_counter()
+        with subprocess.Popen([*alone, "-C", str(messages + 1)], stdout=subprocess.DEVNULL) as reading:
+            subprocess.run(publisher(port), input=lines, check=True)
+            reading.wait()
+        return taken, messages / (time.perf_counter() - begun)
 
 
 def present(client: HullClient, hull: str) -> bool:
@@ -162,10 +191,10 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--folder", type=Path, default=Path.cwd(), help="on the disk to measure")
     options = parser.parse_args()
-    works: dict[str, Callable[[str, Path], tuple[float, ...]]] = {
+    works: dict[str, Callable[[str, Path], tuple[float, float]]] = {
         "JetStream, 1 point": lambda address, folder: jetstream(address, folder, options.messages, 1),
         "JetStream, 100 points": lambda address, folder: jetstream(address, folder, 5 * options.messages, 100),
-        "MQTT": lambda address, folder: (mqtt(address, folder, options.messages // 4),),
+        "MQTT": lambda address, folder: mqtt(address, folder, options.messages),
     }
     print(f"{'points a second':24} {'median':>12} {'least':>12} {'greatest':>12}")
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
@@ -174,8 +203,7 @@ def main() -> None:
             for work, run in works.items():
                 results = [run(f"127.0.0.1:{port}", folder) for _ in range(options.repeat)]
                 line(work, [each[0] for each in results])
-                if len(results[0]) > 1:
-                    line("  reading alone", [each[1] for each in results])
+                line("  reading alone", [each[1] for each in results])
         shutil.rmtree(folder / "data")
 
 
