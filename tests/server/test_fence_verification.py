@@ -25,6 +25,7 @@ from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.faults import FenceFault
+from dynhull_server.state.fences.recent import RecentEvents
 from dynhull_server.state.fences.records import AppendEvents, Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME, HullSettings
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -161,7 +162,7 @@ def test_a_flipped_side_is_found(key: str, expected: str | None) -> None:
     ("change", "complaint"),
     [
         ({"type": EventType.EXIT}, "key 'late' of hull 'fleet': expected outside, as the events say, found inside"),
-        ({"sequence": 1}, "event 1: expected sequence 2, found sequence 1"),
+        ({"sequence": 1}, "expected 2 as the last event, found event 1"),
         ({"key": "inner"}, "key 'inner' of hull 'fleet', event 2: expected a subject that is outside, found enter"),
         ({"key": "nobody"}, "key 'nobody' of hull 'fleet': expected inside, as the events say, found outside"),
         ({"time": 0}, "event 2: expected a time of"),
@@ -174,11 +175,11 @@ def test_a_flipped_event_is_found(monkeypatch: pytest.MonkeyPatch, change: dict[
         async with engine_in_memory() as engine:
             fence = await life(engine)
             assert (await verify_events(fence, engine.aside)).equal
-            events, recent = await fence.events(0, 100), fence.fence.recent
-            recent.clear()
+            events, recent = await fence.events(0, 100), RecentEvents(10**6)
             events[1] = events[1]._replace(**change)
-            for sequence, event in enumerate(events, start=1):
-                recent.add(sequence, block_of({fence.fence.number: [event]}), 0)
+            for event in events:
+                recent.add(block_of({fence.fence.number: [event]}), 1)
+            monkeypatch.setattr(fence.fence, "_recent", recent)
             return "\n".join(map(str, (await engine.get("fleet").verify())[1].fence_faults))
 
     assert complaint in asyncio.run(found()) + "\n"

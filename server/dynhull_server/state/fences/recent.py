@@ -59,16 +59,11 @@ class RecentEvents:
         O(runs that are newer than the first of them + events).
         """
         runs: list[tuple[EventBlock, int]] = []
-        oldest = None
         for block, run in self._newest_first(number):
-            first = int(block.firsts[run])
-            if oldest is not None and first + int(block.counts[run]) != oldest:
-                return None
             runs.append((block, run))
-            oldest = first
-            if first <= after + 1:
+            if block.firsts[run] <= after + 1:
                 break
-        if oldest is None or oldest > after + 1:
+        if not runs or runs[-1][0].firsts[runs[-1][1]] > after + 1:
             return None
         found: list[FenceEvent] = []
         while runs and len(found) < most:
