@@ -1,5 +1,6 @@
 """Convex layers, influence and sketches from a server, compared with the library's own."""
 
+from contextlib import suppress
 from uuid import uuid4
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from dynhull import DynamicHull, GeoHull, KeyedHull
 from dynhull_client import (
+    DeadlineError,
     HullClient,
     HullCopy,
     HullUnsuitableError,
@@ -114,6 +116,16 @@ def test_large_layers_are_read_from_a_copy(client: HullClient) -> None:
     for layer, mine in zip(client.layers(name, 2).layers, live.layers(2), strict=True):
         np.testing.assert_array_equal(layer, mine)
     np.testing.assert_array_equal(client.influence(name).areas, live.influence())
+
+
+def test_callers_who_leave_do_not_use_up_the_copies(client: HullClient) -> None:
+    x = np.arange(-3_000.0, 3_000.0)
+    parabola = np.column_stack((x, x * x))
+    name = hull_of(client, parabola)
+    for timeout in (0.001, 0.002, 0.004, 0.008, 0.016, 0.032):
+        with suppress(DeadlineError):
+            client.influence(name, timeout=timeout)
+    np.testing.assert_array_equal(client.influence(name).areas, DynamicHull(parabola).influence())
 
 
 def test_on_the_globe(client: HullClient, rng: np.random.Generator) -> None:

@@ -105,7 +105,7 @@ class Peeling:
             return vertices, hull.influence(), _keys(hull, vertices)
 
         size = await self._size(min_revision)
-        counts, found = await self._ask(influence, size > FEW_INFLUENCES, min_revision)
+        counts, found = await self._ask(influence, size > FEW_INFLUENCES)
         return counts, *found
 
     async def _peel(self, count: int) -> Layers:
@@ -127,15 +127,26 @@ class Peeling:
         _, vertices = await self._hull.vertices(min_revision)
         return len(vertices)
 
-    async def _ask(self, question: Callable[[AnyHull], T], large: bool, min_revision: int = 0) -> tuple[Counts, T]:
+    async def _ask(self, question: Callable[[AnyHull], T], large: bool) -> tuple[Counts, T]:
         """Ask the hull between two writes; if that would take long, or it is on the globe, a copy of it."""
         hull, points = self._hull, self._hull.counts.points
         if not large and (not hull.geographic or points <= FEW_INFLUENCES):
             # Layers may be larger than the hull, so the event loop does not wait for them.
-            return await hull.read(lambda state: question(state.hull), BLOCK, min_revision)
-        async with self._copies:
-            counts, copied = await hull.read(_copy, max(points, BLOCK), min_revision)
-            return counts, await self._run(partial(question, copied))
+            return await hull.read(lambda state: question(state.hull), BLOCK)
+        await self._copies.acquire()
+        # A caller that leaves ends only the wait: the copy is there, and counts, until the question is answered.
+        asking = asyncio.ensure_future(self._ask_copy(question))
+        asking.add_done_callback(self._asked_copy)
+        return await asyncio.shield(asking)
+
+    async def _ask_copy(self, question: Callable[[AnyHull], T]) -> tuple[Counts, T]:
+        counts, copied = await self._hull.read(_copy, max(self._hull.counts.points, BLOCK))
+        return counts, await self._run(partial(question, copied))
+
+    def _asked_copy(self, asking: "asyncio.Future[Any]") -> None:
+        self._copies.release()
+        if not asking.cancelled():
+            asking.exception()  # it is the caller's, who may have left
 
     def _with_arrays_of_recent(self, peeled: Layers) -> Layers:
         """The same layers, as the same array objects as before where they have not changed: watchers compare these."""
