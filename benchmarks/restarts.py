@@ -31,12 +31,10 @@ async def fill(address: str, hulls: int) -> None:
     """Create the hulls."""
     random = np.random.default_rng(3)
     async with grpc.aio.insecure_channel(address) as channel:
-        create = channel.unary_unary(f"{server.SERVICE}CreateHull")
         apply = channel.unary_unary(f"{server.SERVICE}Apply")
 
         async def make(name: str) -> None:
             batch = batch_pb2.Batch(inserts=server.packed(random.random((POINTS, 2))))
-            await create(pb.CreateHullRequest(name=name).SerializeToString())
             await apply(pb.ApplyRequest(name=name, batch=batch).SerializeToString())
 
         for first in range(0, hulls, AT_ONCE):
@@ -67,10 +65,10 @@ def main() -> None:
     options = parser.parse_args()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
-        kept = "--data", folder
-        with serving(*kept, "--durability", "none") as address:
+        kept, none = (("--data", f"{folder}/{name}") for name in ("kept", "none"))
+        with serving(*kept, "--durability", "none", "--create-on-write") as address:
             asyncio.run(fill(address, options.hulls))
-        works = {f"{options.hulls:,} hulls": kept, "no hulls": ("--in-memory",)}
+        works = {f"{options.hulls:,} hulls": kept, "no hulls": none}
         for each in works.values():
             start(*each)  # files into memory, bytecode onto the disk
         found: dict[str, list[tuple[float, float, float]]] = {name: [] for name in works}
