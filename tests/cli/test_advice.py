@@ -87,6 +87,7 @@ FOLLOWED_ELSEWHERE = {
     "--token": "test_commands.py: test_tokens",
     "--tls": "test_commands.py: test_tls",
     "--tls-ca": "test_commands.py: test_tls",
+    "--layer": "test_commands.py: test_layers_and_influence",
     "--out": "test_demo.py: test_hours_of_flights",
     "--client-cert": "test_commands.py: test_tls",
     "--client-key": "test_commands.py: test_tls",
