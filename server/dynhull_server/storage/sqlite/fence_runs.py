@@ -2,8 +2,10 @@
 
 from array import array
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import count
 from threading import Lock
 from typing import Any, NamedTuple, Self
 
@@ -197,6 +199,8 @@ class FenceRuns:
     fences: Mapping[int, FenceRows]
     table: Table = field(default_factory=lambda: Table(3))
     _names: dict[str, int] = field(default_factory=dict)
+    _uses: Counter[str] = field(default_factory=Counter)
+    _name_ids: "count[int]" = field(default_factory=count)
     _new: Integers = field(default_factory=lambda: np.empty((3, MOST_NEW), np.int64))  # number, sequence, row
     _end: int = 0
     _turn: Any = field(default_factory=Lock)  # fences take runs for commits, and for readers
@@ -205,12 +209,19 @@ class FenceRuns:
         """Take note of a fence, which has its runs."""
         fence = self.fences[number]
         fence.at = self.table.add(number)
-        name = self._names.setdefault(fence.row.config.subjects, len(self._names))
-        self.table.columns[:, fence.at] = fence.last, name, self._end
+        name = fence.row.config.subjects
+        self._uses[name] += 1
+        if name not in self._names:
+            self._names[name] = next(self._name_ids)
+        self.table.columns[:, fence.at] = fence.last, self._names[name], self._end
 
     def forget(self, fence: FenceRows) -> None:
         """Forget a fence that is deleted."""
         self.table.remove(fence.at)
+        name = fence.row.config.subjects
+        self._uses[name] -= 1
+        if not self._uses[name]:
+            del self._uses[name], self._names[name]
 
     def lasts(self, numbers: npt.NDArray[np.int64]) -> Integers:
         """The sequence of the last event of each of some fences; KeyError if one does not exist."""
