@@ -95,6 +95,7 @@ FOLLOWED_ELSEWHERE = {
     "--id": "test_table.py: the columns of the demo",
     "--time": "test_table.py: the columns of the demo",
     "--keys-of": "test_keyed.py: test_integer_keys_and_another_hull",
+    "--live": "test_demo.py: test_the_flights_live_until_ctrl_c",
     "--window": "test_demo.py: test_the_positions_of_the_last_half_hour",
     "--points": "test_demo.py: test_points_of_ones_own",
     "--area": "test_fences.py: test_the_life_of_a_fence",

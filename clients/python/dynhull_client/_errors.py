@@ -202,8 +202,15 @@ BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
 CODES: Mapping[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
 
 
+# What gRPC's asyncio says of a call that ended while a message was sent; the status that it ended with is lost.
+ENDED_IN_A_WRITE = "Internal error from Core"
+
+
 def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
     """The error that a finished call ended with."""
+    if call.code() == grpc.StatusCode.INTERNAL and call.details() == ENDED_IN_A_WRITE:
+        # The code stays: to those who send again, it means that the message itself may be the cause.
+        return UnavailableError("the connection was lost while a message was sent", grpc.StatusCode.INTERNAL, "", {})
     status = rpc_status.from_call(call)
     return _error(call.code(), call.details(), () if status is None else status.details)
 
