@@ -96,7 +96,7 @@ class StackedHull {
 };
 
 // A window by two stacks, as in sliding-window aggregation (Tangwongsan, Hirzel, Schneider, "In-order sliding-window
-// aggregation in worst-case constant time", arXiv 2009.13768): new points are pushed on one; the oldest is popped from
+// aggregation in worst-case constant time", arXiv:2009.13768): new points are pushed on one; the oldest is popped from
 // the other, which takes over all points of the first, newest first, when it is empty. The two hulls are not merged.
 class TwoStacks {
  public:

@@ -59,11 +59,13 @@ EXPORTED = [
     "HullNotFoundError",
     "HullReplacedError",
     "HullUnsuitableError",
+    "Influence",
     "Ingest",
     "Ingested",
     "Inside",
     "InvalidRequestError",
     "KeyMissingError",
+    "Layers",
     "LimitExceededError",
     "Located",
     "Measured",
@@ -124,7 +126,7 @@ def test_signatures_can_be_read(kind: type) -> None:
     for name in METHODS:
         method = getattr(kind, name)
         signature = str(inspect.signature(method))
-        assert len(signature) < 500, signature
+        assert len(signature) < 600, signature
         assert "_SupportsArray" not in signature
         assert "'npt" not in signature
         shown = pydoc.render_doc(method, renderer=pydoc.plaintext).split("\n")[2]
