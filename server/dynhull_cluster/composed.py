@@ -12,6 +12,7 @@ from typing import Any
 from dynhull_proto.v1 import fence_service_pb2, hull_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc import answers, decode
+from dynhull_server.rpc.access import Rights
 from dynhull_server.rpc.calls import Call, Work
 from dynhull_server.rpc.decode_fence import decode_fence, decode_fence_name
 from dynhull_server.rpc.methods import DESCRIPTOR, FENCES
@@ -20,12 +21,14 @@ from dynhull_server.state.errors import HullEmptyError, HullUnsuitableError
 from dynhull_server.state.hull_state import Counts
 
 from .merged_query import MergedQuery
-from .relay import Relay
+from .relay import Relay, Route
 from .worker_link import WorkerLink
 
 HULLS, FENCE_CALLS = f"/{DESCRIPTOR.full_name}", f"/{FENCES.full_name}"
 # The fields of a request that name hulls or fences, and the names.
 Names = Callable[[Any], Iterable[tuple[str, str]]]
+# Raises PermissionDeniedError if a request may not have this name in this field.
+Require = Callable[[Rights, str, str], None]
 
 
 class Composed:
@@ -51,18 +54,26 @@ class Composed:
             f"{HULLS}/Separate": self._separate,
             f"{HULLS}/Query": self._query,
         }
-        self.routes: dict[str, Callable[[bytes], WorkerLink]] = {
-            f"{HULLS}/ApplyTogether": partial(self._common_link, pb.ApplyTogetherRequest, _names_of_batches),
-            f"{HULLS}/Locate": partial(self._common_link, pb.LocateRequest, names_with_keys),
-            f"{HULLS}/Distance": partial(self._common_link, pb.DistanceRequest, names_with_keys),
-            f"{FENCE_CALLS}/CreateFence": partial(self._common_link, fence_service_pb2.CreateFenceRequest, fence_names),
-            f"{FENCE_CALLS}/ReplaceFence": partial(
-                self._common_link, fence_service_pb2.ReplaceFenceRequest, fence_names
-            ),
+        fences = fence_service_pb2
+        together = partial(self._common_link, pb.ApplyTogetherRequest, _names_of_batches, _require_write)
+        create = partial(self._common_link, fences.CreateFenceRequest, fence_names, _require_of_fence)
+        replace = partial(self._common_link, fences.ReplaceFenceRequest, fence_names, _require_of_fence)
+        self.routes: dict[str, Route] = {
+            f"{HULLS}/ApplyTogether": together,
+            f"{HULLS}/Locate": partial(self._common_link, pb.LocateRequest, names_with_keys, _require_read),
+            f"{HULLS}/Distance": partial(self._common_link, pb.DistanceRequest, names_with_keys, _require_read),
+            f"{FENCE_CALLS}/CreateFence": create,
+            f"{FENCE_CALLS}/ReplaceFence": replace,
         }
 
-    def _common_link(self, kind: Any, names: Names, message: bytes) -> WorkerLink:
-        return common_link(self._relay, names(kind.FromString(message)))
+    def _common_link(self, kind: Any, names: Names, require: Require, message: bytes, call: Call) -> WorkerLink:
+        found = list(names(kind.FromString(message)))
+        try:
+            return common_link(self._relay, found)
+        except HullsApartError:  # only who may use the names is told about them
+            for field, name in found:
+                require(call.access, field, name)
+            raise
 
     async def _list(self, request: Any, response: Any, field: str, call: Call) -> bytes:
         """One page of all workers, by name."""
@@ -145,6 +156,18 @@ def names_with_keys(request: Any) -> Iterable[tuple[str, str]]:
     yield "name", request.name
     if request.keys_of:
         yield "keys_of", decode.decode_name(request.keys_of, "keys_of")
+
+
+def _require_read(access: Rights, _: str, name: str) -> None:
+    access.require_read(name)
+
+
+def _require_write(access: Rights, _: str, name: str) -> None:
+    access.require_write(name)
+
+
+def _require_of_fence(access: Rights, field: str, name: str) -> None:
+    (access.require_write if field == "name" else access.require_read)(name)
 
 
 def _names_of_batches(request: pb.ApplyTogetherRequest) -> Iterable[tuple[str, str]]:

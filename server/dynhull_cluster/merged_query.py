@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import grpc
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_server.rpc.access import PermissionDeniedError
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.decode import InvalidFieldError
 from dynhull_server.rpc.methods import DESCRIPTOR
@@ -104,8 +105,17 @@ class MergedQuery:
         for field in ("other_name", "keys_of"):
             other = getattr(request, field, "")
             if other and self._relay.link(other) is not link:
-                return request if kind == "separate" else HullsApartError(field, other, request.name)
+                return request if kind == "separate" else self._apart(field, other, request.name)
         return link
+
+    def _apart(self, field: str, name: str, first: str) -> Exception:
+        """Why two names cannot be in a read, for who may read them."""
+        try:
+            self._call.access.require_read(first)
+            self._call.access.require_read(name)
+        except PermissionDeniedError as error:
+            return error
+        return HullsApartError(field, name, first)
 
     def _begun(self, link: WorkerLink) -> "_WorkerAnswers":
         upstream = self._upstreams.get(link)

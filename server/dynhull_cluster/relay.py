@@ -17,7 +17,7 @@ from .placement import worker_of
 from .upstream import Upstream
 from .worker_link import WorkerLink
 
-Route = Callable[[bytes], WorkerLink]
+Route = Callable[[bytes, Call], WorkerLink]
 
 
 class Relay:
@@ -38,7 +38,7 @@ class Relay:
         """The worker that has a name."""
         return self.links[worker_of(name, len(self.links))]
 
-    def route(self, message: bytes) -> WorkerLink:
+    def route(self, message: bytes, _: Call) -> WorkerLink:
         """The worker that has the name in a request: the first field of nearly all of them. Raises DecodeError."""
         return self.link(pb.DeleteHullRequest.FromString(message).name)
 
@@ -54,18 +54,18 @@ class Relay:
         if not finish:
             with call.cutoff():
                 message = await call.receive()
-                return await route(message).ask(method, call, message)
+                return await route(message, call).ask(method, call, message)
         with call.cutoff():
             message = await call.receive()
         call.finish()
-        return await route(message).ask(method, call, message)
+        return await route(message, call).ask(method, call, message)
 
     async def read(self, method: str, call: Call) -> None:
         """A call with one request and many responses."""
         with call.stream():
             with call.cutoff():
                 message = await call.receive()
-            await self.read_from(self.route(message), method, call, message)
+            await self.read_from(self.route(message, call), method, call, message)
 
     async def watch(self, method: str, kind: str, call: Call) -> None:
         """A call with one request, and responses for as long as the caller likes; `kind` is that of their events."""
@@ -73,7 +73,7 @@ class Relay:
             with call.cutoff():
                 message = await call.receive()
             sending = partial(self._metrics.sending, watcher, kind)
-            await self.read_from(self.route(message), method, call, message, sending)
+            await self.read_from(self.route(message, call), method, call, message, sending)
 
     async def read_from(
         self,
@@ -84,7 +84,7 @@ class Relay:
         sending: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
         """Pass on the responses of a worker to a request, until the last; `sending` is around the sending of each."""
-        async with one_request(link.stream(method, metadata_of(call)), message) as upstream:
+        async with one_request(link.stream(method, metadata_of(call)), message, call.cutoff()) as upstream:
             while True:
                 with call.cutoff():
                     response = await upstream.read()
@@ -103,7 +103,7 @@ class Relay:
             with call.cutoff():
                 first = await call.read()
             # Without any request, every worker refuses the call with the same words.
-            link = self.links[0] if first is None else self.route(first)
+            link = self.links[0] if first is None else self.route(first, call)
             upstream = link.stream(method, metadata_of(call))
             feeding = asyncio.create_task(self._feed(call, first, upstream))
             try:
@@ -141,11 +141,17 @@ async def _response(upstream: Upstream, feeding: "asyncio.Task[None]") -> bytes 
 
 
 @asynccontextmanager
-async def one_request(upstream: Upstream, message: bytes) -> AsyncIterator[Upstream]:
-    """The call of a worker, with this request and no other, which ends with the block."""
+async def one_request(
+    upstream: Upstream, message: bytes, sending: AbstractContextManager[None]
+) -> AsyncIterator[Upstream]:
+    """The call of a worker, with this request and no other, which ends with the block.
+
+    `sending` is around the sending of the request, which waits while the worker starts.
+    """
     try:
-        await upstream.write(message)
-        await upstream.done_writing()
+        with sending:
+            await upstream.write(message)
+            await upstream.done_writing()
         yield upstream
     finally:
         upstream.cancel()

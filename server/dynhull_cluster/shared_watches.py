@@ -10,7 +10,7 @@ sketches always does.
 import asyncio
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -74,7 +74,7 @@ class SharedWatches:
             feed = joined.enter_context(self._feed(link, request, request.resume.uid))
             if may_join and (held := feed.recent.get(revision)) is not None:
                 return feed, held
-        async with one_request(link.stream(WATCH, metadata_of(call)), message) as upstream:
+        async with one_request(link.stream(WATCH, metadata_of(call)), message, call.cutoff()) as upstream:
             while True:
                 reading = asyncio.ensure_future(upstream.read())
                 meeting = asyncio.ensure_future(feed.at(revision)) if feed is not None and may_join else None
@@ -224,7 +224,7 @@ class Feed:
     async def _run(self) -> None:
         try:
             upstream = self._link.stream(WATCH, metadata_of_feed(self._request.name))
-            async with one_request(upstream, self._request.SerializeToString()):
+            async with one_request(upstream, self._request.SerializeToString(), nullcontext()):
                 while (message := await upstream.read()) is not None:
                     await self._take(message)
             self.failure = RelayedError(lost_status())  # watches do not end by themselves

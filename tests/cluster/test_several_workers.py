@@ -189,6 +189,14 @@ def test_tokens_hold_for_calls_through_a_gateway(place: Place, client: HullClien
             some.create_hull(ONE)
         with pytest.raises(PermissionDeniedError):
             some.separate(ZERO, ONE)
+        with pytest.raises(PermissionDeniedError, match=f"may not write '{ONE}'"):  # not where it is
+            some.transfer({ZERO: Batch(insert=[[1, 1]]), ONE: Batch(delete=[[10, 0]])})
+        with pytest.raises(PermissionDeniedError, match=f"may not read '{ONE}'"):
+            some.locate(ZERO, keys=["a"], keys_of=ONE)
+        with pytest.raises(PermissionDeniedError, match=f"may not read '{ONE}'"):
+            some.create_fence("north/fence", SQUARE, ONE)
+        with some.pipeline() as pipeline, pytest.raises(PermissionDeniedError, match=f"may not read '{ONE}'"):
+            pipeline.locate(ZERO, keys=["a"], keys_of=ONE).result()
         with pytest.raises(UnauthenticatedError):
             stranger.get_hull(ZERO)
         with some.watch(ZERO) as watch:
