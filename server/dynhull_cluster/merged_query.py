@@ -61,6 +61,8 @@ class MergedQuery:
                     await self._send()
                 await self._add(await self._answer(source))
             await self._send()
+            # An answer may be here before its request is known to be sent; to cancel that would end the worker's call.
+            await asyncio.gather(*sending)
         finally:
             for task in sending:
                 task.cancel()
