@@ -8,8 +8,8 @@ Broker, ingest and a durable server share the machine. Keys are those of 10,000 
   one acknowledged.
 * `JetStream, 100 points`: 100 points in a message.
 * `reading alone`: a program that only reads the same messages, with nats-py's pull consumer.
-* `MQTT`: Mosquitto, QoS 1, a message for each point, published meanwhile by `mosquitto_pub` as fast as the broker takes
-  them, until the server has the last one; `max_inflight_messages 1000`.
+* `MQTT 3.1.1`, `MQTT 5`: Mosquitto, QoS 1, a message for each point, published meanwhile by `mosquitto_pub` as fast as
+  the broker takes them, until the server has the last one; `max_inflight_messages 1000`.
 * `reading alone` of MQTT: `mosquitto_sub` reads the same messages at QoS 1, published in the same way.
 
 Points a second: the median, the least and the greatest of the runs. Debian: `apt-get install nats-server mosquitto
@@ -144,13 +144,21 @@ def publisher(port: int) -> list[str]:
     ]
 
 
-def mqtt(address: str, folder: Path, messages: int) -> tuple[float, float]:
+def mqtt(address: str, folder: Path, messages: int, version: str) -> tuple[float, float]:
     """Points a second that are taken, and messages a second that a program takes which only reads."""
     hull = f"h{time.time_ns()}"
     mark = {"id": VEHICLES, "x": 0, "y": 0}
     lines = "".join(json.dumps(each) + "\n" for each in (*map(fix, range(messages)), mark)).encode()
     with mosquitto(folder) as port:
-        command = [DYNHULL, "ingest", f"mqtt://127.0.0.1:{port}/s", "--address", address, "--hull", hull]
+        command = [
+            DYNHULL,
+            "ingest",
+            f"mqtt://127.0.0.1:{port}/s?version={version}",
+            "--address",
+            address,
+            "--hull",
+            hull,
+        ]
         keys = ["--key", "$.id", "--x", "$.x", "--y", "$.y"]
         with (
             subprocess.Popen([*command, *keys], stderr=subprocess.PIPE, text=True) as taking,
@@ -194,7 +202,8 @@ def main() -> None:
     works: dict[str, Callable[[str, Path], tuple[float, float]]] = {
         "JetStream, 1 point": lambda address, folder: jetstream(address, folder, options.messages, 1),
         "JetStream, 100 points": lambda address, folder: jetstream(address, folder, 5 * options.messages, 100),
-        "MQTT": lambda address, folder: mqtt(address, folder, options.messages),
+        "MQTT 3.1.1": lambda address, folder: mqtt(address, folder, options.messages, "3.1.1"),
+        "MQTT 5": lambda address, folder: mqtt(address, folder, options.messages, "5"),
     }
     print(f"{'points a second':24} {'median':>12} {'least':>12} {'greatest':>12}")
     with tempfile.TemporaryDirectory(dir=options.folder) as name:

@@ -23,6 +23,7 @@ from .topics import captures_of
 PORT, TLS_PORT = 1883, 8883
 AT_LEAST_ONCE = 1
 WAIT = 1.0  # seconds that a read waits for messages
+GATHER = 0.003  # seconds that the first message of a read waits for others: brokers send one at a time
 TIMEOUT = 10.0  # seconds for a connection
 MOST = 4096  # messages of one read
 WAITING = 65_536  # messages that may wait to be read: with QoS 1 the broker sends no more
@@ -109,6 +110,8 @@ class Mqtt:
             with suppress(TimeoutError):
                 async with asyncio.timeout(WAIT):
                     await self._news.wait()
+        if len(self._arrived) < MOST and self._lost is None:
+            await asyncio.sleep(GATHER)
         if self._lost is not None and not self._arrived:
             raise FeedError(f"MQTT: {self._lost}")
         with self._lock:

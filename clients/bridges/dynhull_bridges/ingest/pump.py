@@ -19,7 +19,7 @@ from .lane import Lane
 from .mapping import Mapping, Row
 
 log = structlog.get_logger("dynhull_ingest")
-UNDER_WAY = 8  # reads that are not settled
+UNDER_WAY = 64  # reads that are not settled
 KEEP_EVERY = 1.0  # seconds between notes of the place in a log
 FIRST_PAUSE, LONGEST_PAUSE = 0.2, 30.0
 
