@@ -13,8 +13,9 @@ from dynhull_server.rpc.status import RelayedError
 
 # Writing to a call that has ended.
 ENDED = suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError)
-# What gRPC itself makes of a connection that breaks; a worker gives its own errors details.
-BROKEN = grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN
+# What gRPC itself makes of a connection that breaks, or of a worker that ends in the middle of a request; a worker
+# gives its own errors details.
+BROKEN = grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN
 # Seconds that the status of a worker may arrive after a write that it has made fail.
 LATE_SECONDS = 1.0
 
