@@ -52,8 +52,8 @@ class Team {
     return std::min(set > 0 ? set : processors(), MOST);
   }
 
-  // The team, for this caller alone, with so many helpers, or fewer if they cannot start. Null if another caller has
-  // it, or if there is no memory for it.
+  // The team, for this caller alone, with this number of helpers, or fewer if they cannot start. Null if another caller
+  // has it, or if there is no memory for it.
   static Team* taken(unsigned helpers) {
     Team* const team = of_this_process();
     if (team == nullptr || team->taken_.exchange(true)) return nullptr;
@@ -266,12 +266,12 @@ class Threads {
   unsigned count_ = 1;
 };
 
-// How many threads pay for a batch of so many rows, and for a pass over so many points.
+// How many threads are worth starting for a batch of `rows`, and for a pass over `points`.
 constexpr std::size_t ROWS_A_THREAD = DYNHULL_ROWS_A_THREAD;
 inline std::size_t threads_for_batch(std::size_t rows) { return rows / ROWS_A_THREAD; }
 inline std::size_t threads_for(std::size_t points) { return points / (32 * ROWS_A_THREAD); }
 
-// Calls `work` with ranges that make up 0..count, at the same time if so many pay for several threads.
+// Calls `work` with ranges that make up 0..count, on several threads if `count` is large enough.
 template <class Work>
 void for_ranges(std::size_t count, std::size_t a_thread, Work work) {
   Threads threads(count / a_thread);

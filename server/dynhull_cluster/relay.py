@@ -6,8 +6,6 @@ from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from functools import partial
 from typing import Any
 
-import grpc
-
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.metrics import Metrics
@@ -18,8 +16,6 @@ from .callers import metadata_of
 from .placement import worker_of
 from .upstream import Upstream
 from .worker_link import WorkerLink
-
-CANCELLED = grpc.StatusCode.CANCELLED.value[0]
 
 Route = Callable[[bytes, Call], WorkerLink]
 
@@ -114,11 +110,8 @@ class Relay:
                 while (response := await _response(upstream, feeding)) is not None:
                     await call.write(response)
                 await feeding  # raises what has ended the requests
-            except RelayedError as error:
-                # Requests that were cut off, perhaps before the first one, are no fault of the caller. Where that was
-                # in the middle of one, the worker's call is cancelled with it.
-                if call.ending is not None and error.status.code == CANCELLED:
-                    raise call.ending from None
+            except RelayedError:
+                # Requests that were cut off, perhaps before the first one, are no fault of the caller.
                 if feeding.done() and not feeding.cancelled() and (cut := feeding.exception()) is not None:
                     raise cut from None
                 raise

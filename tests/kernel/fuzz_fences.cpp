@@ -16,6 +16,7 @@
 #include "../../dynhull/kernel/keyed/entities.hpp"
 #include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
+#include "packed_keys.hpp"
 
 namespace {
 
@@ -38,6 +39,8 @@ const std::vector<std::vector<Rings>> SHAPES = {
 };
 
 // An entity of the model: its place, and its time.
+std::uint64_t number_of(const std::string& key) { return std::stoull(key); }
+
 struct Entity {
   Point place;
   double time;
@@ -183,20 +186,8 @@ class Life {
 
   template <class Work>
   void with_keys(const std::vector<std::string>& rows, Work work) {
-    std::vector<std::uint8_t> lengths;
-    std::string data;
-    std::vector<std::uint64_t> integers;
-    for (const std::string& key : rows) {
-      lengths.push_back(static_cast<std::uint8_t>(key.size()));
-      data += key;
-      integers.push_back(strings_ ? 0 : std::stoull(key));
-    }
-    both([&](Indexed& hull) {
-      if (strings_)
-        work(hull, StringKeys(lengths.data(), data.data(), rows.size()));
-      else
-        work(hull, IntegerKeys(integers.data(), rows.size()));
-    });
+    with_packed_keys(strings_, rows, number_of,
+                     [&](const auto& keys) { both([&](Indexed& hull) { work(hull, keys); }); });
   }
   std::vector<std::string> some_keys(std::size_t count) {
     std::set<std::string> keys;
@@ -400,22 +391,6 @@ class Transfers {
   }
   Point point() { return {static_cast<double>(below(13)), static_cast<double>(below(13))}; }
 
-  template <class Work>
-  void with_keys(const std::vector<std::string>& rows, Work work) {
-    std::vector<std::uint8_t> lengths;
-    std::string data;
-    std::vector<std::uint64_t> integers;
-    for (const std::string& key : rows) {
-      lengths.push_back(static_cast<std::uint8_t>(key.size()));
-      data += key;
-      integers.push_back(strings_ ? 0 : std::stoull(key));
-    }
-    if (strings_)
-      work(StringKeys(lengths.data(), data.data(), rows.size()));
-    else
-      work(IntegerKeys(integers.data(), rows.size()));
-  }
-
   // A fence of one hull or of both.
   void set() {
     const auto number = static_cast<std::int64_t>(below(6));
@@ -442,13 +417,14 @@ class Transfers {
         const bool there = side.now.contains(key);
         if (below(6) == 0) continue;
         if (there && below(4) != 0) {
-          with_keys({key}, [&](const auto& keys) { side.hull.entities.remove(side.hull.tree, keys, true); });
+          with_packed_keys(strings_, {key}, number_of,
+                           [&](const auto& keys) { side.hull.entities.remove(side.hull.tree, keys, true); });
           side.now.erase(key);
           side.removed.insert(key);
         } else {
           const Point place = point();
           const double time = 0;
-          with_keys({key}, [&](const auto& keys) {
+          with_packed_keys(strings_, {key}, number_of, [&](const auto& keys) {
             Puts puts(side.hull.tree.frame(), &place, &time, false, 1);
             side.hull.entities.put(side.hull.tree, keys, puts, Only::ALL);
           });
@@ -464,7 +440,7 @@ class Transfers {
     for (std::uint64_t count = below(2 * keys_); count > 0; --count) asked.insert(key());
     const std::vector<std::string> rows(asked.begin(), asked.end());
     std::set<std::string> carried;
-    with_keys(rows, [&](const auto& keys) {
+    with_packed_keys(strings_, rows, number_of, [&](const auto& keys) {
       std::vector<std::string> names;
       for (std::size_t row = 0; row < keys.size(); ++row) names.emplace_back(keys.bytes_of(row));
       Departures departures = source.hull.fences->departures(names), arrived;

@@ -14,6 +14,7 @@
 #include "../../dynhull/kernel/keyed/entities.hpp"
 #include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
+#include "packed_keys.hpp"
 
 namespace {
 
@@ -123,20 +124,7 @@ class Life {
   // Calls `work` with the kernel's form of the keys.
   template <class Work>
   void with_keys(const std::vector<std::string>& rows, Work work) {
-    std::vector<std::uint8_t> lengths;
-    std::string data;
-    std::vector<std::uint64_t> integers;
-    for (const std::string& key : rows) {
-      lengths.push_back(static_cast<std::uint8_t>(key.size()));
-      data += key;
-      integers.push_back(integer(key));
-    }
-    with_failures([&] {
-      if (strings_)
-        work(StringKeys(lengths.data(), data.data(), rows.size()));
-      else
-        work(IntegerKeys(integers.data(), rows.size()));
-    });
+    with_packed_keys(strings_, rows, integer, [&](const auto& keys) { with_failures([&] { work(keys); }); });
   }
 
   // Runs an update, sometimes with too little memory at first.

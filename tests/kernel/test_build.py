@@ -54,20 +54,6 @@ def test_the_build_forbids_fusing(compiler, tmp_path):
     assert fused([flag if not flag.startswith("-ffp-contract") else "-ffp-contract=fast" for flag in flags])
 
 
-def test_fuzz(compiler, tmp_path):
-    """A short run of `make fuzz`, without sanitizers to be quick: kept seeds, then random ones."""
-    program = tmp_path / "fuzz"
-    build = [
-        compiler,
-        "-std=c++20",
-        "-O0",
-        "-ffp-contract=off",
-        "-pthread",
-        "-DDYNHULL_ROWS_A_THREAD=3",
-        "-DDYNHULL_FAIL_ALLOCATIONS",
-        "-DDYNHULL_LEAF=4",
-    ]
-    subprocess.run([*build, str(HERE / "fuzz.cpp"), "-o", str(program)], check=True)
-    for arguments in (SEEDS, ["--seconds", "1"]):
-        run = subprocess.run([str(program), *arguments], capture_output=True, text=True, check=False)
-        assert run.returncode == 0, run.stdout
+def test_fuzz(fuzz):
+    """A short run of `make fuzz`: kept seeds, then random ones."""
+    fuzz("fuzz.cpp", "-DDYNHULL_ROWS_A_THREAD=3", runs=[SEEDS, ["--seconds", "1"]])

@@ -7,7 +7,7 @@
 namespace dynhull {
 
 // Applies the changes to the tree at nodes.root; calls `reached` with those that reach its top, and on which sides, as
-// bits. Needs room in `nodes` for the plan's extra leaves. The tree has about so many leaves for each change.
+// bits. Needs room in `nodes` for the plan's extra leaves. The tree has about `leaves_a_change` leaves for each change.
 template <class Reached>
 void apply_in_order(Nodes& nodes, std::span<const Change> changes, std::size_t leaves_a_change, Reached reached) {
   constexpr std::size_t LOOKAHEAD = 8;  // changes whose leaf is being prefetched

@@ -59,7 +59,7 @@ class Pool {
     free_ = i;
   }
 
-  // Free slots, so many, as a pool of its own over the same records: another thread takes and gives back its own slots,
+  // `count` free slots, as a pool of its own over the same records: another thread takes and gives back its own slots,
   // while this one does too. Needs room for them. `take_back` ends that.
   Pool lend(std::size_t count) {
     Pool lent;

@@ -57,7 +57,7 @@ class Building {
     nodes_.leaf(leaves_[first]).assign(points_ + from, static_cast<unsigned>(to - from));
     return leaves_[first];
   }
-  // The same once the subtrees are there that are so many levels below.
+  // The same, once the subtrees `levels` below it are there.
   Ref top(std::size_t first, std::size_t last, unsigned levels) const {
     const std::size_t cut = middle(first, last);
     if (levels > 0) return joined(cut, top(first, cut, levels - 1), top(cut, last, levels - 1));
