@@ -13,6 +13,7 @@ from urllib.parse import quote_plus
 import numpy as np
 import pytest
 import server_process as servers
+from cluster import descendants
 from command_line import dynhull
 from forgetful import FORGETFUL
 from forked import COMMAND
@@ -56,7 +57,7 @@ def test_the_flights_live_until_ctrl_c(tmp_path: Path) -> None:
         assert process.stdout is not None
         words = [process.stdout.readline().split() for _ in range(4)]
         page, http, address = (line[-1] for line in words[1:])
-        children = processes_below(process.pid)
+        children = descendants(process.pid)
         assert len(children) >= 3
         for url in (page, http):
             with urllib.request.urlopen(url, timeout=PATIENCE) as answer:
@@ -77,14 +78,6 @@ def test_live_is_for_the_flights(tmp_path):
     for option in (["--points", tmp_path / "points.csv"], ["--window", "30m"]):
         done = demo("--live", *option)
         assert (done.exit_code, "--live is for the flights" in done.stderr) == (2, True)
-
-
-def processes_below(parent: int) -> list[int]:
-    """The processes that a process has started, and those that they have."""
-    found = [
-        int(child) for task in Path(f"/proc/{parent}/task").glob("*/children") for child in task.read_text().split()
-    ]
-    return [*found, *(each for child in found for each in processes_below(child))]
 
 
 def test_the_positions_of_the_last_half_hour(tmp_path):

@@ -32,6 +32,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
                 client.create_hull(name)
         yield server
         # The tests may run in several processes: each of their servers has something to complain about.
+        wait_until(lambda: "gateway-1" in processes(server.process.pid))
         gateway = processes(server.process.pid)["gateway-1"]
         os.kill(gateway, signal.SIGKILL)
         again("gateway-1", server, gateway)

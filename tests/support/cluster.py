@@ -1,5 +1,6 @@
 """The processes of a server, seen from outside."""
 
+from collections import defaultdict
 from pathlib import Path
 
 
@@ -17,13 +18,18 @@ def processes(supervisor: int) -> dict[str, int]:
 
 
 def descendants(process: int) -> list[int]:
-    """The numbers of the processes that it has started, and those that they have."""
-    found = []
-    for thread in Path(f"/proc/{process}/task").glob("*/children"):
+    """The numbers of the processes that it has started, and those that they have.
+
+    From the parents of all: a file of children leaves some out where another one ends while it is read.
+    """
+    children = defaultdict[int, list[int]](list)
+    for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
-            children = [int(each) for each in thread.read_text().split()]
-        except OSError:
+            parent = stat.read_text().rpartition(")")[2].split()[1]
+        except OSError:  # it has just ended
             continue
-        for child in children:
-            found += [child, *descendants(child)]
-    return found
+        children[int(parent)].append(int(stat.parent.name))
+    found = [process]
+    for each in found:
+        found += children[each]
+    return found[1:]
