@@ -3,6 +3,7 @@
 import re
 import signal
 import subprocess
+import sys
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -71,6 +72,21 @@ def test_the_flights_live_until_ctrl_c(tmp_path: Path) -> None:
         assert process.wait(PATIENCE) == 0
     wait_until(lambda: not any(Path(f"/proc/{child}").exists() for child in children))
     assert not list(tmp_path.iterdir())
+
+
+def test_the_processes_end_with_a_demo_that_is_killed() -> None:
+    program = (
+        "import sys; from dynhull_cli.demo.server import SERVE, running\n"
+        "with running('server', *SERVE, apart=True) as server: print(server.addresses[0], flush=True); sys.stdin.read()"
+    )
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        with HullClient(process.stdout.readline().strip()) as client:
+            client.create_hull("fleet")
+        (child,) = descendants(process.pid)
+        process.kill()
+        wait_until(lambda: not Path(f"/proc/{child}").exists())
 
 
 def test_live_is_for_the_flights(tmp_path):

@@ -22,9 +22,6 @@ SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 YARD = Polygon([[0, 0], [10, 0], [10, 10], [0, 10]], ([[4, 4], [6, 4], [6, 6], [4, 6]],))
 NUMBERS = count(1)
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
-# Fences are in the reference geometry so far, and not in the kernel.
-
-WRAP = ("env", "DYNHULL_KERNEL=python")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +37,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def server() -> Iterator[tuple[Server, str]]:
     """A server, and the address of its metrics."""
-    with measured(wrap=WRAP) as running:
+    with measured() as running:
         yield running
 
 
@@ -304,7 +301,7 @@ def test_events_that_were_dropped_while_the_server_was_away(
 @pytest.mark.long
 def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     kept = "--data", str(tmp_path)
-    with server_process(*kept, killed=True, wrap=WRAP) as first, HullClient(first.address) as client:
+    with server_process(*kept, killed=True) as first, HullClient(first.address) as client:
         client.create_hull("zone")
         client.apply("zone", insert=SQUARE)
         client.create_hull("fleet", keyed="str")
@@ -324,7 +321,7 @@ def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Bro
             first.process.kill()
             expect(page.get_by_role("alert")).to_contain_text(f"No connection to {first.address}")
             expect(table_row(page, "NAME")).to_contain_text("Connection lost")
-            with server_process(*kept, "--port", first.address.split(":")[1], wrap=WRAP):
+            with server_process(*kept, "--port", first.address.split(":")[1]):
                 expect(page.get_by_role("alert")).to_be_hidden()
                 client.put("fleet", ["b"], [[2, 2]], timeout=PATIENCE)
                 expect(events(page).locator(".subject")).to_have_text(["b", "1 key inside: a"])

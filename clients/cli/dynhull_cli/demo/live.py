@@ -33,11 +33,10 @@ def live(console: Console, scene: Scene, speed: float) -> None:
     """
     with _stopped_by_signals() as stop, running("server", *SERVE, "--metrics-port", "0", lines=2, apart=True) as server:
         address, metrics = server.addresses
-        client = "-m", "dynhull_cli"
         where = "--port", "0", "--address", address
         with (
-            running("gateway", *client, "gateway", *where, apart=True) as gateway,
-            running("dashboard", *client, "dashboard", *where, "--metrics", metrics, apart=True) as dashboard,
+            running("gateway", "dynhull_cli", "gateway", *where, apart=True) as gateway,
+            running("dashboard", "dynhull_cli", "dashboard", *where, "--metrics", metrics, apart=True) as dashboard,
             HullClient(address) as hulls,
         ):
             _create(hulls, scene)

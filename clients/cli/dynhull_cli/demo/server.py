@@ -5,8 +5,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from . import child
+
 STOP_SECONDS = 10
-SERVE = "-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"
+SERVE = "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"
 
 
 class Process:
@@ -36,16 +38,17 @@ class Process:
 
 @contextmanager
 def running(name: str, *arguments: str, lines: int = 1, apart: bool = False) -> Iterator[Process]:
-    """Run Python with these arguments, and stop it at the end.
+    """Run a module, and stop it at the end, or when this process is killed.
 
     Args:
         name: what it is, for errors.
-        arguments: those of Python.
+        arguments: the module and its arguments.
         lines: how many lines with addresses it prints when it has started.
         apart: whether Ctrl-C on the terminal does not reach it, so that it ends when the block ends.
     """
-    command = [sys.executable, *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=apart) as process:  # noqa: S603  (our own module)
+    command = [sys.executable, "-m", child.__name__, *arguments]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, start_new_session=apart) as process:  # noqa: S603  (our own module)
         try:
             yield Process(name, process, lines)
         finally:
