@@ -48,7 +48,7 @@ from dynhull_server.state.records import (
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NEWEST, DamagedError, NotCommittedError
-from dynhull_server.storage.sqlite.chunks import CHUNK_BYTES
+from dynhull_server.storage.rows.chunks import CHUNK_BYTES
 from dynhull_server.storage.sqlite.disk import Disk
 from dynhull_server.storage.sqlite.folder import DATABASE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage

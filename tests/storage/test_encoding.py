@@ -21,8 +21,8 @@ from dynhull_server.state.records import (
     Record,
     Window,
 )
-from dynhull_server.storage.sqlite import chunks, hull_rows
-from dynhull_server.storage.sqlite.encoding import decode, encode
+from dynhull_server.storage.rows import chunks, hull_rows
+from dynhull_server.storage.rows.encoding import decode, encode
 
 times = st.integers(-(2**53), 2**53) | st.sampled_from([NO_TIME, FOREVER])
 counts = st.integers(0, 5)

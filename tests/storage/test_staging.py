@@ -13,7 +13,7 @@ from dynhull_server.state.fences.records import AddFence, AppendEvents, DropEven
 from dynhull_server.state.records import Append
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, NotCommittedError, StorageError
-from dynhull_server.storage.sqlite import fence_ledger, staging
+from dynhull_server.storage.rows import fence_ledger, staging
 
 FENCES = [10, 11, 12]
 ENDS = ["committed"] * 4 + ["killed", "stopped", "given up", "refused", "unknown"]

@@ -9,14 +9,17 @@ from pathlib import Path
 
 from ...state.records import HullRow, Kept
 from ..port import NEWEST, DamagedError, Progress, StorageError
+from ..rows.examine import Findings
+from ..rows.fence_check import FenceReport, check_fences
+from ..rows.reading import read_hull
+from ..rows.tables import FORMAT, UnreadableError
+from ..rows.totals import STOPPED, Totals
 from .disk import Access, Disk
-from .examine import Findings, examine, format_of, load
-from .fence_check import FenceReport, check_fences
+from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import migrate
-from .reading import read_hull
-from .schema import FORMAT
-from .totals import STOPPED, Totals, renew_totals
+from .readers import SQLiteReader
+from .schema import renew_totals
 
 PAGES_A_STEP = 256
 
@@ -68,7 +71,7 @@ def check(path: Path, progress: Progress) -> Report:
         report = _report(findings, opened.notes)
         if report.fatal:
             return report
-        fences = check_fences(opened.connection, findings.ledger)
+        fences = check_fences(SQLiteReader(opened.connection), findings.ledger)
         return replace(report, fences=fences)
 
 
@@ -123,7 +126,7 @@ def read(path: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
         hull = next((hull for hull in hulls if hull.row.name == name), None)
         if hull is None:
             raise StorageError(f"there is no hull {name!r} in {path}")
-        return hull.row, read_hull(opened.connection, hull, NEWEST), opened.notes
+        return hull.row, read_hull(SQLiteReader(opened.connection), hull, NEWEST), opened.notes
 
 
 def names(path: Path) -> set[str]:
@@ -197,7 +200,7 @@ def _opened(path: Path, *, accept_loss: bool = False) -> Iterator[_Opened]:
             if version == 0:
                 raise StorageError(f"{path} is no data folder: its {DATABASE} is empty")
             yield _Opened(connection, version, notes, own)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnreadableError) as error:
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
 

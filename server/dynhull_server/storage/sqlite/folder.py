@@ -6,9 +6,11 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 from pathlib import Path
 
 from ..port import DamagedError, FormatError, LockedError, StorageError
+from ..rows.tables import UnreadableError
+from ..rows.totals import Totals, totals_from
 from .disk import Access, Disk
 from .log import check_log
-from .totals import Totals, read_totals
+from .readers import SQLiteReader
 
 DATABASE = "dynhull.db"
 LOCK = "dynhull.lock"
@@ -104,6 +106,6 @@ class Folder:
             return None
         try:
             with closing(self.connect(Access.RAW)) as connection:
-                return read_totals(connection)[0]
-        except sqlite3.Error:
+                return totals_from(SQLiteReader(connection).totals())[0]
+        except (sqlite3.Error, UnreadableError):
             return None  # format 1, or damaged, which the examination reports

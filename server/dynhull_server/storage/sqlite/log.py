@@ -21,8 +21,8 @@ import numpy.typing as npt
 
 from ..durability import Durability
 from ..port import DamagedError
+from ..rows.totals import MODES, STOPPED, Totals
 from .disk import Disk
-from .totals import MODES, STOPPED, Totals
 
 HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
 CHECKED_BYTES = 24  # of the header, before its checksum

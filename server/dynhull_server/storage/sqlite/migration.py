@@ -3,11 +3,11 @@
 import sqlite3
 from collections.abc import Mapping
 
-from .fence_runs import Start
-from .hull_rows import values
-from .ledger import Ledger
-from .schema import FENCE_TABLES, INSERT_HULL, INSERT_START, SCHEMAS, TABLES, stamp
-from .totals import Totals, renew_totals
+from ..rows.fence_runs import Start
+from ..rows.hull_rows import values
+from ..rows.ledger import Ledger
+from ..rows.totals import Totals
+from .schema import FENCE_TABLES, INSERT, SCHEMAS, TABLES, renew_totals, stamp
 
 
 def make_tables(connection: sqlite3.Connection) -> None:
@@ -36,10 +36,10 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger, starts
         connection.execute(TABLES[table])
     connection.execute("DROP TABLE hulls")
     connection.execute(TABLES["hulls"])
-    connection.executemany(INSERT_HULL, (values(hull.row) for hull in ledger.hulls.values()))
+    connection.executemany(INSERT["hulls"], (values(hull.row) for hull in ledger.hulls.values()))
     for number, first in starts.items():
         start, stored = Start.at(next(ledger.start_ids), number, first)
-        connection.execute(INSERT_START, (start.place, number, first, stored))
+        connection.execute(INSERT["starts"], (start.place, number, first, stored))
         ledger.fences[number].begin(start, 0)
         ledger.totals = ledger.totals.plus(0, 0, start.weight, 1)
     renew_totals(connection, ledger.totals)

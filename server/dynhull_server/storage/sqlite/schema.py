@@ -1,11 +1,13 @@
 """The tables of each format, and the statements to fill them."""
 
 import sqlite3
+from collections.abc import Iterator
+from typing import Any
+
+from ..rows.tables import COLUMNS, FORMAT, TOTALS_COLUMNS, Insert, Remove, Replace, Statement
+from ..rows.totals import COPIES, Totals
 
 APPLICATION_ID = 0x64796E68  # "dynh"
-FORMAT = 7
-# The first formats with fences, with delayed events, and with events of many fences in a row.
-FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE = 4, 6, 7
 PAGE_BYTES = 8192  # a large batch spans several pages, and wastes half of one
 
 TABLES = {
@@ -91,9 +93,6 @@ TABLES = {
 )""",
 }
 FENCE_TABLES = ("fences", "events", "insides", "consumers", "delays", "starts")
-# The fence, and the first and last sequence, of a row with the events of many fences. A row that a format up to 6 has
-# written has events of one fence, and another encoding.
-MANY = (0, 0, 0)
 
 # Up to format 6 the rows of events said where the events of a fence begin.
 FORMAT_6 = {table: sql for table, sql in TABLES.items() if table != "starts"}
@@ -148,22 +147,25 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     FORMAT: TABLES,
 }
 
-INSERT_HULL = "INSERT INTO hulls (id, name, uid, created, settings, checksum) VALUES (?, ?, ?, ?, ?, ?)"
-INSERT_BATCH = "INSERT INTO batches (rowid, hull, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
-INSERT_CHUNK = "INSERT INTO chunks (rowid, snapshot, number, checksum, points) VALUES (?, ?, ?, ?, ?)"
-INSERT_SNAPSHOT = "INSERT INTO snapshots (id, hull, revision, chunks, state, checksum) VALUES (?, ?, ?, ?, ?, ?)"
-INSERT_FENCE = "INSERT INTO fences (id, name, uid, created, config, checksum) VALUES (?, ?, ?, ?, ?, ?)"
-INSERT_EVENTS = "INSERT INTO events (rowid, fence, first, last, checksum, payload) VALUES (?, ?, ?, ?, ?, ?)"
-SHRINK_EVENTS = "UPDATE events SET checksum = ?, payload = ? WHERE rowid = ?"
-INSERT_INSIDE = (
-    "INSERT INTO insides (rowid, fence, sequence, part, parts, checksum, payload) VALUES (?, ?, ?, ?, ?, ?, ?)"
-)
-INSERT_CONSUMER = "INSERT INTO consumers (rowid, fence, name, acknowledged, lost, checksum) VALUES (?, ?, ?, ?, ?, ?)"
-INSERT_DELAY = "INSERT INTO delays (rowid, fence, checksum, payload) VALUES (?, ?, ?, ?)"
-INSERT_START = "INSERT INTO starts (rowid, fence, first, checksum) VALUES (?, ?, ?, ?)"
-UPDATE_TOTALS = (
-    "UPDATE totals SET commits=?, hulls=?, batches=?, sum=?, next_number=?, mode=?, fence_rows=?, checksum=?"
-)
+INSERT = {
+    table: f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({', '.join('?' * len(columns))})"  # noqa: S608  (ours)
+    for table, columns in COLUMNS.items()
+}
+REPLACE_EVENTS = "UPDATE events SET checksum = ?, payload = ? WHERE rowid = ?"
+UPDATE_TOTALS = f"UPDATE totals SET {', '.join(f'{column} = ?' for column in TOTALS_COLUMNS)}"  # noqa: S608  (ours)
+INSERT_TOTALS = f"INSERT INTO totals ({', '.join(TOTALS_COLUMNS)}) VALUES ({', '.join('?' * len(TOTALS_COLUMNS))})"  # noqa: S608
+
+
+def sql_of(statement: Statement) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """A change of rows as SQL, with its values."""
+    match statement:
+        case Insert(table, values):
+            yield INSERT[table], values
+        case Remove(table, places):
+            for place in places:
+                yield f"DELETE FROM {table} WHERE rowid = ?", (place,)  # noqa: S608  (ours)
+        case Replace(place, checksum, payload):
+            yield REPLACE_EVENTS, (checksum, payload, place)
 
 
 def found(connection: sqlite3.Connection) -> tuple[int, int, dict[str, str | None]]:
@@ -171,6 +173,12 @@ def found(connection: sqlite3.Connection) -> tuple[int, int, dict[str, str | Non
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     return application, version, dict(connection.execute("SELECT name, sql FROM sqlite_schema"))
+
+
+def renew_totals(connection: sqlite3.Connection, totals: Totals) -> None:
+    """Rewrite both copies of the totals."""
+    connection.execute("DELETE FROM totals")
+    connection.executemany(INSERT_TOTALS, [totals.row] * COPIES)
 
 
 def stamp(connection: sqlite3.Connection) -> None:

@@ -10,7 +10,6 @@ durable, reading shows the outcome.
 """
 
 import sqlite3
-from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
@@ -18,45 +17,19 @@ from threading import Lock
 
 from ...state.changes import Change
 from ...state.errors import words
-from ...state.fences.records import FenceEvent, Inside, KeptFence
-from ...state.records import HullRow, Kept
 from ..durability import Durability
-from ..port import (
-    NEWEST,
-    Contents,
-    DamagedError,
-    LockedError,
-    NotCommittedError,
-    Progress,
-    Step,
-    StorageError,
-)
-from .chunks import chunk, starts, state
+from ..port import Contents, DamagedError, LockedError, NotCommittedError, Progress, Step, StorageError
+from ..rows.examine import Findings
+from ..rows.ledger import Group, Ledger
+from ..rows.storage import RowStorage
+from ..rows.tables import FORMAT
+from ..rows.totals import MODES, STOPPED, Totals, totals_from
 from .disk import Access, Disk
-from .encoding import weight
-from .examine import Findings, examine, format_of, load
-from .fence_ledger import DropInside, ShrinkEvents, inside_steps
-from .fence_reading import read_events, read_fences, shrunk
+from .examination import examine, format_of, load
 from .folder import Folder
-from .ledger import (
-    DROPPED,
-    KEPT,
-    Chunk,
-    DropBatches,
-    DropDead,
-    DropSnapshot,
-    Finish,
-    Group,
-    Ledger,
-    Snapshot,
-)
 from .migration import make_tables, migrate
-from .reading import Readers, begin, read_each, read_hull, rows_by_id
-from .schema import FORMAT, PAGE_BYTES, UPDATE_TOTALS
-from .staging import staging
-from .totals import MODES, STOPPED, Totals, read_totals, renew_totals
-
-DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
+from .readers import Readers, SQLiteReader
+from .schema import PAGE_BYTES, UPDATE_TOTALS, renew_totals, sql_of
 
 CHECKPOINT_BYTES = 16 * 2**20  # the size of the log that starts a checkpoint
 LONGEST_LOG_BYTES = 64 * 2**20  # a longer log is truncated when it restarts
@@ -78,7 +51,7 @@ def _as_storage_errors() -> Iterator[None]:
         raise StorageError(str(error)) from error
 
 
-class SQLiteStorage:
+class SQLiteStorage(RowStorage):
     """Hulls in a folder.
 
     Args:
@@ -87,20 +60,14 @@ class SQLiteStorage:
         disk: the disk it is on.
     """
 
-    immediate = False
-    keeps = True
-
     def __init__(self, path: Path, durability: Durability = Durability.SYNC, disk: Disk | None = None) -> None:
+        super().__init__()
         self._folder = Folder(path, disk or Disk())
         self._durability = durability
-        self._ledger = Ledger()
-        self._visible = Lock()  # held while the ledger may differ from the committed rows
-        self._unsettled = False
         self._writer: sqlite3.Connection | None = None
         self._housekeeping = Lock()
         self._log_in_doubt = False
         self._gone: Path | None = None
-        self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._open = ExitStack()
 
     # Opening and closing
@@ -151,21 +118,9 @@ class SQLiteStorage:
     @_as_storage_errors()
     def commit(self, changes: Sequence[Change | Step]) -> None:
         """Commit all of the changes or none."""
-        if self._unsettled:
-            raise StorageError("the outcome of the previous commit is not known yet")
-        if self._gone is not None:
+        if self._gone is not None and not self._unsettled:
             raise NotCommittedError(_gone(self._gone))
-        try:
-            group = Group(self._ledger, changes)  # type: ignore[arg-type]  # all steps come from this class
-        except NotCommittedError:
-            raise
-        except Exception as error:  # a value that does not fit a column, or no memory
-            raise _not_committed(error) from error
-        self._write(group)
-
-    def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
-        """What of many events can be written before the changes."""
-        return staging(changes, lambda: next(self._ledger.event_ids))
+        self._write(self._group(changes))
 
     @_as_storage_errors()
     def settle(self) -> None:
@@ -176,7 +131,7 @@ class SQLiteStorage:
         connection = self._writer = self._connect_writer()
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("BEGIN IMMEDIATE")
-        totals, _ = read_totals(connection)
+        totals, _ = totals_from(SQLiteReader(connection).totals())
         if totals is None:
             raise DamagedError(f"{self._folder.database}: the totals are damaged: restore a backup")
         connection.execute(UPDATE_TOTALS, totals._replace(commits=totals.commits + 1).row)
@@ -187,10 +142,7 @@ class SQLiteStorage:
         connection.execute("BEGIN")
         ledger = load(connection)
         connection.execute("COMMIT")
-        with self._visible:
-            ledger.go_on_from(self._ledger, set().union(*self._under_way.values()))
-            self._ledger = ledger
-            self._unsettled = False
+        self._renew(ledger)
 
     def _write(self, group: Group) -> None:
         connection = self._writer
@@ -198,8 +150,10 @@ class SQLiteStorage:
             if connection is None:
                 connection = self._writer = self._connect_writer()
             connection.execute("BEGIN IMMEDIATE")
-            for sql, values in group.statements:
-                connection.execute(sql, values)
+            for statement in group.statements:
+                for sql, values in sql_of(statement):
+                    connection.execute(sql, values)
+            connection.execute(UPDATE_TOTALS, group.totals.row)
         except BaseException as error:
             self._roll_back()
             if isinstance(error, sqlite3.Error | OSError | MemoryError):
@@ -230,150 +184,14 @@ class SQLiteStorage:
 
     # Reading
 
-    def row(self, number: int) -> HullRow | None:
-        """The hull with that number, or None."""
-        with self._visible:
-            hull = self._settled().hulls.get(number)
-            return None if hull is None else hull.row
+    @property
+    def _place(self) -> str:
+        return str(self._folder.database)
 
-    @_as_storage_errors()
-    def read(self, number: int, until: int = NEWEST) -> Kept:
-        """A hull at a revision."""
-        with self._readers.lend() as connection:
-            with self._visible:
-                hull = self._settled().hulls[number].copy()
-                begin(connection)
-            return read_hull(connection, hull, until)
-
-    def read_each(self, numbers: Sequence[int]) -> Iterator[Kept]:
-        """Hulls at their last revisions."""
+    @contextmanager
+    def _lend(self) -> Iterator[SQLiteReader]:
         with _as_storage_errors(), self._readers.lend() as connection:
-            with self._visible:
-                hulls = [self._settled().hulls[number].copy() for number in numbers]
-                begin(connection)
-            yield from read_each(connection, hulls)
-
-    def oldest(self, number: int) -> int:
-        """The oldest revision that `read` can return."""
-        with self._visible:
-            return self._settled().hulls[number].oldest
-
-    @_as_storage_errors()
-    def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
-        """Fences as last committed."""
-        with self._readers.lend() as connection:
-            with self._visible:
-                ledger = self._settled()
-                found = [ledger.fences.get(number) for number in numbers]
-                fences = [None if fence is None else ledger.runs.since(fence, fence.base) for fence in found]
-                begin(connection)
-            return read_fences(connection, fences)
-
-    @_as_storage_errors()
-    def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
-        """Events of a fence."""
-        with self._readers.lend() as connection:
-            with self._visible:
-                ledger = self._settled()
-                fence = ledger.runs.since(ledger.fences[number], after, most)
-                begin(connection)
-            return read_events(connection, fence, after, most)
-
-    def boundary(self, number: int, first: int) -> int:
-        """The sequence nearest before `first` such that all events before it can be dropped."""
-        with self._visible:
-            return self._settled().fences[number].boundary(first)
-
-    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
-        """Write who is inside, then drop what that supersedes."""
-        yield from inside_steps(number, inside, lambda: next(self._ledger.inside_ids))
-        while (fence := self._ledger.fences.get(number)) and (
-            older := [key for key in fence.insides if key < fence.base]
-        ):
-            yield DropInside(number, older[0])
-
-    def _settled(self) -> Ledger:
-        if self._unsettled:
-            raise StorageError("the outcome of the last commit is not known yet")
-        return self._ledger
-
-    # Snapshots, and the removal of superseded rows
-
-    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
-        """Write a snapshot, then drop the rows it supersedes."""
-        contents = kept.contents
-        firsts = starts(contents)
-        ids = [next(self._ledger.chunk_ids) for _ in firsts]
-        snapshot = Snapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
-        self._under_way[snapshot.id] = set(ids)
-        try:
-            for i, (place, first, end) in enumerate(zip(ids, firsts, [*firsts[1:], len(contents)], strict=True)):
-                yield Chunk(place, snapshot.id, i, chunk(contents, slice(first, end)))
-            yield Finish(number, snapshot, state(kept))
-        finally:
-            del self._under_way[snapshot.id]
-        yield from self._trim(number)
-
-    def _trim(self, number: int) -> Iterator[Step]:
-        while (hull := self._ledger.hulls.get(number)) and len(hull.snapshots) > KEPT:
-            yield DropSnapshot(number, hull.snapshots[0])
-        yield from self._drop_dead("chunks", "points")
-        while (hull := self._ledger.hulls.get(number)) and (ids := hull.superfluous()):
-            rows = self._few(ids, "batches.rowid, first, last, checksum", "batches", "payload")
-            if any(place != row[0] for place, row in zip(ids, rows, strict=False)) or not rows:
-                raise DamagedError(f"{self._folder.database}: a row of batches of hull {number} is missing")
-            weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
-            yield DropBatches(number, ids[: len(rows)], weights)
-
-    def sweep(self) -> Iterator[Step]:
-        """Drop the rows of deleted hulls and unfinished snapshots."""
-        self._look_for_dead_chunks()
-        for table, column in DROPPED.items():
-            yield from self._drop_dead(table, column)
-        for place in self._sparse():
-            step = self._shrunk(place)
-            if step is not None:
-                yield step
-
-    def _sparse(self) -> list[int]:
-        with self._visible:
-            return self._settled().events.sparse()
-
-    @_as_storage_errors()
-    def _shrunk(self, place: int) -> ShrinkEvents | None:
-        """The step that leaves of a row of events what is needed; None if that is nothing."""
-        with self._readers.lend() as connection:
-            with self._visible:
-                starts = {number: fence.first for number, fence in self._settled().fences.items()}
-                begin(connection)
-            return shrunk(connection, place, starts)
-
-    def _drop_dead(self, table: str, column: str) -> Iterator[Step]:
-        while ids := self._ledger.dead[table][:DROPPED_ROWS]:
-            yield DropDead(table, ids[: max(1, len(self._few(ids, "NULL", table, column)))])
-
-    @_as_storage_errors()
-    def _look_for_dead_chunks(self) -> None:
-        """Find the chunks that belong to no snapshot, also those of abandoned ones."""
-        with self._readers.lend() as connection:
-            rows = connection.execute("SELECT rowid, snapshot FROM chunks").fetchall()
-        with self._visible:
-            live = {snapshot.id for hull in self._ledger.hulls.values() for snapshot in hull.snapshots}
-            live |= self._under_way.keys()
-            self._ledger.dead["chunks"] = array("q", (place for place, snapshot in rows if snapshot not in live))
-
-    @_as_storage_errors()
-    def _few(self, ids: "array[int]", columns: str, table: str, sized: str) -> list[Sequence[int]]:
-        """Some columns of the first rows: as many as fit into a step, but at least one."""
-        taken: list[Sequence[int]] = []
-        size = 0
-        with self._readers.lend() as connection:
-            for *row, length in rows_by_id(connection, f"{columns}, length({sized})", table, ids[:DROPPED_ROWS]):
-                size += length
-                if taken and size > DROPPED_BYTES:
-                    break
-                taken.append(row)
-        return taken
+            yield SQLiteReader(connection)
 
     # Housekeeping
 

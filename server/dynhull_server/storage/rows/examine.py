@@ -1,26 +1,23 @@
 """Examination of a database: is all data present and intact, and which rows belong to which hull?"""
 
-import sqlite3
 import struct
 from array import array
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..port import DamagedError, FormatError, Progress
+from ..port import Progress
 from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
 from .hull_rows import found_hulls, values
 from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
-from .schema import APPLICATION_ID, FENCES_SINCE, FORMAT, PAGE_BYTES, SCHEMAS, found
-from .totals import Totals, read_totals
+from .tables import COLUMNS, FENCES_SINCE, Reader
+from .totals import Totals, totals_from
 
-MOST_MESSAGES = 5  # of SQLite's checks
 PROGRESS_ROWS = 1000
 
 MISSING = 0  # the number of no row
@@ -65,82 +62,20 @@ class _Scanned:
     snapshots: dict[int, Snapshot] = field(default_factory=dict)
 
 
-def format_of(connection: sqlite3.Connection, database: Path) -> int:
-    """The format of a database, 0 if it is empty.
-
-    Raises:
-        FormatError: it was written by another program, or by a newer version.
-    """
-    application, version, tables = found(connection)
-    if not tables and application == version == 0:
-        return 0
-    if application != APPLICATION_ID:
-        raise FormatError(f"{database} belongs to another program: choose another folder")
-    if version not in SCHEMAS:
-        raise FormatError(
-            f"{database} has format {version}, this version reads formats 1 to {FORMAT}: run the newer version of "
-            "dynhull that wrote it"
-        )
-    return version
-
-
-def examine(connection: sqlite3.Connection, version: int, own: Totals | None, progress: Progress) -> Findings:
-    """Compare all data of a database with its checksums and totals.
+def examine(reader: Reader, version: int, findings: Findings, progress: Progress, *, contents: bool = True) -> None:
+    """Compare all rows with their checksums and the totals.
 
     Args:
-        connection: a connection with an open transaction, so that all data is of one moment.
+        reader: reads the rows.
         version: the format.
-        own: the totals in the database file, without its log; None if unknown.
+        findings: receives the rows of each hull, and what is damaged.
         progress: called with the rows examined so far and the total.
-    """
-    findings = Findings()
-    try:
-        if not _has_tables(connection, version, findings):
-            return findings
-        _check_structure(connection, version, findings)
-        _Examination(connection, version, findings, progress).run()
-        if own is not None and own.commits > findings.ledger.totals.commits:
-            findings.fatal.append(
-                "log and database do not belong together: the database has later commits than its log"
-            )
-    except sqlite3.Error as error:
-        findings.fatal.append(f"a part of the database cannot be read ({error})")
-    return findings
-
-
-def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
-    """The ledger of a database that was intact when it was opened.
+        contents: whether to read and check payloads and points too.
 
     Raises:
-        DamagedError: it is damaged.
+        UnreadableError: the database itself is damaged.
     """
-    findings = Findings()
-    if _has_tables(connection, version, findings):
-        _Examination(connection, version, findings, lambda *_: None, contents=False).run()
-    if findings.fatal:
-        raise DamagedError("; ".join(findings.fatal))
-    return findings.ledger
-
-
-def _has_tables(connection: sqlite3.Connection, version: int, findings: Findings) -> bool:
-    """Whether the tables are those of the format; if not, nothing can be read."""
-    *_, tables = found(connection)
-    if tables != SCHEMAS[version]:
-        findings.fatal.append("the tables are not those of this format")
-    return tables == SCHEMAS[version]
-
-
-def _check_structure(connection: sqlite3.Connection, version: int, findings: Findings) -> None:
-    """Have SQLite check the structure of pages and cells."""
-    settings = {"page_size": PAGE_BYTES, "auto_vacuum": 0, "encoding": "UTF-8"}
-    for name, expected in settings.items():
-        if connection.execute(f"PRAGMA {name}").fetchone() != (expected,):
-            findings.fatal.append(f"the database's header is damaged ({name})")
-    # Format 1 is read through its indexes, which must agree with the tables.
-    check = "integrity_check" if version == 1 else "quick_check"
-    messages = [text for (text,) in connection.execute(f"PRAGMA {check}({MOST_MESSAGES})")]
-    if messages != ["ok"]:
-        findings.fatal.append("; ".join(" ".join(text.split()) for text in messages))
+    _Examination(reader, version, findings, progress, contents=contents).run()
 
 
 class _Examination:
@@ -148,15 +83,15 @@ class _Examination:
 
     def __init__(
         self,
-        connection: sqlite3.Connection,
+        reader: Reader,
         version: int,
         findings: Findings,
         progress: Progress,
         *,
-        contents: bool = True,
+        contents: bool,
     ) -> None:
         self._contents = contents
-        self._connection = connection
+        self._reader = reader
         self._version = version
         self._findings = findings
         self._ledger = findings.ledger
@@ -176,7 +111,7 @@ class _Examination:
         self._chunks()
         self._batches()
         if self._version >= FENCES_SINCE:
-            examination = FenceExamination(self._connection, self._ledger, self._version, contents=self._contents)
+            examination = FenceExamination(self._reader, self._ledger, self._version, contents=self._contents)
             self._fences = examination.run()
             self._findings.fatal += self._fences.fatal
             self._findings.repairs += self._fences.repairs
@@ -187,13 +122,11 @@ class _Examination:
         self._judge_fenced()
 
     def _totals(self) -> Totals | None:
-        (batches,) = self._connection.execute("SELECT count(*) FROM batches").fetchone()
-        (chunks,) = self._connection.execute("SELECT count(*) FROM chunks").fetchone()
-        self._all = batches + chunks
+        self._all = self._reader.count("batches") + self._reader.count("chunks")
         self._progress(0, self._all)
         if self._version == 1:
             return None
-        totals, self._findings.both_totals = read_totals(self._connection)
+        totals, self._findings.both_totals = totals_from(self._reader.totals())
         if totals is None:
             self._findings.fatal.append(
                 "both copies of the totals are damaged, so missing batches could not be noticed"
@@ -205,7 +138,7 @@ class _Examination:
         return totals
 
     def _hull_rows(self) -> None:
-        for hull in found_hulls(self._connection, self._version):
+        for hull in found_hulls(self._reader, self._version):
             row = hull.row
             if not hull.whole:
                 self._findings.damaged.add(row.number)
@@ -217,8 +150,8 @@ class _Examination:
             self._hulls[row.number] = _Scanned(rows)
 
     def _snapshots(self) -> None:
-        query = "SELECT id, hull, revision, chunks, state, checksum FROM snapshots ORDER BY id"
-        for place, number, revision, chunks, state, stored in self._connection.execute(query):
+        columns = ", ".join(COLUMNS["snapshots"])
+        for place, number, revision, chunks, state, stored in self._reader.every("snapshots", columns):
             self._newest_snapshot = place
             scanned = self._hulls.get(number)
             if scanned is None:
@@ -232,9 +165,10 @@ class _Examination:
         """Assign the chunks to their snapshots."""
         chunks = {key: snapshot.chunks for each in self._hulls.values() for key, snapshot in each.snapshots.items()}
         column = "points" if self._contents else "NULL"
-        query = f"SELECT rowid, snapshot, number, checksum, {column} FROM chunks ORDER BY rowid"  # noqa: S608  (ours)
         newest = MISSING
-        for place, snapshot, number, stored, data in self._counted(query):
+        for place, snapshot, number, stored, data in self._counted(
+            "chunks", f"rowid, snapshot, number, checksum, {column}"
+        ):
             newest = place
             places = chunks.get(snapshot)
             if places is None:
@@ -248,10 +182,10 @@ class _Examination:
 
     def _batches(self) -> None:
         column = "payload" if self._contents else "NULL"
-        query = f"SELECT rowid, hull, first, last, checksum, {column} FROM batches ORDER BY rowid"  # noqa: S608  (ours)
+        columns = f"rowid, hull, first, last, checksum, {column}"
         newest = MISSING
         hulls, dead = self._hulls, self._ledger.dead["batches"]
-        for place, number, first, last, stored, payload in self._counted(query):
+        for place, number, first, last, stored, payload in self._counted("batches", columns):
             newest = place
             scanned = hulls.get(number)
             if scanned is None:
@@ -272,8 +206,8 @@ class _Examination:
                 scanned.damaged[first] = each
         self._ledger.batch_ids = count(newest + 1)
 
-    def _counted(self, query: str) -> Iterator[tuple[Any, ...]]:
-        for row in self._connection.execute(query):
+    def _counted(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
+        for row in self._reader.every(table, columns):
             yield row
             self._done += 1
             if self._done % PROGRESS_ROWS == 0:

@@ -1,7 +1,7 @@
 """The totals of all rows: stored twice, updated in each commit."""
 
-import sqlite3
-from typing import NamedTuple, Self
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 from ..durability import Durability
 from .encoding import checksum
@@ -55,24 +55,11 @@ class Totals(NamedTuple):
         return *self, checksum(b"", *self)
 
 
-def read_totals(connection: sqlite3.Connection) -> tuple[Totals | None, bool]:
-    """The totals, None if damaged; and whether both copies are intact.
-
-    Raises:
-        sqlite3.Error: the table is missing, or cannot be read.
-    """
+def totals_from(rows: Sequence[Sequence[Any]]) -> tuple[Totals | None, bool]:
+    """The totals of all copies found, None if they are damaged; and whether both copies are intact."""
     whole = set()
-    rows = [row for _, *row in connection.execute("SELECT * FROM totals")]  # up to format 3 without fences
-    for *values, stored in rows:
+    for *values, stored in rows:  # up to format 3 without fences
         if all(type(value) is int for value in values) and checksum(b"", *values) == stored:
             whole.add(Totals(*values))
     both = len(rows) == COPIES and all(row == rows[0] for row in rows)
     return whole.pop() if len(whole) == 1 else None, both
-
-
-def renew_totals(connection: sqlite3.Connection, totals: Totals) -> None:
-    """Rewrite both copies."""
-    columns = "commits, hulls, batches, sum, next_number, mode, fence_rows, checksum"
-    connection.execute("DELETE FROM totals")
-    sql = f"INSERT INTO totals ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"  # noqa: S608  (ours)
-    connection.executemany(sql, [totals.row] * COPIES)

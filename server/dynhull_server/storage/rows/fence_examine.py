@@ -1,6 +1,5 @@
 """Examination of the rows of fences: are all present and intact?"""
 
-import sqlite3
 import struct
 from array import array
 from collections import Counter, defaultdict
@@ -18,7 +17,7 @@ from .event_rows import decode_delay
 from .fence_ledger import DropInside, DropStaged, FenceStep, Staged
 from .fence_rows import consumer_values, found_fences
 from .fence_runs import FenceRows, Start
-from .schema import DELAYS_SINCE, STARTS_SINCE
+from .tables import DELAYS_SINCE, STARTS_SINCE, Reader
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -50,14 +49,14 @@ class FenceExamination:
     """Reads every row of the fences, and fills the ledger. Without `contents`, payloads are not read.
 
     Args:
-        connection: a connection with an open transaction.
+        reader: reads the rows.
         ledger: receives the rows.
         version: the format.
         contents: whether to read payloads.
     """
 
-    def __init__(self, connection: sqlite3.Connection, ledger: "Ledger", version: int, *, contents: bool) -> None:
-        self._connection = connection
+    def __init__(self, reader: Reader, ledger: "Ledger", version: int, *, contents: bool) -> None:
+        self._reader = reader
         self._ledger = ledger
         self._fences = ledger.fences
         self._contents = contents
@@ -88,7 +87,7 @@ class FenceExamination:
         return found
 
     def _fence_rows(self) -> None:
-        for each in found_fences(self._connection):
+        for each in found_fences(self._reader):
             if each.row is None:
                 self._found.fatal.append(f"the row of fence {each.number}, {each.name!r}, is damaged")
                 continue
@@ -97,9 +96,7 @@ class FenceExamination:
 
     def _starts(self) -> None:
         newest = 0
-        for place, number, first, stored in self._connection.execute(
-            "SELECT rowid, fence, first, checksum FROM starts ORDER BY rowid"
-        ):
+        for place, number, first, stored in self._reader.every("starts", "rowid, fence, first, checksum"):
             newest = place
             fence = self._fences.get(number)
             if fence is None:
@@ -114,9 +111,9 @@ class FenceExamination:
 
     def _events(self) -> None:
         column = "payload" if self._contents else "CASE fence WHEN 0 THEN payload END"
-        query = f"SELECT rowid, fence, first, last, checksum, {column} FROM events ORDER BY rowid"  # noqa: S608  (ours)
+        columns = f"rowid, fence, first, last, checksum, {column}"
         newest = 0
-        for place, number, first, last, stored, payload in self._connection.execute(query):
+        for place, number, first, last, stored, payload in self._reader.every("events", columns):
             newest = place
             try:
                 whole = (number != 0 and not self._contents) or checksum(payload, number, first, last) == stored
@@ -157,9 +154,9 @@ class FenceExamination:
 
     def _insides(self) -> None:
         column = "payload" if self._contents else "NULL"
-        query = f"SELECT rowid, fence, sequence, part, parts, checksum, {column} FROM insides ORDER BY rowid"  # noqa: S608  (ours)
+        columns = f"rowid, fence, sequence, part, parts, checksum, {column}"
         newest = 0
-        for place, number, sequence, part, parts, stored, payload in self._connection.execute(query):
+        for place, number, sequence, part, parts, stored, payload in self._reader.every("insides", columns):
             newest = place
             fence = self._fences.get(number)
             if fence is None:
@@ -172,9 +169,9 @@ class FenceExamination:
         self._ledger.inside_ids = count(newest + 1)
 
     def _consumers(self) -> None:
-        query = "SELECT rowid, fence, name, acknowledged, lost, checksum FROM consumers ORDER BY rowid"
+        columns = "rowid, fence, name, acknowledged, lost, checksum"
         newest = 0
-        for place, number, name, acknowledged, lost, stored in self._connection.execute(query):
+        for place, number, name, acknowledged, lost, stored in self._reader.every("consumers", columns):
             newest = place
             fence = self._fences.get(number)
             if fence is None:
@@ -189,8 +186,7 @@ class FenceExamination:
 
     def _delays(self) -> None:
         newest = 0
-        query = "SELECT rowid, fence, checksum, payload FROM delays ORDER BY rowid"
-        for place, number, stored, payload in self._connection.execute(query):
+        for place, number, stored, payload in self._reader.every("delays", "rowid, fence, checksum, payload"):
             newest = place
             fence = self._fences.get(number)
             if fence is None:

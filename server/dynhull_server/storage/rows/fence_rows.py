@@ -2,7 +2,6 @@
 
 import base64
 import json
-import sqlite3
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -11,6 +10,7 @@ from typing import Any
 from ...state.fences.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
 from ...state.fences.records import NO_WAITS, Consumer, FenceRow, Waits
 from .encoding import checksum
+from .tables import COLUMNS, Reader
 
 Values = tuple[int, str, str, float, str, int]
 
@@ -72,10 +72,9 @@ def settings_from(text: str) -> tuple[FenceConfig, Waits]:
     return FenceConfig(**{**given, "area": _area_from_json(given["area"])}), waits
 
 
-def found_fences(connection: sqlite3.Connection) -> Iterator[FoundFence]:
+def found_fences(reader: Reader) -> Iterator[FoundFence]:
     """The fences of a database."""
-    query = "SELECT id, name, uid, created, config, checksum FROM fences"
-    for number, name, uid, created, config, stored in connection.execute(query):
+    for number, name, uid, created, config, stored in reader.every("fences", ", ".join(COLUMNS["fences"])):
         try:
             row = FenceRow(number, name, uid, created, *settings_from(config))
             whole = _checksum(number, name, uid, created, config) == stored

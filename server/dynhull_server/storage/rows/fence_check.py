@@ -1,6 +1,5 @@
 """Comparison of stored fences with positions, areas and events: whole rows can say what cannot be."""
 
-import sqlite3
 from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import islice, takewhile
@@ -23,6 +22,7 @@ from .fence_reading import read_runs, read_settled
 from .fence_runs import FenceRows
 from .ledger import HullRows, Ledger
 from .reading import read_hull
+from .tables import Reader
 
 # Faults of a fence, and of a hull, at most.
 MOST_FAULTS = 100
@@ -45,17 +45,17 @@ class FenceReport:
     faults: list[FenceFault]
 
 
-def check_fences(connection: sqlite3.Connection, ledger: Ledger) -> list[FenceReport]:
+def check_fences(reader: Reader, ledger: Ledger) -> list[FenceReport]:
     """Compare all fences of a database whose rows are whole. The reports, ordered by name.
 
     Args:
-        connection: a connection with an open transaction.
+        reader: reads the rows.
         ledger: the rows.
 
     Raises:
         DamagedError: a row is damaged or missing.
     """
-    return _Check(connection, ledger).run()
+    return _Check(reader, ledger).run()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +68,8 @@ class _Stored:
 
 
 class _Check:
-    def __init__(self, connection: sqlite3.Connection, ledger: Ledger) -> None:
-        self._connection = connection
+    def __init__(self, reader: Reader, ledger: Ledger) -> None:
+        self._reader = reader
         self._ledger = ledger
         self._hulls = {hull.row.name: hull for hull in ledger.hulls.values()}
         self._names = sorted(self._hulls)
@@ -102,13 +102,13 @@ class _Check:
 
     def _follow(self, fences: list[FenceRows]) -> list[_Stored]:
         """Read fences, and follow their events: those since it was stored who is inside, and all that are kept."""
-        kept = {fence.row.number: read_settled(self._connection, fence) for fence in fences}
+        kept = {fence.row.number: read_settled(self._reader, fence) for fence in fences}
         newest = {
             number: EventOrder(each.row.name, each.inside.sequence, each.inside.members)
             for number, each in kept.items()
         }
         orders = {number: EventOrder(each.row.name, each.first - 1) for number, each in kept.items()}
-        for number, events in read_runs(self._connection, {fence.row.number: (fence, 0) for fence in fences}):
+        for number, events in read_runs(self._reader, {fence.row.number: (fence, 0) for fence in fences}):
             orders[number].take(events)
             newest[number].take(event for event in events if event.sequence > kept[number].inside.sequence)
         stored = []
@@ -150,14 +150,14 @@ class _Check:
         return found
 
     def _contents(self, hull: HullRows) -> tuple[Contents, Center | None]:
-        contents = replayed(read_hull(self._connection, hull, NEWEST), hull.row.settings)
+        contents = replayed(read_hull(self._reader, hull, NEWEST), hull.row.settings)
         return contents.stored(), None if contents.globe is None else contents.globe.center
 
     def _outline(self, name: str, layer: int = 1) -> tuple[Points, Center | None]:
         """The vertices of a hull, or of another convex layer, and its centre."""
         if (name, layer) not in self._outlines:
             hull = self._hulls[name]
-            contents = replayed(read_hull(self._connection, hull, NEWEST), hull.row.settings)
+            contents = replayed(read_hull(self._reader, hull, NEWEST), hull.row.settings)
             center = None if contents.globe is None else contents.globe.center
             self._outlines[name, layer] = layer_of(contents.hull, layer), center
         return self._outlines[name, layer]

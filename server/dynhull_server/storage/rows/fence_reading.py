@@ -1,6 +1,5 @@
 """Reading fences during commits."""
 
-import sqlite3
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -14,51 +13,50 @@ from .event_blocks import decode_block, encode_block
 from .event_rows import decode_delay, decode_events, decode_inside
 from .fence_ledger import ShrinkEvents
 from .fence_runs import FenceRows
-from .reading import rows_by_id
-from .schema import MANY
+from .tables import MANY, Reader
 
 OWN = "\0"  # no name of a hull
 
 
-def read_fences(connection: sqlite3.Connection, fences: Sequence[FenceRows | None]) -> list[KeptFence | None]:
+def read_fences(reader: Reader, fences: Sequence[FenceRows | None]) -> list[KeptFence | None]:
     """Fences with the events after the newest rows that say who was inside; None for None.
 
     Args:
-        connection: a connection whose transaction was open when the fences were copied.
+        reader: reads the rows as of when the fences were copied.
         fences: the rows of fences.
 
     Raises:
         DamagedError: a row is damaged or missing.
     """
     there = [fence for fence in fences if fence is not None]
-    kept = {fence.row.number: read_settled(connection, fence) for fence in there}
-    for number, events in read_runs(connection, {fence.row.number: (fence, fence.base) for fence in there}):
+    kept = {fence.row.number: read_settled(reader, fence) for fence in there}
+    for number, events in read_runs(reader, {fence.row.number: (fence, fence.base) for fence in there}):
         kept[number].events += events
     return [None if fence is None else kept[fence.row.number] for fence in fences]
 
 
-def read_settled(connection: sqlite3.Connection, fence: FenceRows) -> KeptFence:
+def read_settled(reader: Reader, fence: FenceRows) -> KeptFence:
     """A fence without its events."""
     consumers = {name: consumer for name, (consumer, _, _) in fence.consumers.items()}
-    delays = dict(_delays(connection, fence))
-    return KeptFence(fence.row, _inside(connection, fence, fence.base), [], fence.first, consumers, delays)
+    delays = dict(_delays(reader, fence))
+    return KeptFence(fence.row, _inside(reader, fence, fence.base), [], fence.first, consumers, delays)
 
 
-def read_events(connection: sqlite3.Connection, fence: FenceRows, after: int, most: int) -> list[FenceEvent]:
+def read_events(reader: Reader, fence: FenceRows, after: int, most: int) -> list[FenceEvent]:
     """At most that many events after a sequence, from the oldest that is kept."""
     found: list[FenceEvent] = []
-    for _, events in read_runs(connection, {fence.row.number: (fence, after)}, most):
+    for _, events in read_runs(reader, {fence.row.number: (fence, after)}, most):
         found += events
     return found
 
 
 def read_runs(
-    connection: sqlite3.Connection, wanted: Mapping[int, tuple[FenceRows, int]], most: int = NEWEST
+    reader: Reader, wanted: Mapping[int, tuple[FenceRows, int]], most: int = NEWEST
 ) -> Iterator[tuple[int, list[FenceEvent]]]:
     """Some events of many fences, reading each row once.
 
     Args:
-        connection: a connection whose transaction was open when the fences were copied.
+        reader: reads the rows as of when the fences were copied.
         wanted: fences by number, and the sequences after which their events are wanted.
         most: the number of events of each that are wanted.
 
@@ -76,7 +74,7 @@ def read_runs(
     def own(number: int) -> str:
         return wanted[number][0].row.config.subjects if number in wanted else ""
 
-    for place, number, first, end, stored, payload in rows_by_id(connection, columns, "events", places):
+    for place, number, first, end, stored, payload in reader.some("events", columns, places):
         if checksum(payload, number, first, end) != stored:
             fence = next(fence for fence, _ in wanted.values() if place in fence.places)
             raise _damaged(fence, f"row {place} of events is damaged")
@@ -98,19 +96,18 @@ def read_runs(
             raise _damaged(fence, f"event {last[number] + 1} is missing")
 
 
-def shrunk(connection: sqlite3.Connection, place: int, starts: Mapping[int, int]) -> ShrinkEvents | None:
+def shrunk(reader: Reader, place: int, starts: Mapping[int, int]) -> ShrinkEvents | None:
     """The step that leaves of a row of events of many fences what is needed; None if that is nothing.
 
     Args:
-        connection: a connection.
+        reader: reads the row.
         place: the number of the row.
         starts: where the events of each fence begin, by number.
 
     Raises:
         DamagedError: the row is damaged.
     """
-    query = "SELECT checksum, payload FROM events WHERE rowid = ?"
-    for stored, payload in connection.execute(query, (place,)):
+    for stored, payload in reader.some("events", "checksum, payload", array("q", [place])):
         if checksum(payload, *MANY) != stored:
             raise DamagedError(f"row {place} of events is damaged: restore a backup")
         block = decode_block(payload, lambda _: OWN)
@@ -123,7 +120,7 @@ def shrunk(connection: sqlite3.Connection, place: int, starts: Mapping[int, int]
     return None
 
 
-def _inside(connection: sqlite3.Connection, fence: FenceRows, base: int) -> Inside:
+def _inside(reader: Reader, fence: FenceRows, base: int) -> Inside:
     rows = fence.insides.get(base)
     if rows is None:
         return Inside()
@@ -131,7 +128,7 @@ def _inside(connection: sqlite3.Connection, fence: FenceRows, base: int) -> Insi
     members: list[Members] = []
     columns = "fence, sequence, part, parts, checksum, payload"
     count, time = 0, NO_TIME
-    for *keys, stored, payload in rows_by_id(connection, columns, "insides", places):
+    for *keys, stored, payload in reader.some("insides", columns, places):
         if checksum(payload, *keys) != stored or keys != [fence.row.number, base, count, rows.parts]:
             raise _damaged(fence, f"who was inside after event {base} is damaged")
         part = decode_inside(payload, base)
@@ -143,10 +140,10 @@ def _inside(connection: sqlite3.Connection, fence: FenceRows, base: int) -> Insi
     return Inside(base, tuple(members), time)
 
 
-def _delays(connection: sqlite3.Connection, fence: FenceRows) -> Iterator[tuple[Subject, Delay]]:
+def _delays(reader: Reader, fence: FenceRows) -> Iterator[tuple[Subject, Delay]]:
     places = array("q", (place for place, _ in fence.delays.values()))
     count = 0
-    for number, stored, payload in rows_by_id(connection, "fence, checksum, payload", "delays", places):
+    for number, stored, payload in reader.some("delays", "fence, checksum, payload", places):
         if checksum(payload, number) != stored or number != fence.row.number:
             raise _damaged(fence, "a delay is damaged")
         count += 1

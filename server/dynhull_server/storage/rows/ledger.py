@@ -5,7 +5,7 @@ from bisect import bisect_right, insort
 from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Any, Self
+from typing import Self
 
 from ...state.changes import Change
 from ...state.records import Append, Create, Delete, HullRow
@@ -15,26 +15,24 @@ from .event_directory import EventDirectory
 from .fence_ledger import FenceChanges, FenceStep, Staged
 from .fence_runs import FenceRows, FenceRuns
 from .hull_rows import values
-from .schema import INSERT_BATCH, INSERT_CHUNK, INSERT_HULL, INSERT_SNAPSHOT, UPDATE_TOTALS
+from .tables import Insert, Remove, Statement
 from .totals import Totals
 
 KEPT = 2  # snapshots per hull; the older one serves if the newer is damaged
 
-# The tables in which deleted hulls and fences and unfinished snapshots leave rows, and their largest column.
+# The tables in which deleted hulls and fences and unfinished snapshots leave rows, and about the bytes of a row.
 DROPPED = {
-    "snapshots": "state",
-    "batches": "payload",
-    "chunks": "points",
-    "events": "payload",
-    "insides": "payload",
-    "consumers": "name",
-    "delays": "payload",
-    "starts": "first",
+    "snapshots": "length(state)",
+    "batches": "length(payload)",
+    "chunks": "length(points)",
+    "events": "length(payload)",
+    "insides": "length(payload)",
+    "consumers": "length(name)",
+    "delays": "length(payload)",
+    "starts": "8",
 }
 
 IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids", "delay_ids", "start_ids")
-
-Statement = tuple[str, tuple[Any, ...]]
 
 
 @dataclass(slots=True)
@@ -207,12 +205,13 @@ class Group:
     The ledger does not change before `adopt`, so no reader sees uncommitted rows.
 
     Attributes:
-        statements: the SQL statements, that for the totals last.
+        statements: the changes of rows.
+        before, totals: the totals before and after them.
     """
 
     def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
         self._ledger = ledger
-        self._totals = ledger.totals
+        self.before = self.totals = ledger.totals
         # The hulls it concerns, after the changes so far.
         self._now: dict[int, _Now] = {}
         self._effects: list[Callable[[], object]] = []
@@ -222,16 +221,15 @@ class Group:
             self._take(change)
         fences = self._fences
         fences.finish()
-        next_number = max(self._totals.next_number, fences.next_number)
-        self._totals = self._totals.plus(0, 0, fences.sum, fences.rows)
-        self._totals = self._totals._replace(commits=self._totals.commits + 1, next_number=next_number)
-        self.statements.append((UPDATE_TOTALS, self._totals.row))
+        next_number = max(self.totals.next_number, fences.next_number)
+        self.totals = self.totals.plus(0, 0, fences.sum, fences.rows)
+        self.totals = self.totals._replace(commits=self.totals.commits + 1, next_number=next_number)
 
     def adopt(self) -> None:
         """Update the ledger, after the commit."""
         for effect in self._effects:
             effect()
-        self._ledger.totals = self._totals
+        self._ledger.totals = self.totals
 
     def _take(self, change: Change | AnyStep) -> None:
         match change:
@@ -244,7 +242,7 @@ class Group:
             case Chunk():
                 stored = checksum(change.points, change.snapshot, change.number)
                 values = change.id, change.snapshot, change.number, stored, change.points
-                self.statements.append((INSERT_CHUNK, values))
+                self.statements.append(Insert("chunks", values))
             case Finish():
                 self._finish(change)
             case DropSnapshot():
@@ -271,9 +269,9 @@ class Group:
         *columns, stored = values(row)
         rows = HullRows(row, stored)
         self._now[row.number] = _Now(rows, 0, stored, 0)
-        next_number = max(self._totals.next_number, row.number + 1)
-        self._totals = self._totals.plus(1, 0, stored)._replace(next_number=next_number)
-        self.statements.append((INSERT_HULL, (*columns, stored)))
+        next_number = max(self.totals.next_number, row.number + 1)
+        self.totals = self.totals.plus(1, 0, stored)._replace(next_number=next_number)
+        self.statements.append(Insert("hulls", (*columns, stored)))
         self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
 
     def _append(self, change: Append) -> None:
@@ -291,8 +289,8 @@ class Group:
         each = weight(stored, *keys)
         place = next(self._ledger.batch_ids)
         now.batches, now.sum, now.last = now.batches + 1, now.sum + each, last
-        self._totals = self._totals.plus(0, 1, each)
-        self.statements.append((INSERT_BATCH, (place, *keys, stored, payload)))
+        self.totals = self.totals.plus(0, 1, each)
+        self.statements.append(Insert("batches", (place, *keys, stored, payload)))
         self._effects.append(lambda: now.rows.append(first, last, place, each))
 
     def _delete(self, number: int) -> None:
@@ -301,8 +299,8 @@ class Group:
         if now is None:
             raise NotCommittedError(f"there is no hull {number}")
         now.deleted = True
-        self._totals = self._totals.plus(-1, -now.batches, -now.sum)
-        self.statements.append(("DELETE FROM hulls WHERE id = ?", (number,)))
+        self.totals = self.totals.plus(-1, -now.batches, -now.sum)
+        self.statements.append(Remove("hulls", (number,)))
 
         def bury() -> None:
             rows, dead = self._ledger.hulls.pop(number), self._ledger.dead
@@ -320,7 +318,7 @@ class Group:
             self._effects.append(lambda: self._ledger.dead["chunks"].extend(snapshot.chunks))
             return
         keys = snapshot.id, step.number, snapshot.revision, len(snapshot.chunks)
-        self.statements.append((INSERT_SNAPSHOT, (*keys, step.state, checksum(step.state, *keys))))
+        self.statements.append(Insert("snapshots", (*keys, step.state, checksum(step.state, *keys))))
         self._effects.append(lambda: insort(now.rows.snapshots, snapshot, key=lambda each: each.revision))
 
     def _drop_snapshot(self, step: DropSnapshot) -> None:
@@ -332,7 +330,7 @@ class Group:
             now.rows.snapshots.remove(step.snapshot)
             self._ledger.dead["chunks"].extend(step.snapshot.chunks)
 
-        self.statements.append(("DELETE FROM snapshots WHERE id = ?", (step.snapshot.id,)))
+        self.statements.append(Remove("snapshots", (step.snapshot.id,)))
         self._effects.append(drop)
 
     def _drop_batches(self, step: DropBatches) -> None:
@@ -341,8 +339,8 @@ class Group:
         if now is None or now.rows.ids[:count] != step.ids:
             return
         now.batches, now.sum = now.batches - count, now.sum - step.weights
-        self._totals = self._totals.plus(0, -count, -step.weights)
-        self._delete_rows("batches", step.ids)
+        self.totals = self.totals.plus(0, -count, -step.weights)
+        self.statements.append(Remove("batches", step.ids))
         self._effects.append(lambda: now.rows.drop(count, step.weights))
 
     def _cut(self, step: Cut) -> None:
@@ -354,8 +352,8 @@ class Group:
             rows.ids.pop()
             rows.sum -= step.weight
 
-        self._totals = self._totals.plus(0, -1, -step.weight)
-        self._delete_rows("batches", rows.ids[-1:])
+        self.totals = self.totals.plus(0, -1, -step.weight)
+        self.statements.append(Remove("batches", rows.ids[-1:]))
         self._effects.append(cut)
 
     def _drop_dead(self, step: DropDead) -> None:
@@ -363,17 +361,13 @@ class Group:
         count = len(step.ids)
         if dead[:count] != step.ids:
             return
-        self._delete_rows(step.table, step.ids)
+        self.statements.append(Remove(step.table, step.ids))
 
         def drop() -> None:
             if dead[:count] == step.ids:
                 del dead[:count]
 
         self._effects.append(drop)
-
-    def _delete_rows(self, table: str, ids: "array[int]") -> None:
-        sql = f"DELETE FROM {table} WHERE rowid = ?"  # noqa: S608  (ours)
-        self.statements += [(sql, (place,)) for place in ids]
 
 
 @dataclass(slots=True)

@@ -1,7 +1,6 @@
 """The rows of hulls, in each format."""
 
 import json
-import sqlite3
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
@@ -10,6 +9,7 @@ from typing import Any
 
 from ...state.records import DEFAULT, HullRow, HullSettings, Window
 from .encoding import checksum
+from .tables import Reader
 
 Values = tuple[int, str, str, float, str, int]
 
@@ -62,10 +62,10 @@ def settings_from(text: str) -> HullSettings:
     )
 
 
-def found_hulls(connection: sqlite3.Connection, version: int) -> Iterator[FoundHull]:
+def found_hulls(reader: Reader, version: int) -> Iterator[FoundHull]:
     """The hulls of a database of that format."""
-    query, read = FORMATS[version]
-    for number, name, *more in connection.execute(query):
+    columns, read = FORMATS[version]
+    for number, name, *more in reader.every("hulls", columns):
         try:
             yield read(number, name, *more)
         except (ValueError, TypeError, KeyError, AttributeError, struct.error):
@@ -89,13 +89,13 @@ def _of_format_3(number: int, name: str, uid: str, created: float, settings: str
 
 
 FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
-    1: ("SELECT id, name, created, config FROM hulls", _of_format_1),
-    2: ("SELECT id, name, uid, created, max_points, checksum FROM hulls", _of_format_2),
-    3: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
-    4: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
-    5: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
-    6: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
-    7: ("SELECT id, name, uid, created, settings, checksum FROM hulls", _of_format_3),
+    1: ("id, name, created, config", _of_format_1),
+    2: ("id, name, uid, created, max_points, checksum", _of_format_2),
+    3: ("id, name, uid, created, settings, checksum", _of_format_3),
+    4: ("id, name, uid, created, settings, checksum", _of_format_3),
+    5: ("id, name, uid, created, settings, checksum", _of_format_3),
+    6: ("id, name, uid, created, settings, checksum", _of_format_3),
+    7: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,23 +34,13 @@ from .event_blocks import Runs, encode_block
 from .event_rows import encode_delay, encode_inside
 from .fence_rows import consumer_values, values
 from .fence_runs import FenceRows, Start
-from .schema import (
-    INSERT_CONSUMER,
-    INSERT_DELAY,
-    INSERT_EVENTS,
-    INSERT_FENCE,
-    INSERT_INSIDE,
-    INSERT_START,
-    MANY,
-    SHRINK_EVENTS,
-)
+from .tables import MANY, Insert, Remove, Replace, Statement
 
 if TYPE_CHECKING:
     from array import array
 
     from .ledger import Ledger
 
-Statement = tuple[str, tuple[Any, ...]]
 # Keys in a row of those who are inside: about half a megabyte, a commit that delays later ones only briefly.
 KEYS_A_ROW = 16_384
 # Events in a row: whoever reads those of one fence reads all of them.
@@ -190,7 +180,7 @@ class FenceChanges:
 
     Args:
         ledger: the rows as of the last commit; it does not change before the effects.
-        statements: receives the SQL statements.
+        statements: receives the changes of rows.
         effects: receives the updates of the ledger.
 
     Attributes:
@@ -258,7 +248,7 @@ class FenceChanges:
         self._lasts[row.number] = rows.last
         self._plus(now, 1, each)
         self.next_number = max(self.next_number, row.number + 1)
-        self._statements.append((INSERT_FENCE, (*columns, stored)))
+        self._statements.append(Insert("fences", (*columns, stored)))
 
         def begin() -> None:
             self._ledger.fences[row.number] = rows
@@ -349,7 +339,7 @@ class FenceChanges:
         """Write a row of events. Returns its weight."""
         payload = encode_block(block, self._own(block))
         stored = checksum(payload, *MANY)
-        self._statements.append((INSERT_EVENTS, (place, *MANY, stored, payload)))
+        self._statements.append(Insert("events", (place, *MANY, stored, payload)))
         return weight(stored, *MANY)
 
     def _stage(self, step: StageEvents) -> None:
@@ -399,7 +389,7 @@ class FenceChanges:
         stored = checksum(step.payload, *MANY)
         each = self._shrunk[place] = weight(stored, *MANY)
         self.sum += each - before
-        self._statements.append((SHRINK_EVENTS, (stored, step.payload, place)))
+        self._statements.append(Replace(place, stored, step.payload))
         self._effects.append(lambda: events.shrink(place, each, step.runs))
 
     def _rows(self, number: int) -> FenceRows:
@@ -426,8 +416,8 @@ class FenceChanges:
     def _change(self, row: FenceRow, now: _Now) -> None:
         *columns, stored = values(row)
         each = weight(stored, row.number)
-        self._statements.append(("DELETE FROM fences WHERE id = ?", (row.number,)))
-        self._statements.append((INSERT_FENCE, (*columns, stored)))
+        self._statements.append(Remove("fences", (row.number,)))
+        self._statements.append(Insert("fences", (*columns, stored)))
         self._plus(now, 0, each - now.rows.weight)
         self._effects.append(lambda: now.rows.change(row, each))
 
@@ -436,7 +426,7 @@ class FenceChanges:
         now.deleted = True
         self._lasts.pop(number, None)
         self._plus(now, -now.count, -now.sum)
-        self._statements.append(("DELETE FROM fences WHERE id = ?", (number,)))
+        self._statements.append(Remove("fences", (number,)))
 
         rows = now.rows
         if number in self._ledger.fences:
@@ -468,7 +458,7 @@ class FenceChanges:
         start, stored = Start.at(next(self._ledger.start_ids), rows.row.number, first)
         now.start = start
         self._plus(now, 1, start.weight)
-        self._statements.append((INSERT_START, (start.place, rows.row.number, first, stored)))
+        self._statements.append(Insert("starts", (start.place, rows.row.number, first, stored)))
         count = len(rows.firsts) if first > rows.last else max(bisect_right(rows.firsts, first) - 1, 0)
         released = rows.places[now.dropped : count]
         dropped, now.dropped = len(released), max(now.dropped, count)
@@ -489,7 +479,7 @@ class FenceChanges:
         place, each = next(self._ledger.consumer_ids), weight(stored, number)
         now.consumers[consumer.name] = place, each
         self._plus(now, 1, each)
-        self._statements.append((INSERT_CONSUMER, (place, *columns, stored)))
+        self._statements.append(Insert("consumers", (place, *columns, stored)))
         self._effects.append(lambda: now.rows.put_consumer(consumer, place, each))
 
     def _drop_consumer(self, name: str, now: _Now) -> None:
@@ -515,7 +505,7 @@ class FenceChanges:
             place, each = next(self._ledger.delay_ids), weight(stored, number)
             now.delays[subject] = place, each
             self._plus(now, 1, each)
-            self._statements.append((INSERT_DELAY, (place, number, stored, payload)))
+            self._statements.append(Insert("delays", (place, number, stored, payload)))
             self._effects.append(partial(rows.put_delay, subject, place, each))
 
     def _put_inside(self, step: PutInside, now: _Now) -> None:
@@ -523,7 +513,7 @@ class FenceChanges:
         stored = checksum(step.payload, *keys)
         each = weight(stored, *keys)
         self._plus(now, 1, each)
-        self._statements.append((INSERT_INSIDE, (step.place, *keys, stored, step.payload)))
+        self._statements.append(Insert("insides", (step.place, *keys, stored, step.payload)))
         self._effects.append(lambda: now.rows.put_inside(step.sequence, step.parts, step.part, step.place, each))
 
     def _drop_inside(self, sequence: int, now: _Now) -> None:
@@ -534,8 +524,8 @@ class FenceChanges:
             self._effects.append(lambda: now.rows.drop_inside(sequence))
 
     def _delete_rows(self, table: str, places: Iterable[int]) -> None:
-        sql = f"DELETE FROM {table} WHERE rowid = ?"  # noqa: S608  (ours)
-        self._statements += [(sql, (place,)) for place in places]
+        if gone := list(places):
+            self._statements.append(Remove(table, gone))
 
 
 def inside_steps(number: int, inside: Inside, place: Callable[[], int]) -> list[PutInside]:

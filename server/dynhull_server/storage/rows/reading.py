@@ -1,0 +1,111 @@
+"""Reading hulls during commits."""
+
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from typing import Any
+
+from ...state.records import Kept
+from ..port import DamagedError
+from .chunks import joined, state_from
+from .encoding import checksum, decode
+from .ledger import HullRows, Snapshot
+from .tables import Reader, UnreadableError
+
+BATCH_COLUMNS = "first, last, checksum, payload"
+
+
+def read_hull(reader: Reader, hull: HullRows, until: int) -> Kept:
+    """A hull at revision `until`, or at its last one if that is earlier.
+
+    Args:
+        reader: reads the rows as of when `hull` was copied.
+        hull: the rows of the hull.
+        until: the revision.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    if until < hull.oldest:
+        raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
+    with _as_damage(hull):
+        kept = _newest_snapshot(reader, hull, until)
+        rows = reader.some("batches", BATCH_COLUMNS, hull.between(kept.revision, until))
+        _add_records(kept, hull, rows, until)
+    return kept
+
+
+def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
+    """Hulls at their last revisions, in this order. Those without snapshots share queries: they may be many.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    ids = array("q", (place for hull in hulls if not hull.snapshots for place in hull.ids))
+    rows = reader.some("batches", BATCH_COLUMNS, ids)
+    for hull in hulls:
+        if hull.snapshots:
+            yield read_hull(reader, hull, hull.last)
+            continue
+        kept = Kept()
+        with _as_damage(hull):
+            _add_records(kept, hull, islice(rows, len(hull.ids)), hull.last)
+        yield kept
+
+
+@contextmanager
+def _as_damage(hull: HullRows) -> Iterator[None]:
+    """Name the hull of a row that the database cannot read."""
+    try:
+        yield
+    except UnreadableError as error:
+        raise DamagedError(f"hull {hull.row.name!r} cannot be read ({error}): restore a backup") from error
+
+
+def _newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:
+    for snapshot in reversed(hull.snapshots):
+        if snapshot.revision <= until:
+            kept = _snapshot(reader, hull.row.number, snapshot)
+            if kept is not None:
+                return kept
+    return Kept()
+
+
+def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
+    """A snapshot, None if it is damaged."""
+    keys = snapshot.id, number, snapshot.revision, len(snapshot.chunks)
+    row = next(
+        reader.some("snapshots", "state, checksum, snapshots.id, hull, revision, chunks", array("q", [snapshot.id])),
+        None,
+    )
+    if row is None or tuple(row[2:]) != keys or checksum(row[0], *keys) != row[1]:
+        return None
+    kept, decode_chunk = state_from(row[0])
+    parts = []
+    found = reader.some("chunks", "number, checksum, points", array("q", snapshot.chunks))
+    for expected, (number, stored, data) in enumerate(found):
+        if number != expected or checksum(data, snapshot.id, number) != stored:
+            return None
+        parts.append(decode_chunk(data))
+    if len(parts) != len(snapshot.chunks):
+        return None
+    kept.revision, kept.contents = snapshot.revision, joined(parts)
+    return kept
+
+
+def _add_records(kept: Kept, hull: HullRows, rows: Iterable[tuple[Any, ...]], until: int) -> None:
+    """Add the revisions after the snapshot, up to `until` or the last one; `rows` are those that have them."""
+    expected = kept.revision
+    for first, last, stored, payload in rows:
+        if checksum(payload, hull.row.number, first, last) != stored:
+            raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
+        for record in decode(payload, first):
+            if not kept.revision < record.revision <= until:
+                continue
+            expected += 1
+            if record.revision != expected:
+                raise DamagedError(f"hull {hull.row.name!r}: revision {expected} is missing: restore a backup")
+            kept.records.append(record)
+    if expected < min(until, hull.last):
+        raise DamagedError(f"hull {hull.row.name!r}: revision {expected + 1} is missing: restore a backup")

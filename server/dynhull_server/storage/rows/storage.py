@@ -1,0 +1,223 @@
+"""What storages on databases have in common: a ledger in memory, and rows that are read as of the same moment."""
+
+from abc import ABC, abstractmethod
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from threading import Lock
+from typing import Protocol, TypeVar
+
+from ...state.changes import Change
+from ...state.errors import words
+from ...state.fences.records import FenceEvent, Inside, KeptFence
+from ...state.records import HullRow, Kept
+from ..port import NEWEST, DamagedError, NotCommittedError, Step, StorageError
+from . import chunks
+from .encoding import weight
+from .fence_ledger import DropInside, ShrinkEvents, inside_steps
+from .fence_reading import read_events, read_fences, shrunk
+from .fence_runs import FenceRows
+from .ledger import DROPPED, KEPT, Chunk, DropBatches, DropDead, DropSnapshot, Finish, Group, Ledger, Snapshot
+from .reading import read_each, read_hull
+from .staging import staging
+from .tables import Reader
+
+DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
+
+Picked = TypeVar("Picked")
+
+
+class Lent(Reader, Protocol):
+    """A reader that one thread has borrowed."""
+
+    def begin(self) -> None:
+        """From now on read the rows as of this moment."""
+
+
+class RowStorage(ABC):
+    """The part of the port that works on the ledger, whatever database the rows are in.
+
+    An implementation sets `_ledger` when it opens, and holds `_visible` while it commits a group and adopts it.
+    """
+
+    immediate = False
+    keeps = True
+
+    def __init__(self) -> None:
+        self._ledger = Ledger()
+        self._visible = Lock()  # held while the ledger may differ from the committed rows
+        self._unsettled = False
+        self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
+
+    @property
+    @abstractmethod
+    def _place(self) -> str:
+        """Where the rows are, for messages."""
+
+    @abstractmethod
+    def _lend(self) -> AbstractContextManager[Lent]:
+        """A reader, for one thread. Errors of the database become StorageError."""
+
+    # Committing
+
+    def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
+        """What of many events can be written before the changes."""
+        return staging(changes, lambda: next(self._ledger.event_ids))
+
+    def _group(self, changes: Sequence[Change | Step]) -> Group:
+        """The statements of a commit, and what it does to the ledger."""
+        if self._unsettled:
+            raise StorageError("the outcome of the previous commit is not known yet")
+        try:
+            return Group(self._ledger, changes)  # type: ignore[arg-type]  # all steps come from this class
+        except NotCommittedError:
+            raise
+        except Exception as error:  # a value that does not fit a column, or no memory
+            raise NotCommittedError(f"nothing was written: {words(error)}") from error
+
+    def _renew(self, ledger: Ledger) -> None:
+        """Go on with the rows as they are in the database, after a commit with an unknown outcome."""
+        with self._visible:
+            ledger.go_on_from(self._ledger, set().union(*self._under_way.values()))
+            self._ledger = ledger
+            self._unsettled = False
+
+    # Reading
+
+    def row(self, number: int) -> HullRow | None:
+        """The hull with that number, or None."""
+        with self._visible:
+            hull = self._settled().hulls.get(number)
+            return None if hull is None else hull.row
+
+    def read(self, number: int, until: int = NEWEST) -> Kept:
+        """A hull at a revision."""
+        with self._reading(lambda ledger: ledger.hulls[number].copy()) as (reader, hull):
+            return read_hull(reader, hull, until)
+
+    def read_each(self, numbers: Sequence[int]) -> Iterator[Kept]:
+        """Hulls at their last revisions."""
+        with self._reading(lambda ledger: [ledger.hulls[number].copy() for number in numbers]) as (reader, hulls):
+            yield from read_each(reader, hulls)
+
+    def oldest(self, number: int) -> int:
+        """The oldest revision that `read` can return."""
+        with self._visible:
+            return self._settled().hulls[number].oldest
+
+    def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
+        """Fences as last committed."""
+
+        def pick(ledger: Ledger) -> list[FenceRows | None]:
+            found = [ledger.fences.get(number) for number in numbers]
+            return [None if fence is None else ledger.runs.since(fence, fence.base) for fence in found]
+
+        with self._reading(pick) as (reader, fences):
+            return read_fences(reader, fences)
+
+    def read_events(self, number: int, after: int, most: int) -> list[FenceEvent]:
+        """Events of a fence."""
+        with self._reading(lambda ledger: ledger.runs.since(ledger.fences[number], after, most)) as (reader, fence):
+            return read_events(reader, fence, after, most)
+
+    def boundary(self, number: int, first: int) -> int:
+        """The sequence nearest before `first` such that all events before it can be dropped."""
+        with self._visible:
+            return self._settled().fences[number].boundary(first)
+
+    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+        """Write who is inside, then drop what that supersedes."""
+        yield from inside_steps(number, inside, lambda: next(self._ledger.inside_ids))
+        while (fence := self._ledger.fences.get(number)) and (
+            older := [key for key in fence.insides if key < fence.base]
+        ):
+            yield DropInside(number, older[0])
+
+    @contextmanager
+    def _reading(self, pick: Callable[[Ledger], Picked]) -> Iterator[tuple[Reader, Picked]]:
+        """A reader, and a part of the ledger as of the same moment."""
+        with self._lend() as reader:
+            with self._visible:
+                picked = pick(self._settled())
+                reader.begin()
+            yield reader, picked
+
+    def _settled(self) -> Ledger:
+        if self._unsettled:
+            raise StorageError("the outcome of the last commit is not known yet")
+        return self._ledger
+
+    # Snapshots, and the removal of superseded rows
+
+    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
+        """Write a snapshot, then drop the rows it supersedes."""
+        contents = kept.contents
+        firsts = chunks.starts(contents)
+        ids = [next(self._ledger.chunk_ids) for _ in firsts]
+        snapshot = Snapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
+        self._under_way[snapshot.id] = set(ids)
+        try:
+            for i, (place, first, end) in enumerate(zip(ids, firsts, [*firsts[1:], len(contents)], strict=True)):
+                yield Chunk(place, snapshot.id, i, chunks.chunk(contents, slice(first, end)))
+            yield Finish(number, snapshot, chunks.state(kept))
+        finally:
+            del self._under_way[snapshot.id]
+        yield from self._trim(number)
+
+    def _trim(self, number: int) -> Iterator[Step]:
+        while (hull := self._ledger.hulls.get(number)) and len(hull.snapshots) > KEPT:
+            yield DropSnapshot(number, hull.snapshots[0])
+        yield from self._drop_dead("chunks")
+        while (hull := self._ledger.hulls.get(number)) and (ids := hull.superfluous()):
+            rows = self._few("batches", ids, "batches.rowid, first, last, checksum, ")
+            if any(place != row[0] for place, row in zip(ids, rows, strict=False)) or not rows:
+                raise DamagedError(f"{self._place}: a row of batches of hull {number} is missing")
+            weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
+            yield DropBatches(number, ids[: len(rows)], weights)
+
+    def sweep(self) -> Iterator[Step]:
+        """Drop the rows of deleted hulls and unfinished snapshots."""
+        self._look_for_dead_chunks()
+        for table in DROPPED:
+            yield from self._drop_dead(table)
+        for place in self._sparse():
+            step = self._shrunk(place)
+            if step is not None:
+                yield step
+
+    def _sparse(self) -> list[int]:
+        with self._visible:
+            return self._settled().events.sparse()
+
+    def _shrunk(self, place: int) -> ShrinkEvents | None:
+        """The step that leaves of a row of events what is needed; None if that is nothing."""
+        with self._reading(lambda ledger: {key: fence.first for key, fence in ledger.fences.items()}) as (
+            reader,
+            firsts,
+        ):
+            return shrunk(reader, place, firsts)
+
+    def _drop_dead(self, table: str) -> Iterator[Step]:
+        while ids := self._ledger.dead[table][:DROPPED_ROWS]:
+            yield DropDead(table, ids[: max(1, len(self._few(table, ids)))])
+
+    def _look_for_dead_chunks(self) -> None:
+        """Find the chunks that belong to no snapshot, also those of abandoned ones."""
+        with self._lend() as reader:
+            rows = list(reader.every("chunks", "rowid, snapshot"))
+        with self._visible:
+            live = {snapshot.id for hull in self._ledger.hulls.values() for snapshot in hull.snapshots}
+            live |= self._under_way.keys()
+            self._ledger.dead["chunks"] = array("q", (place for place, snapshot in rows if snapshot not in live))
+
+    def _few(self, table: str, ids: "array[int]", columns: str = "") -> list[Sequence[int]]:
+        """Some columns of the first rows: as many as fit into a step, but at least one."""
+        taken: list[Sequence[int]] = []
+        size = 0
+        with self._lend() as reader:
+            for *row, length in reader.some(table, f"{columns}{DROPPED[table]}", ids[:DROPPED_ROWS]):
+                size += length
+                if taken and size > DROPPED_BYTES:
+                    break
+                taken.append(row)
+        return taken

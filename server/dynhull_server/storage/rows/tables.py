@@ -1,0 +1,87 @@
+"""The tables, and how a database reads and changes their rows."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from ..port import StorageError
+
+if TYPE_CHECKING:
+    from array import array
+
+# The present format of rows, and the first ones with fences, delayed events, and events of many fences in a row.
+FORMAT = 7
+FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE = 4, 6, 7
+
+# The columns of each table in the present format; the first is the number of the row.
+COLUMNS = {
+    "hulls": ("id", "name", "uid", "created", "settings", "checksum"),
+    "batches": ("rowid", "hull", "first", "last", "checksum", "payload"),
+    "snapshots": ("id", "hull", "revision", "chunks", "state", "checksum"),
+    "chunks": ("rowid", "snapshot", "number", "checksum", "points"),
+    "fences": ("id", "name", "uid", "created", "config", "checksum"),
+    "events": ("rowid", "fence", "first", "last", "checksum", "payload"),
+    "insides": ("rowid", "fence", "sequence", "part", "parts", "checksum", "payload"),
+    "consumers": ("rowid", "fence", "name", "acknowledged", "lost", "checksum"),
+    "delays": ("rowid", "fence", "checksum", "payload"),
+    "starts": ("rowid", "fence", "first", "checksum"),
+}
+TOTALS_COLUMNS = ("commits", "hulls", "batches", "sum", "next_number", "mode", "fence_rows", "checksum")
+
+# The fence, and the first and last sequence, of a row with the events of many fences. A row that a format up to 6 has
+# written has events of one fence, and another encoding.
+MANY = (0, 0, 0)
+
+
+class UnreadableError(StorageError):
+    """The database itself is damaged: it cannot read a row."""
+
+
+class Insert(NamedTuple):
+    """A new row of a table; its values are in the order of COLUMNS."""
+
+    table: str
+    values: tuple[Any, ...]
+
+
+class Remove(NamedTuple):
+    """Deletes rows of a table; those that do not exist are ignored."""
+
+    table: str
+    places: Sequence[int]
+
+
+class Replace(NamedTuple):
+    """Replaces the payload of a row of events."""
+
+    place: int
+    checksum: int
+    payload: bytes
+
+
+Statement = Insert | Remove | Replace
+
+
+class Reader(Protocol):
+    """Reads rows of the present format, as of one moment.
+
+    The columns that a method is given are SQL expressions which every database understands.
+
+    Raises:
+        UnreadableError: the database is damaged.
+        StorageError: it cannot be read at present.
+    """
+
+    def count(self, table: str) -> int:
+        """The number of rows of a table."""
+
+    def every(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
+        """Some columns of all rows of a table, ordered by the number of the row."""
+
+    def some(self, table: str, columns: str, places: "array[int]") -> Iterator[tuple[Any, ...]]:
+        """Some columns of the rows with these numbers, in this order; rows that do not exist are left out.
+
+        The column with the number of the row is given as `table.column`.
+        """
+
+    def totals(self) -> list[tuple[Any, ...]]:
+        """The rows of the totals, without their numbers."""
