@@ -131,6 +131,43 @@ def test_a_reader_continues_where_it_was(gateway: Gateway, name: str) -> None:
         each.close()
 
 
+def test_a_layer_and_a_sketch(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name})
+    octagon = [[2, 0], [4, 0], [6, 2], [6, 4], [4, 6], [2, 6], [0, 4], [0, 2]]
+    gateway.post(f"/hulls/{name}/points", [*octagon, [2, 2], [3, 2], [3, 3]])
+    path = f"/hulls/{name}/events?rate=100"
+    layer = Events(gateway, f"{path}&layer=2&measures=true")
+    first = next(iter(layer))
+    assert json.loads(first["data"])["vertices"] == [[2, 2], [3, 2], [3, 3]]
+    few = Events(gateway, f"{path}&max_vertices=4")
+    sketch = next(iter(few))
+    shown = json.loads(sketch["data"])
+    assert (sketch["event"], "id" in sketch, len(shown["vertices"]), shown["revision"]) == ("snapshot", False, 4, 1)
+    assert shown["error"] == 2**0.5
+    feature = Events(gateway, f"{path}&max_vertices=4&form=geojson", Last_Event_ID=first["id"])
+    assert len(feature.next()[1]["geometry"]["coordinates"][0]) == 5
+    gateway.post(f"/hulls/{name}/points", [[9, 9]])
+    second = next(iter(layer))
+    # Without the octagon's (6, 4) and (4, 6), which are now below (9, 9).
+    assert (second["event"], json.loads(second["data"])["measures"]["area"]) == ("change", 7)
+    again = Events(gateway, f"{path}&layer=2&measures=true", Last_Event_ID=first["id"])
+    assert next(iter(again)) == second
+    assert [9, 9] in few.next()[1]["vertices"]
+    gateway.call("DELETE", f"/hulls/{name}")
+    assert (layer.next()[0], few.next()[0]) == ("deleted", "deleted")
+    gateway.post("/hulls", {"name": name})
+    assert few.next()[1]["vertices"] == []
+    for each in (layer, few, feature, again):
+        each.close()
+
+
+@pytest.mark.parametrize("query", ["layer=0", "layer=1001", "max_vertices=0", "max_vertices=1001", "layer=x"])
+def test_layers_and_sketches_out_of_range_are_refused(gateway: Gateway, name: str, query: str) -> None:
+    gateway.post("/hulls", {"name": name})
+    refused = gateway.get(f"/hulls/{name}/events?{query}")
+    assert (refused.status, refused.json["field"]) == (400, query.partition("=")[0])
+
+
 def test_what_is_not_there_is_not_found(gateway: Gateway, name: str) -> None:
     for path in (f"/hulls/{name}/events", f"/fences/{name}/events"):
         assert gateway.get(path).status == 404

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import grpc
 
-from dynhull_client import AsyncHullClient, Deleted, DynhullError, Event, HullCopy, Measures, Progress, Snapshot
+from dynhull_client import AsyncHullClient, Deleted, DynhullError, Event, HullCopy, Measures, Progress, Sketch, Snapshot
 
 from ..figures import Figures
 from ..problems import of_refusal
@@ -42,6 +42,8 @@ class View:
     rate: float
     keys: bool
     measures: bool
+    layer: int = 1
+    max_vertices: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,9 @@ class Feed:
         self._client = client
         self._view = view
         self._copy = HullCopy()
+        self._known = False  # whether the copy holds the hull
         self._measures: Measures | None = None
+        self._error: float | None = None  # how far the hull reaches beyond the vertices of a sketch
         self._events: deque[_Sent] = deque(maxlen=KEPT)
         self._count = 0
         self._snapshot: bytes | None = None
@@ -86,7 +90,7 @@ class Feed:
             if place is None and resume is not None:
                 place = self._place(*resume)
             ahead = resume is not None and resume[0] == self._copy.uid and resume[1] > self._copy.revision
-            if place is None and self._copy.uid and not (ahead and monotonic() < begun + PATIENCE_SECONDS):
+            if place is None and self._known and not (ahead and monotonic() < begun + PATIENCE_SECONDS):
                 place, resume = self._count, None
                 yield self._whole()
             elif place is not None and place < self._count - len(self._events):
@@ -125,6 +129,8 @@ class Feed:
                     max_rate=view.rate,
                     keys=view.keys,
                     measures=view.measures,
+                    layer=view.layer,
+                    max_vertices=view.max_vertices,
                     follow=True,
                 )
                 async with watch:
@@ -145,6 +151,11 @@ class Feed:
 
     def _add(self, event: Event) -> None:
         self._snapshot = None
+        self._known = not isinstance(event, Deleted)
+        if isinstance(event, Sketch):
+            self._error = event.error
+            event = _whole_sketch(event)
+            self._copy.update(event)
         if isinstance(event, Deleted):
             text = message("deleted", "", {"revision": event.revision})
             self._events.clear()
@@ -178,6 +189,8 @@ class Feed:
         head: dict[str, Any] = {"revision": copy.revision, "points": copy.points}
         if self._measures is not None:
             head["measures"] = shown(self._measures)
+        if self._error is not None:
+            head["error"] = self._error
         if self._view.form == "geojson":
             geometry = copy.__geo_interface__ if len(copy.vertices) else None
             return {"type": "Feature", "id": self._view.name, "geometry": geometry, "properties": head}
@@ -185,7 +198,8 @@ class Feed:
         return {**head, "vertices": copy.vertices.tolist(), **keys, "center": copy.center}
 
     def _ident(self) -> str:
-        return f"{self._copy.uid}:{self._copy.revision}"
+        """None for a sketch: each is complete, so that a reader who connects again needs no place."""
+        return f"{self._copy.uid}:{self._copy.revision}" if self._copy.uid else ""
 
 
 class Feeds:
@@ -222,6 +236,12 @@ def shown(value: Any) -> dict[str, Any]:
 def of_failure(error: DynhullError) -> Any:
     """The problem details of what ends a stream."""
     return json.loads(bytes(of_refusal(error).body))
+
+
+def _whole_sketch(sketch: Sketch) -> Snapshot:
+    """A sketch as the snapshot of a hull that has only these vertices."""
+    head = sketch.revision, sketch.points, sketch.vertices, sketch.measures
+    return Snapshot(*head, vertex_keys=sketch.keys, center=sketch.center)
 
 
 def _plain(value: Any) -> Any:

@@ -32,6 +32,16 @@ FormOf = Annotated[
 ]
 WithKeys = Annotated[bool, Query(description="Whether to name the vertices, in a keyed hull.")]
 WithMeasures = Annotated[bool, Query(description="Whether events include measures.")]
+Layer = Annotated[int, Query(ge=1, le=1000, description="The convex layer to follow; 1 is the hull.")]
+MaxVertices = Annotated[
+    int | None,
+    Query(
+        ge=1,
+        le=1000,
+        description="Show at most this many of the vertices. Each event is then a snapshot; its error is the distance "
+        "by which the hull reaches beyond them, rounded up. Not for hulls on the globe.",
+    ),
+]
 Consumer = Annotated[
     str | None,
     Query(pattern=NAME, description="A durable consumer, which knows its place: events after the acknowledged one."),
@@ -62,6 +72,8 @@ async def hull_events(
     rate: Rate = 10.0,
     keys: WithKeys = False,
     measures: WithMeasures = False,
+    layer: Layer = 1,
+    max_vertices: MaxVertices = None,
     last_event_id: LastEventId = None,
 ) -> Response:
     """Follow a hull: events "snapshot", "change", "progress" and "deleted", with ids UID:REVISION.
@@ -69,11 +81,14 @@ async def hull_events(
     A reader that connects again with the id of its last event continues from there, with the changes since then or with
     a snapshot; so does one that is too slow. A hull that is created again begins with a snapshot. What ends the stream
     is an event "problem".
+
+    Events of a stream with max_vertices have no ids: each shows all there is, and a reader that connects again begins
+    with the present one. An inner layer begins with a snapshot also when the gateway has lost the server for a while.
     """
     _admit(request)
     with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
         await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
-    view = View(token_of(request), name, form, rate, keys, measures)
+    view = View(token_of(request), name, form, rate, keys, measures, layer, max_vertices)
     state = request.app.state
     texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
     return EventStream(texts, state.health, state.figures)
