@@ -232,9 +232,7 @@ def test_a_folder_of_format_4_has_every_fence(folder, name):
         assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
 
 
-# Format 6, written by tests/data/make_folder.py
-
-FORMAT_6 = OLD_FOLDERS / "format6"
+# Formats 6 and 7, written by tests/data/make_folder.py
 
 
 def as_told(event):
@@ -243,11 +241,12 @@ def as_told(event):
     return [event.sequence, event.type.name.lower(), event.hull, key, position, event.distance]
 
 
+@pytest.mark.parametrize("version", ["format6", "format7"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
-def test_a_folder_of_format_6_has_every_event(folder, name):
-    """Those of rows for one fence each; the next ones share rows, and are dropped one by one."""
-    shutil.copytree(FORMAT_6 / name, folder)
-    expected = json.loads((FORMAT_6 / f"{name}-fences.json").read_text())
+def test_a_folder_with_events_has_every_event(folder, name, version):
+    """Those of rows for one fence each, and of shared ones; the next ones share rows, and are dropped one by one."""
+    shutil.copytree(OLD_FOLDERS / version / name, folder)
+    expected = json.loads((OLD_FOLDERS / version / f"{name}-fences.json").read_text())
     for _ in range(2):
         storage, contents = opened(folder)
         assert contents.notes == []

@@ -2,7 +2,8 @@
 
 A payload has the number of events, that of runs, flags, and columns. A column of integers is their least one, the
 number of bytes of a difference to it, and these differences: what all have in common takes almost nothing. Of a
-previous position only the bits that differ from the position are stored, without the zero bytes before them.
+previous position only the bits that differ from the position are stored, without the zero bytes before them. Positions
+that are decimals of at most seven places, as those of most receivers are, are integers instead.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,14 +27,19 @@ HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
 PAIRED = EventType.BEGIN, EventType.CEASE  # they have a distance without a position
 # What a block has.
 HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE, HAS_ORIGINS = 1, 2, 4, 8, 16
-ALL_FLAGS = 31
+# How it is written, since format 8: without the counts of runs, as each is one event; without revisions of areas, as
+# there are none; positions as multiples of 1e-7.
+ONE_EACH, NO_AREAS, DECIMALS = 32, 64, 128
 WORD = 8
 FEW = 64
+# Multiples of 1e-7 up to this one are integers that a double holds.
+PLACES, GREATEST = 1e7, 2.0**53
 # The numbers from which on an integer needs one byte more.
 LIMITS = np.array([1 << 8 * size for size in range(WORD)], np.uint64)
 
 Words = npt.NDArray[np.uint64]
 Column = npt.NDArray[np.integer[Any]]
+Mask = npt.NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
@@ -67,11 +73,17 @@ def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
         flags |= HAS_INSIDE
     if block.origins:
         flags |= HAS_ORIGINS
+    there, before = marks & HAS_POSITION != 0, marks & HAS_PREVIOUS != 0
+    decimals = _decimals(block.points[there], block.previous[before])
+    flags |= ONE_EACH * (len(block) == len(block.fences)) + NO_AREAS * (not block.area_revisions.any())
+    flags |= DECIMALS * (decimals is not None)
     put_unsigned(out, len(block))
     put_unsigned(out, len(block.fences))
     out.append(flags)
     put = _put_one if len(block) == 1 else _put_integers
-    put(out, block.fences, block.firsts, block.counts)
+    put(out, block.fences, block.firsts)
+    if not flags & ONE_EACH:
+        put(out, block.counts)
     if named:
         used, places = np.unique(block.hulls[~own], return_inverse=True)
         put_unsigned(out, len(used))
@@ -80,11 +92,21 @@ def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
         of_runs = np.zeros(len(block.fences), np.int64)
         of_runs[~own] = places + 1
         put(out, of_runs)
-    put(out, block.kinds, block.subject_revisions, block.area_revisions, block.times)
-    put(out, marks, block.causes, block.lengths)
+    put(out, block.kinds, block.subject_revisions)
+    if not flags & NO_AREAS:
+        put(out, block.area_revisions)
+    put(out, block.times)
+    if len(block) == 1:
+        out += marks.tobytes()
+    else:
+        put(out, marks)
+    put(out, block.causes, block.lengths)
     out += block.keys
-    out += point_bytes(block.points[marks & HAS_POSITION != 0])
-    _put_previous(out, block, marks & HAS_PREVIOUS != 0)
+    if decimals is None:
+        out += point_bytes(block.points[there])
+        _put_previous(out, block, before)
+    else:
+        _put_decimals(out, put, *decimals, there[before], before[there])
     out += block.distances[marks & HAS_DISTANCE != 0].astype("<f8", copy=False).tobytes()
     if flags & HAS_EVENT_TIMES:
         _put_integers(out, block.event_times[timed])
@@ -117,7 +139,7 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     cursor = Cursor(payload)
     n, m, flags = _counts(cursor)
     take = _take_one if n == 1 else _take_integers
-    fences, firsts, counts = (take(cursor, m) for _ in range(3))
+    fences, firsts, counts = _take_runs(cursor, n, m, flags)
     names, of_runs = [], np.zeros(m, np.int64)
     if flags & HAS_HULLS:
         names = [take_text(cursor) for _ in range(take_unsigned(cursor))]
@@ -125,15 +147,21 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     if of_runs.min() < 0 or of_runs.max() > len(names):
         raise ValueError(f"a hull is number {of_runs.max()} of {len(names)}")
     hulls, names = _with_own(of_runs, names, [own(number) for number in fences[of_runs == 0].tolist()])
-    kinds, subject_revisions, area_revisions, times = (take(cursor, m) for _ in range(4))
-    marks, causes, lengths = (take(cursor, n).astype(np.uint8) for _ in range(3))
+    kinds, subject_revisions = take(cursor, m), take(cursor, m)
+    area_revisions = np.zeros(m, np.int64) if flags & NO_AREAS else take(cursor, m)
+    times = take(cursor, m)
+    raw = n == 1 and flags & ONE_EACH
+    marks = np.frombuffer(cursor.take(1), np.uint8) if raw else take(cursor, n).astype(np.uint8)
+    causes, lengths = (take(cursor, n).astype(np.uint8) for _ in range(2))
     keys = bytes(cursor.take(int(lengths.sum(dtype=np.int64))))
     types, there = marks & np.uint8(TYPE_BITS), marks & HAS_POSITION != 0
-    points = np.full((n, 2), np.nan)
-    points[there] = cursor.points(int(there.sum()))
-    previous = np.full((n, 2), np.nan)
     before = marks & HAS_PREVIOUS != 0
-    previous[before] = _take_previous(cursor, points[before])
+    points, previous = np.full((n, 2), np.nan), np.full((n, 2), np.nan)
+    if flags & DECIMALS:
+        points[there], previous[before] = _take_decimals(cursor, take, there, before)
+    else:
+        points[there] = cursor.points(int(there.sum()))
+        previous[before] = _take_previous(cursor, points[before])
     distances = np.where(there | np.isin(types, PAIRED), 0.0, np.nan)
     far = marks & HAS_DISTANCE != 0
     distances[far] = np.frombuffer(cursor.take(WORD * int(far.sum())), "<f8")
@@ -190,18 +218,21 @@ def _with_own(of_runs: Integers, names: Sequence[str], own: Sequence[str]) -> tu
 def decode_runs(payload: bytes) -> Runs:
     """Which fences have which events in a payload. ValueError if the bytes are no events."""
     cursor = Cursor(payload)
-    n, m, _ = _counts(cursor)
-    take = _take_one if n == 1 else _take_integers
-    fences, firsts, counts = (take(cursor, m) for _ in range(3))
-    return Runs(fences, firsts, counts)
+    return _take_runs(cursor, *_counts(cursor))
 
 
 def _counts(cursor: Cursor) -> tuple[int, int, int]:
     n, m = take_unsigned(cursor), take_unsigned(cursor)
     (flags,) = cursor.take(1)
-    if not 0 < m <= n or flags > ALL_FLAGS:
+    if not 0 < m <= n or (flags & ONE_EACH and m < n):
         raise ValueError(f"a row has {n} events in {m} runs, and the flags {flags:#x}")
     return n, m, flags
+
+
+def _take_runs(cursor: Cursor, n: int, m: int, flags: int) -> Runs:
+    take = _take_one if n == 1 else _take_integers
+    fences, firsts = take(cursor, m), take(cursor, m)
+    return Runs(fences, firsts, np.ones(m, np.int64) if flags & ONE_EACH else take(cursor, m))
 
 
 def _marks(block: EventBlock) -> Bytes:
@@ -252,6 +283,63 @@ def _take_integers(cursor: Cursor, count: int) -> Integers:
     found[:, :size] = np.frombuffer(cursor.take(count * size), np.uint8).reshape(count, size)
     above = found.view("<u8").ravel().astype(np.uint64, copy=False)
     return (above + np.array(least, np.int64).view(np.uint64)).view(np.int64)
+
+
+# Positions as multiples of 1e-7
+
+
+def _decimals(points: Points, previous: Points) -> tuple[Integers, Integers] | None:
+    """Positions, and those before, as multiples of 1e-7; None if one of them is no such number, or too large."""
+    if len(points) and not _is_decimal(float(points[0, 0])):  # as a rule all are, or none
+        return None
+    values = np.concatenate([points, previous])
+    with np.errstate(over="ignore"):
+        multiples = np.rint(values * PLACES)
+    if not (np.abs(multiples) <= GREATEST).all() or (multiples / PLACES != values).any():
+        return None
+    if (np.signbit(values) & (values == 0)).any():  # an integer has no negative zero
+        return None
+    found = multiples.astype(np.int64)
+    return found[: len(points)], found[len(points) :]
+
+
+def _is_decimal(value: float) -> bool:
+    multiple = value * PLACES
+    return abs(multiple) <= GREATEST and round(multiple) / PLACES == value
+
+
+def _put_decimals(
+    out: bytearray, put: Callable[..., None], points: Integers, previous: Integers, there: Mask, before: Mask
+) -> None:
+    """Append positions, and how those before differ.
+
+    Args:
+        out: receives the bytes.
+        put: appends columns.
+        points: the positions.
+        previous: the positions before.
+        there: of those before, which have a position after them.
+        before: of the positions, which have one before them.
+    """
+    for columns in (points, previous[there] - points[before], previous[~there]):
+        if len(columns):
+            put(out, *columns.T)
+
+
+def _take_decimals(
+    cursor: Cursor, take: Callable[[Cursor, int], Integers], there: Mask, before: Mask
+) -> tuple[Points, Points]:
+    """The inverse of `_put_decimals`, given which events have positions, and positions before."""
+
+    def pairs(count: int) -> Integers:
+        columns = [take(cursor, count) for _ in range(2)] if count else [np.empty(0, np.int64)] * 2
+        return np.stack(columns, axis=1)
+
+    points = pairs(int(there.sum()))
+    previous = np.empty((int(before.sum()), 2), np.int64)
+    previous[there[before]] = pairs(int((there & before).sum())) + points[before[there]]
+    previous[~there[before]] = pairs(int((before & ~there).sum()))
+    return points / PLACES, previous / PLACES
 
 
 # Positions before

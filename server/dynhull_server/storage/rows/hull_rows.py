@@ -96,6 +96,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     5: ("id, name, uid, created, settings, checksum", _of_format_3),
     6: ("id, name, uid, created, settings, checksum", _of_format_3),
     7: ("id, name, uid, created, settings, checksum", _of_format_3),
+    8: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

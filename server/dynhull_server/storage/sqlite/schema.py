@@ -144,6 +144,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     4: FORMAT_5,  # it had no centres in batches and snapshots, and no frames of hulls
     5: FORMAT_5,
     6: FORMAT_6,
+    7: TABLES,  # it wrote the events of a row in more bytes
     FORMAT: TABLES,
 }
 
