@@ -3,6 +3,7 @@
 import json
 import shutil
 import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from dynhull_server.state.fences.records import AppendEvents, Delay, DropEvents,
 from dynhull_server.state.fences.restoring import members_after
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError
+from dynhull_server.storage.sqlite.disk import Access, Disk
 from dynhull_server.storage.sqlite.schema import FORMAT
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -70,8 +72,9 @@ FLEET = {"stopped": 40, "killed": 43}
 PRODUCERS = {"plane": 12, "ship": 12, "train": 12, "bus": 4}
 
 
-def query(folder, sql):
-    with sqlite3.connect(folder / DATABASE) as database:
+def query(folder, sql, access=Access.READ):
+    """What a statement finds. Unless it only reads, the log is copied and deleted when the connection closes."""
+    with closing(Disk().connect(folder / DATABASE, access)) as database:
         return database.execute(sql).fetchall()
 
 
@@ -152,7 +155,7 @@ def test_damage_to_a_folder_of_format_2_is_noticed(folder):
         ("UPDATE batches SET payload = x'00' WHERE first = 30", "revisions 30 to 30 are damaged, and later ones exist"),
     ):
         shutil.copytree(FORMAT_2 / "stopped", folder)
-        query(folder, damage)
+        query(folder, damage, Access.WRITE)
         with pytest.raises(StorageError, match=words):
             opened(folder)
         shutil.rmtree(folder)

@@ -1,9 +1,8 @@
 """Blocks of events as bytes: the payload of a row of events.
 
 A payload has the number of events, that of runs, flags, and columns. A column of integers is their least one, the
-number of bytes of a difference to it, and these differences: what all have in common takes almost nothing. Of a
-previous position only the bits that differ from the position are stored, without the zero bytes before them. Positions
-that are decimals of at most seven places, as those of most receivers are, are integers instead.
+number of bytes of a difference to it, and these differences: what all have in common takes almost nothing. An event
+that is alone in its row has a shorter form: `lone_events.py`.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,34 +11,32 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.arrays import Points
-
-from ...state.fences.event_block import Bytes, EventBlock, Integers
-from ...state.fences.records import EventType, Origin
+from ...state.fences.event_block import Bytes, EventBlock, Integers, block_of
+from ...state.fences.records import Origin
 from ...state.records import NO_TIME
 from .columns import Cursor, point_bytes
-from .event_rows import put_members, take_members
+from .event_positions import WORD, decimals_of, put_decimals, put_previous, take_decimals, take_previous
+from .event_rows import (
+    HAS_DISTANCE,
+    HAS_EVENT_TIME,
+    HAS_POSITION,
+    HAS_PREVIOUS,
+    OF_PAIRS,
+    TYPE_BITS,
+    put_members,
+    take_members,
+)
+from .lone_events import LONE, decode_lone, encode_lone, lone_run
 from .varints import put_signed, put_text, put_unsigned, take_signed, take_text, take_unsigned
 
-# The mark of an event: its type, and what it has. A distance without bytes of its own is 0.
-TYPE_BITS = 15
-HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
-PAIRED = EventType.BEGIN, EventType.CEASE  # they have a distance without a position
 # What a block has.
 HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE, HAS_ORIGINS = 1, 2, 4, 8, 16
 # How it is written, since format 8: without the counts of runs, as each is one event; without revisions of areas, as
 # there are none; positions as multiples of 1e-7.
 ONE_EACH, NO_AREAS, DECIMALS = 32, 64, 128
-WORD = 8
 FEW = 64
-# Multiples of 1e-7 up to this one are integers that a double holds.
-PLACES, GREATEST = 1e7, 2.0**53
-# The numbers from which on an integer needs one byte more.
-LIMITS = np.array([1 << 8 * size for size in range(WORD)], np.uint64)
 
-Words = npt.NDArray[np.uint64]
 Column = npt.NDArray[np.integer[Any]]
-Mask = npt.NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
@@ -58,6 +55,8 @@ class Runs(NamedTuple):
 
 def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
     """A block as bytes. `own` says of which runs the hull is the one whose keys the fence compares: it is left out."""
+    if len(block) == 1:
+        return encode_lone(int(block.fences[0]), block.events(0)[0], own=bool(own[0]))
     out = bytearray()
     marks, flags = _marks(block), 0
     timed = block.event_times != NO_TIME
@@ -74,16 +73,15 @@ def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
     if block.origins:
         flags |= HAS_ORIGINS
     there, before = marks & HAS_POSITION != 0, marks & HAS_PREVIOUS != 0
-    decimals = _decimals(block.points[there], block.previous[before])
+    decimals = decimals_of(block.points[there], block.previous[before])
     flags |= ONE_EACH * (len(block) == len(block.fences)) + NO_AREAS * (not block.area_revisions.any())
     flags |= DECIMALS * (decimals is not None)
     put_unsigned(out, len(block))
     put_unsigned(out, len(block.fences))
     out.append(flags)
-    put = _put_one if len(block) == 1 else _put_integers
-    put(out, block.fences, block.firsts)
+    _put_integers(out, block.fences, block.firsts)
     if not flags & ONE_EACH:
-        put(out, block.counts)
+        _put_integers(out, block.counts)
     if named:
         used, places = np.unique(block.hulls[~own], return_inverse=True)
         put_unsigned(out, len(used))
@@ -91,22 +89,17 @@ def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
             put_text(out, block.names[place])
         of_runs = np.zeros(len(block.fences), np.int64)
         of_runs[~own] = places + 1
-        put(out, of_runs)
-    put(out, block.kinds, block.subject_revisions)
+        _put_integers(out, of_runs)
+    _put_integers(out, block.kinds, block.subject_revisions)
     if not flags & NO_AREAS:
-        put(out, block.area_revisions)
-    put(out, block.times)
-    if len(block) == 1:
-        out += marks.tobytes()
-    else:
-        put(out, marks)
-    put(out, block.causes, block.lengths)
+        _put_integers(out, block.area_revisions)
+    _put_integers(out, block.times, marks, block.causes, block.lengths)
     out += block.keys
     if decimals is None:
         out += point_bytes(block.points[there])
-        _put_previous(out, block, before)
+        put_previous(out, block.points[before], block.previous[before])
     else:
-        _put_decimals(out, put, *decimals, there[before], before[there])
+        put_decimals(out, _put_integers, *decimals, there[before], before[there])
     out += block.distances[marks & HAS_DISTANCE != 0].astype("<f8", copy=False).tobytes()
     if flags & HAS_EVENT_TIMES:
         _put_integers(out, block.event_times[timed])
@@ -136,6 +129,9 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     Raises:
         ValueError: the bytes are no events.
     """
+    if payload[:1] == LONE:
+        number, event = decode_lone(payload, own)
+        return block_of({number: [event]})
     cursor = Cursor(payload)
     n, m, flags = _counts(cursor)
     take = _take_one if n == 1 else _take_integers
@@ -150,19 +146,17 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     kinds, subject_revisions = take(cursor, m), take(cursor, m)
     area_revisions = np.zeros(m, np.int64) if flags & NO_AREAS else take(cursor, m)
     times = take(cursor, m)
-    raw = n == 1 and flags & ONE_EACH
-    marks = np.frombuffer(cursor.take(1), np.uint8) if raw else take(cursor, n).astype(np.uint8)
-    causes, lengths = (take(cursor, n).astype(np.uint8) for _ in range(2))
+    marks, causes, lengths = (take(cursor, n).astype(np.uint8) for _ in range(3))
     keys = bytes(cursor.take(int(lengths.sum(dtype=np.int64))))
     types, there = marks & np.uint8(TYPE_BITS), marks & HAS_POSITION != 0
     before = marks & HAS_PREVIOUS != 0
     points, previous = np.full((n, 2), np.nan), np.full((n, 2), np.nan)
     if flags & DECIMALS:
-        points[there], previous[before] = _take_decimals(cursor, take, there, before)
+        points[there], previous[before] = take_decimals(cursor, take, there, before)
     else:
         points[there] = cursor.points(int(there.sum()))
-        previous[before] = _take_previous(cursor, points[before])
-    distances = np.where(there | np.isin(types, PAIRED), 0.0, np.nan)
+        previous[before] = take_previous(cursor, points[before])
+    distances = np.where(there | np.isin(types, OF_PAIRS), 0.0, np.nan)
     far = marks & HAS_DISTANCE != 0
     distances[far] = np.frombuffer(cursor.take(WORD * int(far.sum())), "<f8")
     event_times, first_times = np.full(n, NO_TIME), np.full(n, NO_TIME)
@@ -217,6 +211,9 @@ def _with_own(of_runs: Integers, names: Sequence[str], own: Sequence[str]) -> tu
 
 def decode_runs(payload: bytes) -> Runs:
     """Which fences have which events in a payload. ValueError if the bytes are no events."""
+    if payload[:1] == LONE:
+        number, sequence = lone_run(payload)
+        return Runs(*(np.array([each], np.int64) for each in (number, sequence, 1)))
     cursor = Cursor(payload)
     return _take_runs(cursor, *_counts(cursor))
 
@@ -243,11 +240,6 @@ def _marks(block: EventBlock) -> Bytes:
 
 
 # Columns of integers
-
-
-def _put_one(out: bytearray, *columns: Column) -> None:
-    for column in columns:
-        put_signed(out, int(column[0]))
 
 
 def _take_one(cursor: Cursor, _: int) -> Integers:
@@ -283,92 +275,3 @@ def _take_integers(cursor: Cursor, count: int) -> Integers:
     found[:, :size] = np.frombuffer(cursor.take(count * size), np.uint8).reshape(count, size)
     above = found.view("<u8").ravel().astype(np.uint64, copy=False)
     return (above + np.array(least, np.int64).view(np.uint64)).view(np.int64)
-
-
-# Positions as multiples of 1e-7
-
-
-def _decimals(points: Points, previous: Points) -> tuple[Integers, Integers] | None:
-    """Positions, and those before, as multiples of 1e-7; None if one of them is no such number, or too large."""
-    if len(points) and not _is_decimal(float(points[0, 0])):  # as a rule all are, or none
-        return None
-    values = np.concatenate([points, previous])
-    with np.errstate(over="ignore"):
-        multiples = np.rint(values * PLACES)
-    if not (np.abs(multiples) <= GREATEST).all() or (multiples / PLACES != values).any():
-        return None
-    if (np.signbit(values) & (values == 0)).any():  # an integer has no negative zero
-        return None
-    found = multiples.astype(np.int64)
-    return found[: len(points)], found[len(points) :]
-
-
-def _is_decimal(value: float) -> bool:
-    multiple = value * PLACES
-    return abs(multiple) <= GREATEST and round(multiple) / PLACES == value
-
-
-def _put_decimals(
-    out: bytearray, put: Callable[..., None], points: Integers, previous: Integers, there: Mask, before: Mask
-) -> None:
-    """Append positions, and how those before differ.
-
-    Args:
-        out: receives the bytes.
-        put: appends columns.
-        points: the positions.
-        previous: the positions before.
-        there: of those before, which have a position after them.
-        before: of the positions, which have one before them.
-    """
-    for columns in (points, previous[there] - points[before], previous[~there]):
-        if len(columns):
-            put(out, *columns.T)
-
-
-def _take_decimals(
-    cursor: Cursor, take: Callable[[Cursor, int], Integers], there: Mask, before: Mask
-) -> tuple[Points, Points]:
-    """The inverse of `_put_decimals`, given which events have positions, and positions before."""
-
-    def pairs(count: int) -> Integers:
-        columns = [take(cursor, count) for _ in range(2)] if count else [np.empty(0, np.int64)] * 2
-        return np.stack(columns, axis=1)
-
-    points = pairs(int(there.sum()))
-    previous = np.empty((int(before.sum()), 2), np.int64)
-    previous[there[before]] = pairs(int((there & before).sum())) + points[before[there]]
-    previous[~there[before]] = pairs(int((before & ~there).sum()))
-    return points / PLACES, previous / PLACES
-
-
-# Positions before
-
-
-def _put_previous(out: bytearray, block: EventBlock, before: npt.NDArray[np.bool_]) -> None:
-    differing = _words(block.previous[before]) ^ _words(block.points[before])
-    sizes = np.searchsorted(LIMITS, differing.ravel(), "right").astype(np.uint8)
-    out += (sizes[::2] << 4 | sizes[1::2]).tobytes()
-    out += differing.astype(">u8").view(np.uint8).reshape(-1, WORD)[_used(sizes)].tobytes()
-
-
-def _take_previous(cursor: Cursor, points: Points) -> Points:
-    both = np.frombuffer(cursor.take(len(points)), np.uint8)
-    sizes = np.column_stack([both >> 4, both & 15]).ravel()
-    if sizes.max(initial=0) > WORD:
-        raise ValueError("a coordinate of more than 8 bytes")
-    used = _used(sizes)
-    found = np.zeros((len(sizes), WORD), np.uint8)
-    found[used] = np.frombuffer(cursor.take(int(sizes.sum(dtype=np.int64))), np.uint8)
-    differing = found.view(">u8").reshape(-1, 2).astype(np.uint64)
-    return (differing ^ _words(points)).view(np.float64)
-
-
-def _words(points: Points) -> Words:
-    """The bits of coordinates; 0 where there is no position."""
-    return np.ascontiguousarray(np.where(np.isnan(points), 0.0, points)).view(np.uint64)
-
-
-def _used(sizes: Bytes) -> npt.NDArray[np.bool_]:
-    """Which bytes of big-endian words are not zero bytes at their beginning."""
-    return np.arange(WORD) >= WORD - sizes[:, None].astype(np.int64)

@@ -53,7 +53,7 @@ def decode_events(payload: bytes, sequence: int, own: str) -> Iterator[FenceEven
         if first & HAS_POSITION:
             position = POSITION.unpack(cursor.take(POSITION.size))
         if first & HAS_PREVIOUS:
-            previous = _read_differing(cursor, position)
+            previous = take_differing(cursor, position)
         if first & HAS_DISTANCE:
             (distance,) = DISTANCE.unpack(cursor.take(DISTANCE.size))
         event_time = time + take_signed(cursor) if first & HAS_EVENT_TIME else NO_TIME
@@ -151,10 +151,24 @@ def take_members(cursor: Cursor) -> tuple[Members, ...]:
     return tuple(members)
 
 
-def _read_differing(cursor: Cursor, position: Position | None) -> Position:
+def put_differing(out: bytearray, position: Position, other: Position | None) -> None:
+    """Append the bytes in which a position differs from another one."""
+    differing = [each ^ its for each, its in zip(_bits(position), _bits(other), strict=True)]
+    x, y = ((word.bit_length() + 7) // 8 for word in differing)
+    out.append(x << 4 | y)
+    out += differing[0].to_bytes(x) + differing[1].to_bytes(y)
+
+
+def take_differing(cursor: Cursor, other: Position | None) -> Position:
+    """The inverse of `put_differing`."""
     (lengths,) = cursor.take(1)
     x = int.from_bytes(cursor.take(lengths >> 4))
     y = int.from_bytes(cursor.take(lengths & 15))
-    here = PAIR.unpack(POSITION.pack(*(position or (0.0, 0.0))))
+    here = _bits(other)
     found: Position = POSITION.unpack(PAIR.pack(here[0] ^ x, here[1] ^ y))
     return found
+
+
+def _bits(position: Position | None) -> tuple[int, int]:
+    bits: tuple[int, int] = PAIR.unpack(POSITION.pack(*(position or (0.0, 0.0))))
+    return bits
