@@ -97,13 +97,13 @@ def clocked(work: Callable[[], object], times: int = 1, clock: Callable[[], floa
 
 
 class Rivals:
-    """The C++ program."""
+    """The C++ program. ParGeo is among the rivals where CPLUS_INCLUDE_PATH names its headers and those of parlaylib."""
 
     def __init__(self):
         compiler = shutil.which("c++") or sys.exit("no C++ compiler: --no-rivals measures without")
         self.program = str(Path(tempfile.mkdtemp()) / "rivals")
         source = str(Path(__file__).with_name("rivals.cpp"))
-        build = [compiler, "-std=c++20", "-O2", "-DNDEBUG", source, "-o", self.program]
+        build = [compiler, "-std=c++20", "-O2", "-DNDEBUG", "-pthread", source, "-o", self.program]
         probe = [compiler, "-fsyntax-only", "-x", "c++", "-"]
         if subprocess.run(probe, input=b"#include <CGAL/version.h>", capture_output=True, check=False).returncode != 0:
             print("no CGAL among the rivals: its headers are not installed (Debian: libcgal-dev)\n")

@@ -23,6 +23,12 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using CgalPoint = Kernel::Point_2;
 #endif
 
+#if __has_include(<convexHull2d/quickHull/hull.h>)
+#define WITH_PARGEO 1
+#include <convexHull2d/quickHull/hull.h>
+#include <pargeo/point.h>
+#endif
+
 using Point = std::pair<double, double>;
 
 [[maybe_unused]] constexpr std::size_t MOST_FOR_SLOW = 1'000'000;  // points
@@ -160,6 +166,16 @@ static void hulls([[maybe_unused]] const std::vector<Point>& points) {
   report("CGAL convex_hull_2", 1, [&] { CGAL::convex_hull_2(input.begin(), input.end(), std::back_inserter(output)); });
   report("CGAL ch_graham_andrew", 1,
          [&] { CGAL::ch_graham_andrew(input.begin(), input.end(), std::back_inserter(output)); });
+#endif
+#ifdef WITH_PARGEO
+  auto rows = parlay::tabulate(points.size(), [&](std::size_t i) {
+    pargeo::point<2> row;
+    row[0] = points[i].first;
+    row[1] = points[i].second;
+    return row;
+  });
+  pargeo::hull2d::quickHull::compute(parlay::make_slice(rows));  // starts its threads
+  report("ParGeo quickHull", 1, [&] { pargeo::hull2d::quickHull::compute(parlay::make_slice(rows)); });
 #endif
 }
 
