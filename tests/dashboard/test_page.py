@@ -281,6 +281,36 @@ def test_all_keys_have_names_where_there_is_room(browser: Browser, url: str, cli
         page.wait_for_function(named)
 
 
+def test_outliers_are_shown_to_those_who_look(
+    browser: Browser, server: tuple[Server, str], url: str, client: HullClient, name: str
+) -> None:
+    peeled = 'dynhull_calls_total{code="OK",method="GetLayers"}'
+    client.create_hull(name, keyed="str")
+    client.put(name, ["a", "b", "c", "far", "in", "<b>", "deep"], [*SQUARE[:2], [0, 4], [9, 9], [1, 1], [2, 1], [1, 2]])
+    layers = "name => picture.hulls.get(name).layers.map(({corners}) => corners)"
+    with opened(browser, url, name) as page:
+        wait_for_vertices(page, name, [[0, 0], [4, 0], [9, 9], [0, 4]])
+        words = page.get_by_role("list", name="The most influential vertices").locator("li")
+        expect(words).to_have_count(0)
+        assert page.evaluate(layers, name) == []
+        before = scrape(server[1]).get(peeled, 0)
+        box = page.get_by_role("checkbox", name="Outliers")
+        box.focus()
+        page.keyboard.press("Space")
+        expect(words).to_have_text(f"Without far, {name} would lose 28 square units: x 9, y 9, revision 1")
+        page.wait_for_function("picture.rings.map(({text}) => text).join() == 'far: 28 square units'")
+        assert page.evaluate(layers, name) == [[[1, 1], [2, 1], [1, 2]]]
+        client.put(name, ["far"], [[4, 4]])
+        expect(words).to_contain_text(f"Without far, {name} would lose 8 square units: x 4, y 4, revision 2")
+        assert scrape(server[1])[peeled] > before
+        page.reload()
+        expect(box).to_be_checked()
+        expect(words).to_have_count(1)
+        box.uncheck()
+        expect(words).to_have_count(0)
+        page.wait_for_function("picture.rings.length == 0")
+
+
 def test_the_picture_is_moved_by_keys_and_by_hand(browser: Browser, url: str, hull: str) -> None:
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)

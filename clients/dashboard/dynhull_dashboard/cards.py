@@ -50,12 +50,12 @@ def _figures(feed: HullFeed) -> tuple[str, ...]:
     outline, _ = feed.drawings()
     drawn = len(outline.points)
     vertices = f"{feed.vertices:,}" if drawn == feed.vertices else f"{feed.vertices:,} ({drawn:,} drawn)"
-    return f"{feed.revision:,}", f"{feed.points:,}", vertices, _area(feed), _number(feed.rate, RATE_DIGITS)
+    return f"{feed.revision:,}", f"{feed.points:,}", vertices, _area(feed), number(feed.rate, RATE_DIGITS)
 
 
 def _area(feed: HullFeed) -> str:
     """The area; of a geographic hull with its own unit, whatever that of the others."""
-    return _number(feed.shown_area) + ("" if feed.center is None else " km²")
+    return number(feed.shown_area) + ("" if feed.center is None else " km²")
 
 
 def symbol(look: Look) -> str:
@@ -99,7 +99,8 @@ def _ago(seconds: float) -> str:
     return f"{seconds:.0f} s ago" if seconds < SECONDS_UP_TO else f"{seconds / 60:.0f} min ago"
 
 
-def _number(value: float, digits: int = DIGITS) -> str:
+def number(value: float, digits: int = DIGITS) -> str:
+    """A figure as the page shows it."""
     if math.isnan(value):
         return UNKNOWN
     return f"{value:,.0f}" if 1000 <= abs(value) < 1e15 else f"{value:.{digits}g}"

@@ -9,6 +9,7 @@ from .feed import HullFeed
 from .feeds import Feeds
 from .fence_feed import FenceFeed
 from .fence_list import FenceList
+from .outliers import OutlierFeed
 from .server_metrics import ServerMetrics
 from .server_state import ServerState
 from .units import NO_UNITS, Units
@@ -28,6 +29,7 @@ class Hub:
         fence_list: the server's fences.
         hulls: the feeds of the hulls on view.
         fences: the feeds of the fences on view.
+        outliers: the feeds of the outliers of hulls, for those viewers that look at them.
     """
 
     def __init__(
@@ -40,9 +42,11 @@ class Hub:
         self.metrics = None if metrics_url is None else ServerMetrics(metrics_url)
         self.hulls = Feeds(partial(HullFeed, client))
         self.fences = Feeds(partial(FenceFeed, client))
+        self.outliers = Feeds(partial(OutlierFeed, client, self.hulls, units.area))
 
     async def close(self) -> None:
         """Stop all background tasks."""
+        await self.outliers.close()  # they use hulls
         await asyncio.gather(self.server.close(), self.fence_list.close(), self.hulls.close(), self.fences.close())
         if self.metrics is not None:
             await self.metrics.close()

@@ -15,9 +15,10 @@ log = logging.getLogger(__name__)
 
 
 class LiveSocket(WebSocketHandler):
-    """Sends what is new on the page, and does what the page asks for. The query names hulls, fences and a key.
+    """Sends what is new on the page, and does what the page asks for.
 
-    Without `hull` or `fence` the dashboard chooses; an empty one stands for none.
+    The query names hulls, fences and a key, and may ask for outliers. Without `hull` or `fence` the dashboard chooses;
+    an empty one stands for none.
     """
 
     def initialize(self, hub: Hub, version: str) -> None:
@@ -34,7 +35,10 @@ class LiveSocket(WebSocketHandler):
     def open(self) -> None:
         """The page has connected."""
         key = self.get_query_argument("key", "", strip=False)
-        viewer = Viewer(self._hub, self._names("hull"), self._names("fence"), key, self._version)
+        outliers = bool(self.get_query_argument("outliers", ""))
+        viewer = Viewer(
+            self._hub, self._names("hull"), self._names("fence"), key, outliers=outliers, version=self._version
+        )
         self._viewer = viewer
         self._sending = asyncio.create_task(self._send(viewer))
 

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .advice import about_fences, about_metrics, about_picture, about_server
 from .cards import key, table
@@ -12,6 +12,9 @@ from .feed import HullFeed
 from .fence_picks import FencePicks
 from .hub import Hub
 from .looks import LOOKS, Look
+
+if TYPE_CHECKING:
+    from .outliers import OutlierFeed
 
 # Text changes slower than the picture: nobody reads ten times a second.
 TICKS_OF_TEXT = 5
@@ -34,16 +37,26 @@ class Viewer:
         hulls: the hulls to begin with; None for those of the fences, or the largest one.
         fences: the fences to begin with; None for the first ones of these hulls.
         sought: the key to look for to begin with; empty for none.
+        outliers: whether to begin with the outliers of the hulls.
         version: names the version of the page's scripts, which a page of another version loads.
     """
 
     def __init__(
-        self, hub: Hub, hulls: list[str] | None, fences: list[str] | None, sought: str = "", version: str = ""
+        self,
+        hub: Hub,
+        hulls: list[str] | None,
+        fences: list[str] | None,
+        sought: str = "",
+        *,
+        outliers: bool = False,
+        version: str = "",
     ) -> None:
         self._hub = hub
         self._shown: dict[str, Shown] = {}
         self._version = version
         self._sought = sought
+        self._with_outliers = outliers
+        self._outliers: dict[str, OutlierFeed] = {}
         self._ticks = 0
         self._properties: dict[str, Any] = {}
         self._drawn: dict[tuple[str, str], str] = {}
@@ -51,11 +64,12 @@ class Viewer:
         self._untouched = hulls is None and not fences
         self._fences = FencePicks(hub, fences)
         self._show(hub.server.largest() if self._untouched else hulls or ())
-        self._takes: Mapping[str, Callable[[Any], None]] = {
-            "hulls": self._pick_hulls,
-            "fences": self._pick_fences,
-            "sought": self._seek,
-            "verify": self._verify,
+        self._takes: Mapping[str, tuple[Callable[[object], bool], Callable[[Any], None]]] = {
+            "hulls": (_are_names, self._pick_hulls),
+            "fences": (_are_names, self._pick_fences),
+            "sought": (_is_text, self._seek),
+            "outliers": (_is_choice, self._choose_outliers),
+            "verify": (_is_text, self._verify),
         }
 
     def close(self) -> None:
@@ -64,7 +78,7 @@ class Viewer:
         self._fences.close()
 
     def take(self, message: str) -> None:
-        """Do what the page asks for: a JSON object with one or more of hulls, fences, sought and verify.
+        """Do what the page asks for: a JSON object with one or more of hulls, fences, sought, outliers, verify.
 
         Raises:
             ValueError: if it is none; then nothing is changed.
@@ -73,10 +87,12 @@ class Viewer:
         if not isinstance(asked, dict) or not asked.keys() <= self._takes.keys():
             raise ValueError(f"the page sent {message[:100]!r}: expected an object with {', '.join(self._takes)}")
         for name, value in asked.items():
-            if not (_is_text(value) if name in ("sought", "verify") else _are_names(value)):
-                raise ValueError(f"the page sent {name} {str(value)[:100]!r}: expected text, or a list of names")
+            is_valid, _ = self._takes[name]
+            if not is_valid(value):
+                raise ValueError(f"the page sent {name} {str(value)[:100]!r}: expected text, names, or true or false")
         for name, value in asked.items():
-            self._takes[name](value)
+            _, take = self._takes[name]
+            take(value)
         self._ticks = 0  # the answer at once
 
     def messages(self) -> list[str]:
@@ -110,6 +126,9 @@ class Viewer:
         for feed in self._fences.feeds:
             for kind, message in feed.messages().items():
                 yield (kind, feed.name), message
+        for name, outliers in self._outliers.items():
+            if outliers.message is not None:
+                yield ("outliers", name), outliers.message
 
     def _lines(self) -> Iterator[str]:
         """The new rows of the time lines."""
@@ -135,6 +154,18 @@ class Viewer:
     def _seek(self, key: str) -> None:
         self._sought = key
 
+    def _choose_outliers(self, chosen: bool) -> None:
+        self._with_outliers = chosen
+        self._show_outliers()
+
+    def _show_outliers(self) -> None:
+        names = self._shown.keys() if self._with_outliers else set[str]()
+        for name in self._outliers.keys() - names:
+            del self._outliers[name]
+            self._hub.outliers.release(name)
+        for name in names - self._outliers.keys():
+            self._outliers[name] = self._hub.outliers.open(name)
+
     def _verify(self, _: str) -> None:
         for shown in self._shown.values():
             shown.feed.verify_now()
@@ -149,6 +180,7 @@ class Viewer:
                 taken = [shown.look for shown in self._shown.values()]
                 look = next(look for look in LOOKS if look not in taken)
                 self._shown[name] = Shown(self._hub.hulls.open(name), look)
+        self._show_outliers()
         self._forget(set(names) | set(self._fences.names))
 
     def _forget(self, names: set[str]) -> None:
@@ -193,6 +225,7 @@ class Viewer:
             if server.error
             else about_metrics(self._hub.metrics),
             "note": about_picture(self._hub.address, server, feeds, self._fences.feeds),
+            "outliers": [self._outliers[name].words for name in self._shown if name in self._outliers],
             "fence_hint": about_fences(self._hub.address, fences, shown=bool(self._fences.names)),
             "description": describe(feeds, self._fences.feeds),
             "table": table(rows, connected=connected, area_unit=self._hub.units.area),
@@ -206,6 +239,10 @@ def _look(name: str, look: Look) -> dict[str, Any]:
 
 def _are_names(value: object) -> bool:
     return isinstance(value, list) and all(map(_is_text, value))
+
+
+def _is_choice(value: object) -> bool:
+    return isinstance(value, bool)
 
 
 def _is_text(value: object) -> bool:

@@ -1,6 +1,7 @@
 // The hulls in the picture.
 const SURFACE_ALPHA = 0.12, POINT_ALPHA = 0.65, POINT_SIZE = 4, VERTEX_SIZE = 8
 const NOTHING = {revision: 0, x: [], y: [], keys: null, rings: null}
+const NO_OUTLIERS = {layers: [], vertex: null, label: ""}, LAYER_ALPHA = 0.7
 const SHAPES = {
   square: [[-4, -4], [4, -4], [4, 4], [-4, 4]],
   triangle: [[0, -5], [4.5, 3.5], [-4.5, 3.5]],
@@ -25,9 +26,19 @@ class Hull {
     this.name = name
     this.look = look
     this.vertices = this.points = NOTHING
+    this.outliers = NO_OUTLIERS
+    this.layers = []  // the inner ones, as hulls
   }
   take(message) {
     this[message.kind] = message
+    if (message.kind == "outliers") {
+      this.layers = message.layers.map(layer => {
+        const hull = new Hull(this.name, this.look)
+        hull.take({kind: "vertices", ...layer})
+        return hull
+      })
+      return
+    }
     this.places = undefined
     if (message.kind == "vertices") {
       this.corners = message.x.map((x, row) => [x, message.y[row]])
@@ -68,6 +79,21 @@ function draw_surfaces(canvas, {view, hulls}) {
     canvas.stroke()
     canvas.setLineDash([])
   }
+}
+// The deeper, the fainter.
+function draw_layers(canvas, {view, hulls, outliers}) {
+  if (!outliers) return
+  canvas.lineWidth = 1
+  for (const {layers, look} of hulls.values()) {
+    canvas.strokeStyle = look.colour
+    layers.forEach((layer, depth) => {
+      canvas.beginPath()
+      for (const rings of layer.polygons(view)) view.polygon(canvas, rings)
+      canvas.globalAlpha = LAYER_ALPHA ** (depth + 1)
+      canvas.stroke()
+    })
+  }
+  canvas.globalAlpha = 1
 }
 function draw_points(canvas, {view, hulls}) {
   canvas.globalAlpha = POINT_ALPHA

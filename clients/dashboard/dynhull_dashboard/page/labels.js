@@ -1,5 +1,5 @@
 // The names beside vertices, subjects of fences and points: as many as fit without overlap. Hovering shows the others.
-const LABEL_OFFSET = 8, RING_RADIUS = 13
+const LABEL_OFFSET = 8, RING_RADIUS = 13, WIDE_RING_RADIUS = 17, RING_DASH = [5, 3]
 const MOST_HALOS = 100  // of more names, drawing takes too long
 class Labels {
   shown = new Set()
@@ -46,34 +46,44 @@ class Labels {
     return found
   }
 }
-// The rings around the key that the viewer looks for, and its name: where they are, before other text takes the room.
-function place_found(picture) {
-  const {view, sought, taken} = picture
-  return picture.found().flatMap(({place, colour}) => {
+// The rings around the key that the viewer looks for and around the most influential vertices, and their names: where they
+// are, before other text takes the room.
+function place_rings(picture) {
+  const {view, sought, taken, hulls, outliers} = picture, found = sought ? picture.found() : []
+  const stretching = outliers ? [...hulls.values()].filter(hull => hull.outliers.vertex) : []
+  const ringed = [
+    ...found.map(({place, colour}) => ({place, colour, text: sought, radius: RING_RADIUS, dash: [], below: false})),
+    ...stretching.map(({outliers: {vertex, label}, look: {colour}}) =>
+      ({place: vertex, colour, text: label, radius: WIDE_RING_RADIUS, dash: RING_DASH, below: true})),
+  ]
+  return ringed.flatMap(({place, below, ...ring}) => {
     const [across, down] = view.place(...place)
     if (isNaN(across)) return []
     const side = across > view.rect.left + view.rect.width / 2 ? "right" : "left"
-    const box = label_box(across, down - RING_RADIUS - 3, text_width(sought, FOUND_LABEL_FONT), side)
+    const bottom = below ? down + ring.radius + 3 + LABEL_HEIGHT : down - ring.radius - 3
+    const box = label_box(across, bottom, text_width(ring.text, FOUND_LABEL_FONT), side)
     taken.add(box)
-    taken.add(square_box(across, down, RING_RADIUS))
-    return [{across, down, colour, box}]
+    taken.add(square_box(across, down, ring.radius))
+    return [{across, down, box, ...ring}]
   })
 }
-function draw_found(canvas, {rings, sought, colours}) {
+function draw_rings(canvas, {rings, colours}) {
   canvas.font = FOUND_LABEL_FONT
-  for (const {across, down, colour, box: {left, top, right, bottom}} of rings) {
+  for (const {across, down, colour, text, radius, dash, box: {left, top, right, bottom}} of rings) {
     for (const [style, width] of [[colours.paper, 7], [colour, 3]]) {
       canvas.beginPath()
-      canvas.arc(across, down, RING_RADIUS, 0, 2 * Math.PI)
+      canvas.arc(across, down, radius, 0, 2 * Math.PI)
       canvas.strokeStyle = style
       canvas.lineWidth = width
+      canvas.setLineDash(style == colour ? dash : [])
       canvas.stroke()
     }
+    canvas.setLineDash([])
     canvas.fillStyle = colours.paper
     canvas.lineWidth = 1
     canvas.fillRect(left, top, right - left, LABEL_HEIGHT)
     canvas.strokeRect(left, top, right - left, LABEL_HEIGHT)
     canvas.fillStyle = colours.ink
-    canvas.fillText(sought, left + LABEL_GAP, bottom - 4)
+    canvas.fillText(text, left + LABEL_GAP, bottom - 4)
   }
 }

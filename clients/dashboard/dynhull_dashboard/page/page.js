@@ -5,7 +5,8 @@ const MOST_OFFERED = 20, RETRY_MILLISECONDS = 1000
 const SILENCE = "The dashboard does not answer. Check that dynhull dashboard still runs. The page shows what it last "
   + "received, and reconnects by itself."
 const settings = find(".page").dataset
-const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], places: []}
+const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
+  places: []}
 const picture = new Picture(find(".map"), {x_unit: settings.xUnit, y_unit: settings.yUnit})
 const events = new Events(key => seek(key))
 const recorder = new Recorder(show_drawing, () => {
@@ -32,6 +33,13 @@ function connect() {
 }
 function ask(change) {
   if (socket.readyState == WebSocket.OPEN) socket.send(JSON.stringify(change))
+}
+// The address follows, so that the page shows the same when it is loaded or connects again.
+function keep_in_address(noun, values) {
+  const query = new URLSearchParams(location.search)
+  query.delete(noun)
+  for (const value of values) query.append(noun, value)
+  history.replaceState(null, "", `?${query}`)
 }
 function take(message, text) {
   if (message.kind == "page") return update(message)
@@ -63,7 +71,11 @@ function update({kind: _, ...changes}) {
     if (changes[name] != undefined) write(selector, changes[name])
   for (const [name, selector] of [["table", ".of_hulls"], ["fence_table", ".of_fences"]])
     if (changes[name] != undefined) find(selector).innerHTML = changes[name]  // the server has escaped the names
-  if (changes.found) show_found()
+  if (changes.found) {
+    show_lines(".found", state.found)
+    write("#found", state.found.map(([sentence]) => sentence).join(". "))
+  }
+  if (changes.outliers) show_lines(".outliers", state.outliers)
   if (changes.places || changes.sought != undefined) {
     picture.places = state.places
     picture.sought = state.sought
@@ -97,13 +109,9 @@ class Picker {
     if (this.field.value && !this.names.includes(this.field.value)) this.pick([...this.names, this.field.value])
     this.field.value = ""
   }
-  // The address follows, so that the page shows the same when it is loaded or connects again.
   pick(names) {
     ask({[this.picked]: names})
-    const query = new URLSearchParams(location.search)
-    query.delete(this.noun)
-    for (const name of names.length ? names : [""]) query.append(this.noun, name)
-    history.replaceState(null, "", `?${query}`)
+    keep_in_address(this.noun, names.length ? names : [""])
   }
   show() {
     const full = this.names.length >= this.most
@@ -124,10 +132,7 @@ const finder = find(".finder input")
 function seek(key) {
   finder.value = key
   ask({sought: key})
-  const query = new URLSearchParams(location.search)
-  query.delete("key")
-  if (key) query.set("key", key)
-  history.replaceState(null, "", `?${query}`)
+  keep_in_address("key", key ? [key] : [])
 }
 function offer_keys() {
   const drawn = [...picture.hulls.values()].flatMap(({vertices, points}) => [...vertices.keys ?? [], ...points.keys ?? []])
@@ -136,15 +141,15 @@ function offer_keys() {
   const offered = [...new Set(names)].sort().slice(0, MOST_OFFERED)
   find("#keys").replaceChildren(...offered.map(key => new Option(key, key)))
 }
-function show_found() {
-  const lines = state.found.map(([sentence, place]) => {
+// Sentences, each with what changes more often.
+function show_lines(selector, sentences) {
+  const lines = sentences.map(([sentence, place]) => {
     const line = document.createElement("li"), numbers = document.createElement("span")
     numbers.textContent = place
     line.append(sentence, place && ": ", numbers)
     return line
   })
-  find(".finder ul").replaceChildren(...lines)
-  write("#found", state.found.map(([sentence]) => sentence).join(". "))
+  find(selector).replaceChildren(...lines)
 }
 finder.value = new URLSearchParams(location.search).get("key") ?? ""
 finder.addEventListener("focus", offer_keys)
@@ -163,6 +168,12 @@ const tick = (name, checked, change) => {
 }
 tick("all_names", false, checked => picture.labels.all = checked)
 tick("trails", false, checked => picture.trails.shown = checked)
+picture.outliers = Boolean(new URLSearchParams(location.search).get("outliers"))
+tick("outliers", picture.outliers, checked => {
+  picture.outliers = checked
+  ask({outliers: checked})
+  keep_in_address("outliers", checked ? ["1"] : [])
+})
 tick("same_scale", picture.plane.same_scale, checked => {
   picture.plane.same_scale = checked
   picture.follow()

@@ -1,7 +1,7 @@
 // The picture: two canvases, one for the ground (coasts or axes), one for what moves, and the order in which things are
 // drawn. A new layer is a function of the canvas and the picture, in its place in LAYERS.
-const LAYERS = [draw_fences, draw_surfaces, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
-  draw_found]
+const LAYERS = [draw_fences, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
+  draw_rings]
 const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
 const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
 function draw_trails(canvas, picture) {
@@ -27,6 +27,7 @@ class Picture {
     this.following = true  // until the viewer moves the picture
     this.moving = false
     this.live = true  // or as it was before
+    this.outliers = false
     this.sought = ""
     this.places = []
     this.now = Date.now
@@ -141,7 +142,7 @@ class Picture {
     }
     this.clear(things)
     this.taken = new Boxes()
-    this.rings = this.sought ? place_found(this) : []
+    this.rings = place_rings(this)
     for (const fence of this.fences.values())
       for (const {place} of fence.marks(this.hulls)) {
         const [across, down] = this.view.place(...place)

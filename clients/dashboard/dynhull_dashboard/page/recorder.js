@@ -97,7 +97,7 @@ class Recorder {
 }
 // What was to be seen before the first message.
 function emptied(message) {
-  return {...message, ...NOTHING, ...NO_AREA, ...NOBODY, rows: [], hull: message.fence ? [] : message.hull}
+  return {...message, ...NOTHING, ...NO_OUTLIERS, ...NO_AREA, ...NOBODY, rows: [], hull: message.fence ? [] : message.hull}
 }
 class TimeBar {
   constructor(recorder, form) {
