@@ -5,6 +5,7 @@ from collections.abc import Generator, Iterator
 import pytest
 import server_process as servers
 from hypothesis import HealthCheck, Phase, settings
+from postgresql import PostgreSQL, postgresql
 from server_process import SHAPES, server_process
 
 collect_ignore = ["data/make_phases.py", "mutants/run.py"]  # need packages that the tests do not
@@ -44,6 +45,13 @@ def address() -> Iterator[str]:
     """A server that tests share; each test uses hulls of its own. It starts and ends as it does for users."""
     with server_process(wrap=["env"]) as server:
         yield server.address
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[PostgreSQL]:
+    """A PostgreSQL server that tests share; each test has databases of its own."""
+    with postgresql() as server:
+        yield server
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What the tests talk to and pip cannot install: a real Prometheus and browser, systemd's checks, a clock that can be
-# set back, message brokers, readers of maps, reverse proxies, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
+# set back, message brokers, a database, readers of maps, reverse proxies, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
 # that need what is missing are skipped, and say so.
 set -uo pipefail
 cd "$(dirname "$0")"
@@ -15,6 +15,7 @@ command -v faketime >/dev/null || packages+=(faketime)
 command -v mosquitto >/dev/null || packages+=(mosquitto)
 command -v nats-server >/dev/null || packages+=(nats-server)
 command -v ogrinfo >/dev/null && command -v ogr2ogr >/dev/null || packages+=(gdal-bin)
+ls /usr/lib/postgresql/*/bin/postgres >/dev/null 2>&1 || command -v postgres >/dev/null || packages+=(postgresql)
 command -v nginx >/dev/null || packages+=(nginx-light)
 command -v caddy >/dev/null || packages+=(caddy)
 command -v node >/dev/null || packages+=(nodejs)

@@ -11,6 +11,8 @@ import pytest
 from folders import appended, event, events, fence_row, fill_fence, read_fence, same
 
 from dynhull.keys import PackedKeys
+from dynhull_cluster.postgres.database import Database
+from dynhull_cluster.postgres.storage import PostgresStorage
 from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.records import (
     NO_WAITS,
@@ -93,12 +95,19 @@ def no_progress(done, total):
     assert 0 <= done <= total
 
 
-@pytest.fixture(params=["memory", "simulated", *Durability])
+def never(reason):
+    raise AssertionError(reason)
+
+
+@pytest.fixture(params=["memory", "simulated", "postgresql", *Durability])
 def make(request, tmp_path):
     """Makes the storage; again, as it is after a restart."""
     if request.param == "memory":
         storage = MemoryStorage()
         return lambda: storage
+    if request.param == "postgresql":
+        database = Database(request.getfixturevalue("postgres").new_database())
+        return lambda: PostgresStorage(database, never)
     if request.param == "simulated":
         disk = MemoryDisk()
         return lambda: SQLiteStorage(tmp_path / "data", disk=disk)

@@ -22,6 +22,8 @@ INSTALLED_BY = {
     "ogr2ogr": "Debian's package gdal-bin",
     "ogrinfo": "Debian's package gdal-bin",
     "node": "Debian's package nodejs",
+    "postgres": "Debian's package postgresql",
+    "initdb": "Debian's package postgresql",
     "prometheus": "Debian's package prometheus",
     "promtool": "Debian's package prometheus",
     "systemd-analyze": "Debian's package systemd",

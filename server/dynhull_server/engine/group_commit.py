@@ -6,9 +6,10 @@ Large changes are committed in pieces, as far as the storage allows, each togeth
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 from ..state.changes import Change
-from ..storage.port import NotCommittedError, Step, Storage
+from ..storage.port import NotCommittedError, Step, Storage, TakenOverError
 from .threads import Clock, Inbox, Threads
 
 # Called with the outcome of a commit: its error or None, and whether the outcome is unknown.
@@ -134,6 +135,8 @@ class GroupCommit:
             return True
         try:
             self._storage.settle()
+        except TakenOverError as error:
+            self._end(group, error)
         except Exception as error:
             refusal = NotCommittedError(f"an earlier commit failed, and the disk cannot be read yet: {error}")
             for each in group:
@@ -154,6 +157,8 @@ class GroupCommit:
                 self._report(error)
             else:  # changes too large for the disk must not fail the others
                 self._commit_apart(group)
+        except TakenOverError as error:
+            self._end(group, error)
         except Exception as error:  # after any error, such as a MemoryError, the changes may be stored
             self._undecided = True
             for each in group:
@@ -163,6 +168,12 @@ class GroupCommit:
             for each in group:
                 each.done(None, False)
             self._report(None)
+
+    def _end(self, group: list[_Waiting], error: TakenOverError) -> NoReturn:
+        """Refuse the group, and end the thread and with it the process."""
+        for each in group:
+            each.done(NotCommittedError(str(error)), False)
+        raise error
 
     def _commit_apart(self, group: list[_Waiting]) -> None:
         for each in group:

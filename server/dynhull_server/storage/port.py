@@ -1,7 +1,7 @@
 """The port: the interface between the engine and any storage.
 
-Calls block until they are complete. One thread commits; any thread may read at any time. A storage starts no threads:
-the engine calls `sync` and `checkpoint`, and commits the steps of `snapshot` and `sweep`.
+Calls block until they are complete. One thread commits; any thread may read at any time. A storage starts no threads,
+but to keep a lease: the engine calls `sync` and `checkpoint`, and commits the steps of `snapshot` and `sweep`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -41,6 +41,10 @@ class DamagedError(StorageError):
 
 class LockedError(StorageError):
     """Another server uses this storage."""
+
+
+class TakenOverError(StorageError):
+    """Nothing was committed, and nothing ever will be: the storage belongs to another server. The process must end."""
 
 
 class FormatError(StorageError):
@@ -95,6 +99,7 @@ class Storage(Protocol):
         Raises:
             NotCommittedError: none was committed, and none will be found later. Also if a hull or fence to create
                 exists, if one to change does not exist, or if batches or events do not follow the last ones.
+            TakenOverError: none was committed, and no other change ever will be.
             Exception: any other error: the outcome is unknown until `settle` has returned.
         """
 
@@ -111,6 +116,7 @@ class Storage(Protocol):
         Until then `commit`, `read`, `row` and `oldest` raise StorageError.
 
         Raises:
+            TakenOverError: another server decides from now on.
             Exception: it cannot be decided yet; call this again later.
         """
 

@@ -1,0 +1,90 @@
+"""Connections to a PostgreSQL database, and its errors as those of the storage."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import psycopg
+from psycopg.conninfo import conninfo_to_dict, make_conninfo
+
+from dynhull_server.storage.port import FormatError, StorageError
+from dynhull_server.storage.rows.tables import UnreadableError
+
+Connection = psycopg.Connection[tuple[Any, ...]]
+
+SCHEMA = "dynhull"
+OLDEST_VERSION = 15
+# Seconds until a connection attempt ends; milliseconds until data that nobody acknowledges ends a connection.
+CONNECT_SECONDS, UNACKNOWLEDGED_MS = 10, 10_000
+# Where the address does not say otherwise.
+DEFAULTS = {
+    "connect_timeout": CONNECT_SECONDS,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+    "tcp_user_timeout": UNACKNOWLEDGED_MS,
+    "target_session_attrs": "read-write",  # of several hosts the one that is no standby
+}
+
+
+class Database:
+    """A PostgreSQL database.
+
+    Args:
+        address: a URL, or keywords as of libpq.
+
+    Raises:
+        ValueError: the address is invalid.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            given: dict[str, Any] = {**DEFAULTS, **conninfo_to_dict(address)}
+        except psycopg.ProgrammingError as error:
+            raise ValueError(f"no address of a PostgreSQL database: {_words(error)}") from None
+        given["options"] = f"{given.get('options') or ''} -c search_path={SCHEMA}".strip()
+        self._address = make_conninfo(**given)
+        where = f"{given.get('host') or 'localhost'}{':' + str(given['port']) if given.get('port') else ''}"
+        self._words = f"the database {given.get('dbname') or given.get('user') or 'of the user'} on {where}"
+
+    def __str__(self) -> str:
+        """How messages call it: without its password."""
+        return self._words
+
+    def connect(self, name: str) -> Connection:
+        """A connection without an open transaction, which others see by this name.
+
+        Raises:
+            StorageError: the server cannot be reached, or refuses it.
+            FormatError: the server is too old, or the database has another encoding than UTF-8.
+        """
+        try:
+            connection = psycopg.connect(self._address, autocommit=True, application_name=name, client_encoding="utf8")
+        except psycopg.Error as error:
+            raise StorageError(f"cannot connect to {self}: {_words(error)}") from error
+        try:
+            if connection.info.server_version < OLDEST_VERSION * 10_000:
+                version = connection.info.parameter_status("server_version")
+                raise FormatError(f"{self} is of PostgreSQL {version}: {OLDEST_VERSION} or newer is needed")
+            encoding = connection.info.parameter_status("server_encoding")
+            if encoding != "UTF8":
+                raise FormatError(f"{self} has the encoding {encoding}: create one with UTF8")
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+
+@contextmanager
+def as_storage_errors() -> Iterator[None]:
+    """Convert errors of PostgreSQL to StorageError, and what it says about damage to UnreadableError."""
+    try:
+        yield
+    except (psycopg.errors.DataCorrupted, psycopg.errors.IndexCorrupted) as error:
+        raise UnreadableError(_words(error)) from error
+    except psycopg.Error as error:
+        raise StorageError(f"PostgreSQL: {_words(error)}") from error
+
+
+def _words(error: psycopg.Error) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,273 @@
+"""Who owns a partition: one server at a time, with an epoch and a lease.
+
+Taking a partition raises its epoch. Each commit first locks the row of the owner if the epoch is still its own, so that
+a new owner waits for it, and so that nothing is committed under an old epoch. Renewing the lease does not wait for
+commits, nor they for it: the lock is the one of a foreign key.
+
+Reads are answered from memory, and so only within the lease. Clocks of different machines are never compared: the
+database decides when a lease has ended, and the owner counts from before it asked for it, and a margin less.
+"""
+
+import logging
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from psycopg.errors import LockNotAvailable
+
+from dynhull_server.state.errors import words
+from dynhull_server.storage.port import LockedError, StorageError, TakenOverError
+
+from .database import Connection, Database, as_storage_errors
+
+# Seconds of a lease, between renewals, and by which an owner ends its own lease earlier.
+LEASE, RENEWAL, MARGIN = 5.0, 1.0, 0.5
+# Seconds between looks whether the lease of another server is renewed, or has ended.
+LOOK = 0.25
+# Seconds that an owner which was stopped inside of a transaction may hold up the next one.
+LOCK_SECONDS = 1
+
+log = logging.getLogger(__name__)
+
+# Locks the row of an owner against the next one, but not against renewals.
+REQUIRE = b"SELECT epoch FROM owners WHERE partition = %s AND epoch = %s FOR KEY SHARE"
+
+
+@dataclass(frozen=True, slots=True)
+class _Owner:
+    epoch: int
+    worker: str
+    process: str
+    until: str
+    alive: bool
+
+
+def this_worker() -> str:
+    """This process, for people."""
+    return f"process {os.getpid()} on {socket.gethostname()}"
+
+
+def this_process() -> str:
+    """This process, so that others on the same machine can tell whether it runs; empty where they cannot."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        namespace = Path("/proc/self/ns/pid").readlink()
+        return f"{boot} {namespace} {os.getpid()} {_begun(os.getpid())}"
+    except OSError:
+        return ""
+
+
+def is_known_dead(process: str) -> bool:
+    """Whether a process has certainly ended: it was of this machine, and its number is free or that of another one."""
+    own = this_process().split()
+    other = process.split()
+    if not other or own[:2] != other[:2]:
+        return False
+    try:
+        return _begun(int(other[2])) != other[3]
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+
+
+def _begun(process: int) -> str:
+    """When a process began, in ticks since the start of the machine; "" of one that has ended and is not yet reaped."""
+    state, *fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return "" if state in "ZX" else fields[18]
+
+
+def writer_name(partition: int, epoch: int) -> str:
+    """What the connection of an owner that commits is called."""
+    return f"dynhull writer {partition}/{epoch}"
+
+
+class Ownership:
+    """The ownership of a partition, renewed by a thread of its own until `release`.
+
+    Args:
+        database: the database.
+        partition: the partition.
+        address: where callers reach the owner, for other servers.
+        lost: called in the thread with the reason, when another server owns the partition or the thread has failed.
+
+    Attributes:
+        epoch: the epoch; 0 before `take`.
+    """
+
+    def __init__(self, database: Database, partition: int, address: str, lost: Callable[[str], None]) -> None:
+        self._database = database
+        self._partition = partition
+        self._address = address
+        self._lost = lost
+        self._until = 0.0
+        self._turn = threading.Lock()  # of the connection
+        self._connection: Connection | None = None
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self.epoch = 0
+
+    def holds(self) -> bool:
+        """Whether the lease has not ended."""
+        return time.monotonic() < self._until
+
+    def take(self) -> None:
+        """Own the partition: at once if nobody does, or a process that has ended; else when the lease has ended.
+
+        Raises:
+            LockedError: another server renews its lease.
+            StorageError: the database cannot be used.
+        """
+        seen: str | None = None
+        while True:
+            owner = self._try_to_take()
+            if owner is None:
+                break
+            if seen not in (None, owner.until):
+                raise LockedError(
+                    f"{self._database} is served by {owner.worker}: stop that server first, or choose another database"
+                )
+            seen = owner.until
+            time.sleep(LOOK)
+        self._thread = threading.Thread(target=self._keep, name="lease", daemon=True)
+        self._thread.start()
+
+    def renew(self) -> None:
+        """Renew the lease, and make all earlier commits durable.
+
+        Raises:
+            TakenOverError: another server owns the partition.
+            StorageError: the database cannot be reached.
+        """
+        with self._turn, self._working() as connection:
+            before = time.monotonic()
+            renewed = connection.execute(
+                "UPDATE owners SET until = clock_timestamp() + make_interval(secs => %s) "
+                "WHERE partition = %s AND epoch = %s",
+                [LEASE, self._partition, self.epoch],
+            )
+            if renewed.rowcount != 1:
+                self._until = 0.0
+                raise taken_over(self._database, self._partition)
+            self._until = before + LEASE - MARGIN
+
+    def release(self) -> None:
+        """Let another server own the partition at once; if the database does not answer, when the lease has ended."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(LOCK_SECONDS)
+        self._until = 0.0
+        if not self._turn.acquire(timeout=LOCK_SECONDS):
+            return
+        try:
+            if self.epoch:
+                with self._working() as connection:
+                    connection.execute(
+                        "UPDATE owners SET until = clock_timestamp(), process = '' WHERE partition = %s AND epoch = %s",
+                        [self._partition, self.epoch],
+                    )
+        except StorageError as error:
+            log.warning("the lease was not returned", extra={"reason": words(error)})
+        finally:
+            self._disconnect()
+            self._turn.release()
+
+    def end_writers(self, connection: Connection, until: int) -> None:
+        """End the other connections that could commit under an epoch, or an earlier one."""
+        connection.execute(
+            "SELECT pg_terminate_backend(pid, %s) FROM pg_stat_activity WHERE datname = current_database() "
+            "AND pid <> pg_backend_pid() AND starts_with(application_name, %s) "
+            "AND split_part(application_name, '/', 2)::bigint <= %s",
+            [1000 * LOCK_SECONDS, writer_name(self._partition, 0)[:-1], until],
+        )
+
+    def _try_to_take(self) -> _Owner | None:
+        """Own the partition if it is free; else its owner."""
+        with self._turn, self._working() as connection:
+            owner = self._owner(connection)
+            if owner is not None and owner.alive and not is_known_dead(owner.process):
+                return owner
+            before = time.monotonic()
+            try:
+                epoch = self._succeed(connection, owner)
+            except LockNotAvailable:  # it was stopped inside of a transaction, which has locked the row
+                connection.execute("ROLLBACK")
+                self.end_writers(connection, until=0 if owner is None else owner.epoch)
+                return owner
+            if epoch is None:
+                return self._owner(connection)
+            self.epoch, self._until = epoch, before + LEASE - MARGIN
+            return None
+
+    def _owner(self, connection: Connection) -> _Owner | None:
+        row = connection.execute(
+            "SELECT epoch, worker, process, until::text, until > clock_timestamp() FROM owners WHERE partition = %s",
+            [self._partition],
+        ).fetchone()
+        return None if row is None else _Owner(*row)
+
+    def _succeed(self, connection: Connection, owner: _Owner | None) -> int | None:
+        """Follow an owner, or nobody. The new epoch; None if another server was faster."""
+        own = this_worker(), this_process(), self._address, LEASE
+        values = "%s, %s, %s, clock_timestamp() + make_interval(secs => %s)"
+        if owner is None:
+            sql = f"INSERT INTO owners VALUES (%s, 1, {values}) ON CONFLICT DO NOTHING"  # noqa: S608  (ours)
+            return 1 if connection.execute(sql.encode(), [self._partition, *own]).rowcount else None
+        connection.execute("BEGIN")
+        connection.execute(f"SET LOCAL lock_timeout = '{LOCK_SECONDS}s'".encode())
+        same = "partition = %s AND epoch = %s AND until = %s::timestamptz"
+        of_owner = self._partition, owner.epoch, owner.until
+        locked = connection.execute(f"SELECT epoch FROM owners WHERE {same} FOR UPDATE".encode(), of_owner)  # noqa: S608
+        if locked.rowcount:
+            sql = f"UPDATE owners SET (epoch, worker, process, address, until) = (epoch + 1, {values}) WHERE {same}"  # noqa: S608
+            connection.execute(sql.encode(), [*own, *of_owner])
+        connection.execute("COMMIT")
+        return owner.epoch + 1 if locked.rowcount else None
+
+    def _keep(self) -> None:
+        """Renew the lease until `release`. While the database is away, the lease ends, and begins anew afterwards."""
+        away = False
+        try:
+            while not self._stop.wait(RENEWAL):
+                try:
+                    self.renew()
+                except TakenOverError:
+                    raise
+                except StorageError as error:
+                    if not away:
+                        log.warning("the lease cannot be renewed; reads end with it", extra={"reason": words(error)})
+                    away = True
+                    continue
+                if away:
+                    log.info("the lease is renewed again")
+                away = False
+        except BaseException as error:
+            self._until = 0.0
+            self._lost(words(error))
+
+    @contextmanager
+    def _working(self) -> Iterator[Connection]:
+        """The connection; after an error, the next one is another."""
+        try:
+            with as_storage_errors():
+                if self._connection is None:
+                    self._connection = self._database.connect(f"dynhull lease {self._partition}")
+                yield self._connection
+        except BaseException:
+            self._disconnect()
+            raise
+
+    def _disconnect(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+
+def taken_over(database: Database, partition: int) -> TakenOverError:
+    """The error of an owner that is no longer one."""
+    return TakenOverError(f"another server has taken over partition {partition} of {database}")

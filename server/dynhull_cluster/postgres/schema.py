@@ -1,0 +1,212 @@
+"""The tables in PostgreSQL, and the statements to fill them.
+
+Every table has the columns of `COLUMNS`, and before them the partition. Payloads are not compressed: they are points
+and keys, and compressing them would take longer than writing them.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Any
+
+from psycopg.errors import LockNotAvailable
+
+from dynhull_server.storage.port import FormatError, StorageError
+from dynhull_server.storage.rows.tables import (
+    COLUMNS,
+    FORMAT,
+    TOTALS_COLUMNS,
+    Insert,
+    Remove,
+    Replace,
+    Statement,
+)
+from dynhull_server.storage.rows.totals import COPIES, Totals
+
+from .database import SCHEMA, Connection, Database
+
+# The first format in PostgreSQL, and the statements that lead from each format to the next one.
+FIRST_FORMAT = 8
+MIGRATIONS: dict[int, Sequence[str]] = {}
+# The number of an advisory lock, held while tables are created, migrated, or filled from a folder: "dynhull".
+PREPARING = 0x64796E68756C6C
+PREPARING_SECONDS = 10
+# Bytes of the rows that one statement inserts, unless one row is larger.
+INSERTED_BYTES = 2**22
+
+TYPES = {
+    "name": "text",
+    "uid": "text",
+    "created": "double precision",
+    "settings": "text",
+    "config": "text",
+    "payload": "bytea",
+    "points": "bytea",
+    "state": "bytea",
+}
+INTEGER = "bigint"
+
+Query = tuple[bytes, Sequence[Any]]
+
+
+def _columns(columns: Sequence[str]) -> str:
+    return ", ".join(f"{column} {TYPES.get(column, INTEGER)} NOT NULL" for column in columns)
+
+
+def _tables() -> Iterator[str]:
+    yield "CREATE TABLE format (format integer NOT NULL, partitions integer NOT NULL)"
+    yield (
+        "CREATE TABLE owners (partition integer PRIMARY KEY, epoch bigint NOT NULL, worker text NOT NULL, "
+        "process text NOT NULL, address text NOT NULL, until timestamptz NOT NULL)"
+    )
+    # Rows that every commit renews stay on their page.
+    yield (
+        f"CREATE TABLE totals (partition integer NOT NULL, copy integer NOT NULL, {_columns(TOTALS_COLUMNS)}, "
+        "PRIMARY KEY (partition, copy)) WITH (fillfactor = 30)"
+    )
+    for table, columns in COLUMNS.items():
+        key = f"PRIMARY KEY (partition, {columns[0]})"
+        yield f"CREATE TABLE {table} (partition integer NOT NULL, {_columns(columns)}, {key})"
+        for column in columns:
+            if TYPES.get(column) == "bytea":
+                yield f"ALTER TABLE {table} ALTER COLUMN {column} SET STORAGE EXTERNAL"
+
+
+INSERT_TOTALS = (
+    f"INSERT INTO totals (partition, copy, {', '.join(TOTALS_COLUMNS)}) "  # noqa: S608  (ours)
+    f"VALUES (%s, %s, {', '.join(['%s'] * len(TOTALS_COLUMNS))})"
+).encode()
+UPDATE_TOTALS = (
+    f"UPDATE totals SET {', '.join(f'{column} = %s' for column in TOTALS_COLUMNS)} "  # noqa: S608  (ours)
+    "WHERE partition = %s AND commits = %s AND checksum = %s"
+).encode()
+
+
+def _insert(table: str) -> bytes:
+    columns = COLUMNS[table]
+    given = ", ".join(f"%s::{TYPES.get(column, INTEGER)}[]" for column in columns)
+    return f"INSERT INTO {table} (partition, {', '.join(columns)}) SELECT %s, * FROM unnest({given})".encode()  # noqa: S608
+
+
+INSERT = {table: _insert(table) for table in COLUMNS}
+REMOVE = {
+    table: f"DELETE FROM {table} WHERE partition = %s AND {columns[0]} = ANY(%s::bigint[])".encode()  # noqa: S608
+    for table, columns in COLUMNS.items()
+}
+REPLACE_EVENTS = b"UPDATE events SET checksum = %s, payload = %s WHERE partition = %s AND rowid = %s"
+
+
+def queries_of(partition: int, statements: Sequence[Statement]) -> Iterator[Query]:
+    """Changes of rows as SQL, in their order; rows that are inserted one after the other share statements."""
+    for (kind, table), run in groupby(statements, lambda each: (type(each), getattr(each, "table", ""))):
+        if kind is Insert:
+            for rows in _some([each.values for each in run if isinstance(each, Insert)]):
+                yield INSERT[table], [partition, *map(list, zip(*rows, strict=True))]
+            continue
+        for each in run:
+            match each:
+                case Remove(_, places):
+                    yield REMOVE[table], [partition, list(places)]
+                case Replace(place, checksum, payload):
+                    yield REPLACE_EVENTS, [checksum, payload, partition, place]
+
+
+def _some(rows: Sequence[tuple[Any, ...]]) -> Iterator[list[tuple[Any, ...]]]:
+    some: list[tuple[Any, ...]] = []
+    size = 0
+    for row in rows:
+        row_bytes = sum(len(value) for value in row if isinstance(value, bytes | str))
+        if some and size + row_bytes > INSERTED_BYTES:
+            yield some
+            some, size = [], 0
+        some.append(row)
+        size += row_bytes
+    yield some
+
+
+def put_totals(connection: Connection, partition: int, totals: Totals) -> None:
+    """Write both copies of the totals of a partition anew."""
+    connection.execute("DELETE FROM totals WHERE partition = %s", [partition])
+    for copy in range(COPIES):
+        connection.execute(INSERT_TOTALS, [partition, copy, *totals.row])
+
+
+def hold(connection: Connection, database: Database) -> None:
+    """Keep others from preparing the database, until the end of the transaction. Raises StorageError."""
+    connection.execute(f"SET LOCAL lock_timeout = '{PREPARING_SECONDS}s'".encode())
+    try:
+        connection.execute("SELECT pg_advisory_xact_lock(%s)", [PREPARING])
+    except LockNotAvailable:
+        raise StorageError(f"{database} is being prepared by another server, or filled by `dynhull move`") from None
+
+
+def partitions_of(connection: Connection, database: Database) -> int | None:
+    """The number of partitions; None if the database has no tables of dynhull.
+
+    Raises:
+        FormatError: the tables are of a newer version.
+        StorageError: the tables are not those of dynhull.
+    """
+    (there,) = _one(connection, "SELECT to_regclass(%s) IS NOT NULL", [f"{SCHEMA}.format"])
+    if not there:
+        if _one(connection, "SELECT to_regnamespace(%s) IS NOT NULL", [SCHEMA])[0] and _has_tables(connection):
+            raise FormatError(f"{database} has a schema {SCHEMA} of another program: choose another database")
+        return None
+    rows = connection.execute("SELECT format, partitions FROM format").fetchall()
+    if len(rows) != 1:
+        raise FormatError(
+            f"{database}: the table {SCHEMA}.format has {len(rows)} rows instead of one: restore a backup"
+        )
+    version, partitions = rows[0]
+    if version not in range(FIRST_FORMAT, FORMAT + 1):
+        raise FormatError(
+            f"{database} has format {version}, this version reads formats {FIRST_FORMAT} to {FORMAT}: run the newer "
+            "version of dynhull that wrote it"
+        )
+    return int(partitions)
+
+
+def prepare(connection: Connection, database: Database, partitions: int) -> None:
+    """Create the tables of so many partitions, or migrate those that there are. Inside a transaction, after `hold`.
+
+    Raises:
+        FormatError: the database belongs to another program, or to a newer version.
+        StorageError: it has another number of partitions.
+    """
+    present = partitions_of(connection, database)
+    if present is None:
+        connection.execute(f"CREATE SCHEMA IF NOT EXISTS {SCHEMA}".encode())
+        for statement in _tables():
+            connection.execute(statement.encode())
+        connection.execute("INSERT INTO format (format, partitions) VALUES (%s, %s)", [FORMAT, partitions])
+        for partition in range(partitions):
+            put_totals(connection, partition, Totals())
+        return
+    if present != partitions:
+        raise StorageError(f"{database} is divided among {_servers(present)}: {_remedy(present)}")
+    (version,) = _one(connection, "SELECT format FROM format")
+    for before in range(version, FORMAT):
+        for sql in MIGRATIONS[before]:
+            connection.execute(sql.encode())
+    if version != FORMAT:
+        connection.execute("UPDATE format SET format = %s", [FORMAT])
+
+
+def _servers(partitions: int) -> str:
+    return "one process" if partitions == 1 else f"{partitions} workers"
+
+
+def _remedy(partitions: int) -> str:
+    if partitions == 1:
+        return "start the server without --workers"
+    return f"start the server with --workers {partitions}"
+
+
+def _has_tables(connection: Connection) -> bool:
+    (tables,) = _one(connection, "SELECT count(*) FROM pg_class WHERE relnamespace = to_regnamespace(%s)", [SCHEMA])
+    return bool(tables)
+
+
+def _one(connection: Connection, sql: Any, values: Sequence[Any] = ()) -> tuple[Any, ...]:
+    row = connection.execute(sql, values).fetchone()
+    assert row is not None  # these queries have one row
+    return row

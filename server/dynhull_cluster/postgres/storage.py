@@ -1,0 +1,285 @@
+"""The storage on PostgreSQL: an implementation of the port.
+
+Outcomes. Everything of a commit but its COMMIT is sent in one piece, and nothing of it stays if that fails. After an
+error of COMMIT itself the outcome is unknown: `settle` ends the connection that it was sent on, waits until its
+transaction has ended, and reads what there is.
+
+A commit takes place only if the epoch is still that of this server, and if the totals are those of its last commit.
+The second fails if PostgreSQL has lost commits, as it may in a crash without `synchronous_commit`, or if it was
+replaced by a copy. In both cases what this server has in memory is not what the database has, and its process must end.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from functools import partial
+
+import psycopg
+from psycopg.errors import DiskFull
+from psycopg.pq import TransactionStatus
+
+from dynhull_server.state.changes import Change
+from dynhull_server.state.errors import words
+from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.port import (
+    Contents,
+    DamagedError,
+    NotCommittedError,
+    Progress,
+    Step,
+    StorageError,
+    TakenOverError,
+)
+from dynhull_server.storage.rows.examine import Findings, examine
+from dynhull_server.storage.rows.ledger import Group
+from dynhull_server.storage.rows.storage import RowStorage
+from dynhull_server.storage.rows.tables import FORMAT, UnreadableError
+from dynhull_server.storage.rows.totals import COPIES
+
+from .database import Connection, Database, as_storage_errors
+from .ownership import REQUIRE, Ownership, taken_over, writer_name
+from .reader import PostgresReader, Readers
+from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of
+
+# With `off` commits survive the end of this process; a crash of PostgreSQL may lose those since the last `sync`.
+SYNCHRONOUS = {Durability.SYNC: "on", Durability.INTERVAL: "off", Durability.NONE: "off"}
+# Seconds after which PostgreSQL ends a transaction of a process that was stopped.
+IDLE_SECONDS = 10
+# Seconds between looks at the size of the database.
+SIZE_SECONDS = 10.0
+
+SIZE = b"""
+SELECT coalesce(sum(pg_total_relation_size(oid)), 0)::bigint FROM pg_class
+WHERE relnamespace = to_regnamespace(current_schema()) AND relkind = 'r'
+"""
+
+
+class PostgresStorage(RowStorage):
+    """Hulls in a partition of a database.
+
+    A thread of its own renews the lease from `open` to `close`.
+
+    Args:
+        database: the database.
+        lost: called, in a thread, with the reason when another server has taken the partition over.
+        durability: the durability of a commit.
+        partition: the partition.
+        partitions: the number of partitions of the database.
+        address: where callers reach this server, for others to see.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        lost: Callable[[str], None],
+        durability: Durability = Durability.SYNC,
+        *,
+        partition: int = 0,
+        partitions: int = 1,
+        address: str = "",
+    ) -> None:
+        super().__init__()
+        self._database = database
+        self._durability = durability
+        self._partition = partition
+        self._partitions = partitions
+        self._owner = Ownership(database, partition, address, lost)
+        self._writer: Connection | None = None
+        self._not_durable = False
+        self._size = 0
+        self._size_due = 0.0
+        self._open = ExitStack()
+
+    def entitled(self) -> bool:
+        """Whether this server may answer reads: no other one owns the partition."""
+        return self._owner.holds()
+
+    # Opening and closing
+
+    def open(self, progress: Progress) -> Contents:
+        """Own the partition, examine it, repair what can be repaired, and load it."""
+        with ExitStack() as stack:
+            with closing(self._database.connect("dynhull start")) as connection, as_storage_errors():
+                connection.execute("BEGIN")
+                hold(connection, self._database)
+                prepare(connection, self._database, self._partitions)
+                connection.execute("COMMIT")
+                stack.callback(self._owner.release)
+                self._owner.take()
+                connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
+                findings = examined(connection, self._partition, progress)
+            if findings.fatal:
+                raise DamagedError(f"{self._place}: {'; '.join(findings.fatal)}: restore a backup")
+            stack.callback(self._disconnect)
+            self._ledger = findings.ledger
+            if not findings.both_totals:
+                self._restore_totals()
+            self._write(Group(self._ledger, findings.repairs))
+            self._readers = Readers(
+                partial(self._database.connect, f"dynhull reader {self._partition}"), self._partition
+            )
+            stack.callback(self._readers.close)
+            self._open = stack.pop_all()
+        rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
+        fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
+        notes = [f"{self._place}: {note}" for note in findings.notes]
+        return Contents(rows, self._ledger.totals.next_number, notes, fences)
+
+    def close(self) -> None:
+        """Make all commits durable, and let another server own the partition."""
+        try:
+            self.sync()
+        finally:
+            self._open.close()
+
+    # Committing
+
+    def commit(self, changes: Sequence[Change | Step]) -> None:
+        """Commit all of the changes or none."""
+        self._write(self._group(changes))
+
+    def settle(self) -> None:
+        """Decide the outcome of the last commit, as described at the top of this file."""
+        if not self._unsettled:
+            return
+        self._disconnect()
+        connection = self._writer = self._connect_writer()
+        with as_storage_errors():
+            self._owner.end_writers(connection, self._owner.epoch)
+            connection.execute("BEGIN")
+            self._require_ownership(connection.execute(REQUIRE, [self._partition, self._owner.epoch]).rowcount)
+            findings = examined(connection, self._partition, lambda *_: None, contents=False)
+            connection.execute("COMMIT")
+        if findings.fatal:
+            raise DamagedError(f"{self._place}: {'; '.join(findings.fatal)}: restore a backup")
+        self._renew(findings.ledger)
+
+    def _write(self, group: Group) -> None:
+        try:
+            if self._writer is None:
+                self._writer = self._connect_writer()
+            self._send(self._writer, group)
+        except TakenOverError:
+            self._disconnect()
+            raise
+        except BaseException as error:
+            self._roll_back()
+            if isinstance(error, psycopg.Error | StorageError | OSError | MemoryError):
+                raise _not_committed(error) from error
+            raise
+        with self._visible:
+            self._unsettled = True
+            with as_storage_errors():
+                ended = self._writer.execute("COMMIT").statusmessage
+            if ended != "COMMIT":
+                raise StorageError(f"PostgreSQL: the commit ended with {ended}")
+            group.adopt()
+            self._unsettled = False
+        self._not_durable = self._durability is not Durability.SYNC
+
+    def _send(self, connection: Connection, group: Group) -> None:
+        """Send all of a transaction but its COMMIT."""
+        with connection.pipeline():
+            connection.execute("BEGIN")
+            owned = connection.execute(REQUIRE, [self._partition, self._owner.epoch])
+            for sql, values in queries_of(self._partition, group.statements):
+                connection.execute(sql, values)
+            *_, last = group.before.row
+            keys = self._partition, group.before.commits, last
+            renewed = connection.execute(UPDATE_TOTALS, [*group.totals.row, *keys])
+        self._require_ownership(owned.rowcount)
+        if renewed.rowcount != COPIES:
+            raise TakenOverError(
+                f"{self._place} is not as this server has left it: it has lost commits, or was replaced"
+            )
+
+    def _require_ownership(self, rows: int) -> None:
+        if rows != 1:
+            raise taken_over(self._database, self._partition)
+
+    def _restore_totals(self) -> None:
+        """Renew both copies of the totals, one of which is damaged."""
+        connection = self._writer = self._connect_writer()
+        with as_storage_errors(), connection.transaction():
+            self._require_ownership(connection.execute(REQUIRE, [self._partition, self._owner.epoch]).rowcount)
+            put_totals(connection, self._partition, self._ledger.totals)
+
+    def _roll_back(self) -> None:
+        """End the transaction; if that fails, close the connection."""
+        if self._writer is None:
+            return
+        try:
+            if self._writer.info.transaction_status is not TransactionStatus.IDLE:
+                self._writer.execute("ROLLBACK")
+        except (psycopg.Error, MemoryError):
+            self._disconnect()
+
+    def _connect_writer(self) -> Connection:
+        connection = self._database.connect(writer_name(self._partition, self._owner.epoch))
+        try:
+            with as_storage_errors():
+                connection.execute(f"SET synchronous_commit = {SYNCHRONOUS[self._durability]}".encode())
+                connection.execute(f"SET idle_in_transaction_session_timeout = '{IDLE_SECONDS}s'".encode())
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _disconnect(self) -> None:
+        """Close the connection, which also ends its transaction."""
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+    # Reading
+
+    @property
+    def _place(self) -> str:
+        return str(self._database) + (f", partition {self._partition}" if self._partitions > 1 else "")
+
+    @contextmanager
+    def _lend(self) -> Iterator[PostgresReader]:
+        with self._readers.lend() as reader:
+            yield reader
+
+    # Housekeeping
+
+    def sync(self) -> None:
+        """Make earlier commits durable: a later one that is makes them so, too."""
+        if self._not_durable:
+            self._not_durable = False
+            try:
+                self._owner.renew()
+            except BaseException:
+                self._not_durable = True
+                raise
+
+    def checkpoint(self) -> None:
+        """Look at the size of the database now and then. Its housekeeping is PostgreSQL's own."""
+        if time.monotonic() < self._size_due:
+            return
+        self._size_due = time.monotonic() + SIZE_SECONDS
+        with self._readers.lend() as reader:
+            self._size = reader.number(SIZE)
+
+    def bytes_used(self) -> int:
+        """The size of the tables of all partitions in bytes, as of the last look."""
+        return self._size
+
+
+def examined(connection: Connection, partition: int, progress: Progress, *, contents: bool = True) -> Findings:
+    """Compare the rows of a partition with their checksums and the totals, inside of a transaction."""
+    findings = Findings()
+    try:
+        examine(PostgresReader(connection, partition), FORMAT, findings, progress, contents=contents)
+    except UnreadableError as error:
+        findings.fatal.append(f"a part of the database cannot be read ({error})")
+    return findings
+
+
+def _not_committed(error: BaseException) -> NotCommittedError:
+    if isinstance(error, DiskFull):
+        return NotCommittedError(
+            "the disk of PostgreSQL is full: free some space, and writes are accepted again", full=True
+        )
+    return NotCommittedError(f"nothing was written: {words(error)}")

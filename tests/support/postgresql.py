@@ -1,0 +1,118 @@
+"""A real PostgreSQL server, in processes of its own."""
+
+import os
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import psycopg
+from patience import PATIENCE, wait_until
+from peers import program
+
+# Without syncs: only where no test asks what a power failure leaves.
+FAST = ("fsync=off", "full_page_writes=off", "shared_buffers=16MB", "autovacuum=off", "max_wal_size=256MB")
+DEBIAN = Path("/usr/lib/postgresql")
+
+
+def postgres_program(name: str) -> str:
+    """The path of one of its programs; Debian has those of the server in a folder for each version."""
+    newest = sorted(DEBIAN.glob(f"*/bin/{name}"), key=lambda path: int(path.parts[-3]))
+    return str(newest[-1]) if newest else program(name)
+
+
+class PostgreSQL:
+    """A server with a folder and a socket of its own; it runs as `nobody` where root starts it."""
+
+    def __init__(self, home: Path, settings: Sequence[str] = FAST) -> None:
+        self._home = home
+        self._settings = settings
+        self._databases = count(1)
+        self.process: subprocess.Popen[bytes] | None = None
+        home.chmod(0o777)
+        self._run(
+            "initdb", "--auth=trust", "--username=tester", "--no-sync", "--encoding=UTF8", "--locale=C", self._data
+        )
+
+    @property
+    def _data(self) -> Path:
+        return self._home / "data"
+
+    @cached_property
+    def _as_nobody(self) -> dict[str, Any]:
+        return {"user": "nobody", "group": "nogroup", "extra_groups": []} if os.getuid() == 0 else {}
+
+    def _run(self, name: str, *arguments: object) -> None:
+        command = [postgres_program(name), *map(str, arguments)]
+        subprocess.run(command, check=True, cwd=self._home, stdout=subprocess.DEVNULL, **self._as_nobody)
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        options = [each for setting in self._settings for each in ("-c", setting)]
+        with (self._home / "log").open("ab") as log:
+            self.process = subprocess.Popen(
+                [postgres_program("postgres"), "-D", self._data, "-k", self._home, "-h", "", *options],
+                stdout=log,
+                stderr=log,
+                cwd=self._home,
+                **self._as_nobody,
+            )
+        wait_until(self._answers)
+
+    def _answers(self) -> bool:
+        assert self.process.poll() is None, (self._home / "log").read_text()
+        try:
+            self.query("SELECT 1", database="postgres")
+        except psycopg.OperationalError:
+            return False
+        return True
+
+    def stop(self, number: int = signal.SIGQUIT) -> None:
+        """End it; by default at once, without a checkpoint."""
+        if self.process is not None:
+            self.process.send_signal(number)
+            self.process.wait(PATIENCE)
+            self.process = None
+
+    def kill(self) -> None:
+        """SIGKILL its first process; the others end by themselves, and only then can it start again."""
+        self.stop(signal.SIGKILL)
+
+    def url(self, database: str) -> str:
+        """The address of a database."""
+        return f"postgresql:///{database}?host={self._home}&user=tester"
+
+    def new_database(self, template: str = "template1") -> str:
+        """The address of an empty database, or of a copy of one that nobody uses."""
+        name = f"test{next(self._databases)}"
+        self.query(f"CREATE DATABASE {name} TEMPLATE {template}", database="postgres")
+        return self.url(name)
+
+    def query(self, sql: str, *values: object, database: str) -> list[Any]:
+        """The rows of a query, in a connection of its own."""
+        return query(self.url(database), sql, *values)
+
+
+def query(url: str, sql: str, *values: object) -> list[Any]:
+    """The rows of a query, in a connection of its own; names are of dynhull's tables."""
+    with psycopg.connect(url, autocommit=True, options="-c search_path=dynhull") as connection:
+        cursor = connection.execute(sql, values)
+        return cursor.fetchall() if cursor.description else []
+
+
+@contextmanager
+def postgresql(*settings: str) -> Iterator[PostgreSQL]:
+    """A server that answers; it ends with the block."""
+    # A path to a socket has at most a hundred bytes, fewer than the folders of tests.
+    with tempfile.TemporaryDirectory(prefix="pg-", ignore_cleanup_errors=True) as home:
+        server = PostgreSQL(Path(home), settings or FAST)
+        server.start()
+        try:
+            yield server
+        finally:
+            server.stop()
