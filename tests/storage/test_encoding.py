@@ -13,11 +13,14 @@ from dynhull_server.state.records import (
     NO_TIME,
     Contents,
     Expiry,
+    HeldChange,
+    HeldRows,
     HullRow,
     HullSettings,
     Kept,
     KeyRows,
     PointRows,
+    QuarantineRules,
     Record,
     Window,
 )
@@ -59,11 +62,28 @@ def point_rows(draw):
 
 
 @st.composite
+def held_rows(draw, kind, rows):
+    measures = of_rows(st.floats(0) | st.just(np.nan), rows, np.float64)
+    numbers = of_rows(st.integers(0, 2**62), rows, np.int64)
+    whens = of_rows(times, rows, np.int64)
+    return HeldRows(*map(draw, (keys(kind, rows), points(rows), whens, whens, measures, measures, numbers, numbers)))
+
+
+limits = st.none() | st.floats(1, allow_infinity=False)
+rules = st.builds(QuarantineRules, limits, limits, st.integers(0, 2**32 - 1))
+
+
+@st.composite
+def held_changes(draw, kind):
+    return HeldChange(draw(held_rows(kind, draw(counts))), draw(keys(kind, draw(counts))), draw(st.none() | rules))
+
+
+@st.composite
 def key_rows(draw):
     kind, puts, removes = draw(st.sampled_from(["str", "int"])), draw(counts), draw(counts)
     condition = draw(st.sampled_from([None, "absent", "present"]))
     columns = keys(kind, puts), points(puts), keys(kind, removes), optional_times(puts), optional_times(puts)
-    return KeyRows(*map(draw, columns), condition)
+    return KeyRows(*map(draw, columns), condition, draw(st.none() | held_changes(kind)))
 
 
 centers = st.none() | st.tuples(st.floats(-180, 180, exclude_max=True), st.floats(-90, 90))
@@ -96,6 +116,7 @@ def contents(draw):
         None if kind is None else draw(keys(kind, rows)),
         draw(optional_times(rows)),
         draw(optional_times(rows)),
+        None if kind is None else draw(st.none() | held_rows(kind, draw(st.integers(1, 30)))),
     )
 
 
@@ -130,9 +151,9 @@ def test_keys_of_two_kinds_are_refused():
 def test_contents_come_back_from_chunks(given, size):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chunks, "CHUNK_BYTES", size)
-        starts = chunks.starts(given)
-    parts = [chunks.chunk(given, slice(*ends)) for ends in zip(starts, [*starts[1:], len(given)], strict=True)]
-    longest_row = 16 + 8 + 8 + 256
+        cuts = chunks.cuts(given)
+    parts = [chunks.chunk(given, cut) for cut in cuts]
+    longest_row = 16 + 6 * 8 + 256  # in quarantine
     assert max(map(len, parts)) <= chunks.HEADER.size + size + longest_row
     *_, decoded = chunks.state_from(chunks.state(Kept()))
     same(chunks.joined([decoded(part) for part in parts]), given)
@@ -141,10 +162,12 @@ def test_contents_come_back_from_chunks(given, size):
 @given(st.dictionaries(st.text(), st.integers(1, 2**64 - 1)) | st.just({"producers": 3, "clock": 4}), st.none() | times)
 def test_the_state_of_a_snapshot_comes_back(producers, clock):
     for center in (None, (-180.0, 89.5)):
-        before = Kept(producers=producers, clock=clock, center=center, skipping=frozenset(list(producers)[::2]))
+        rules = None if center is None else QuarantineRules(0.1, confirmations=0)
+        skipping = frozenset(list(producers)[::2])
+        before = Kept(producers=producers, clock=clock, center=center, skipping=skipping, rules=rules)
         kept, _ = chunks.state_from(chunks.state(before))
         assert (kept.producers, kept.clock, kept.center) == (producers, clock, center)
-        assert kept.skipping == before.skipping
+        assert (kept.skipping, kept.rules) == (skipping, rules)
 
 
 def test_a_snapshot_without_producers_that_skip():
@@ -180,6 +203,7 @@ settings = st.builds(
     st.booleans(),
     st.sampled_from(["plane", "geographic"]),
     centers,
+    st.none() | rules,
 )
 
 

@@ -1,5 +1,6 @@
 """A batch: changes that are applied together or not at all."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from dynhull.arrays import Points
 
-from .records import Condition, Keys, Times
+from .records import Condition, Keys, QuarantineRules, Times
 
 
 @dataclass(slots=True)
@@ -44,6 +45,9 @@ class KeyedBatch:
         ttl: the microseconds after which the puts leave, or None.
         deadlines: (n,) the times at which the puts leave, or None.
         refuse_missing: whether a missing key among the removes refuses the batch, rather than being counted.
+        releases: keys whose held position is let in. A batch with this or one of the next two has no puts or removes.
+        drops: keys whose held position is dropped.
+        rules: the rules of the quarantine from now on; None for the same as before.
     """
 
     kind: Literal["str", "int"]
@@ -55,11 +59,21 @@ class KeyedBatch:
     ttl: int | None = None
     deadlines: Times | None = None
     refuse_missing: bool = False
+    releases: Keys | None = None
+    drops: Keys | None = None
+    rules: QuarantineRules | None = None
 
     @property
     def field(self) -> str:
         """The path of its keys in the batch."""
-        return "puts.keys" if len(self.keys) else "removes"
+        if len(self.keys):
+            return "puts.keys"
+        return "releases" if self.releases is not None else "drops" if self.drops is not None else "removes"
+
+    @property
+    def of_quarantine(self) -> bool:
+        """Whether it is about the quarantine, and not about positions."""
+        return self.releases is not None or self.drops is not None or self.rules is not None
 
 
 @dataclass(slots=True)
@@ -82,6 +96,9 @@ class Applied:
         evicted: the oldest points, removed because the window has room for no more.
         clock: the clock of the hull, None for a hull without a clock.
         expired: points that left before the batch because of its time, as a revision of their own.
+        held: the rows of the puts that are held in quarantine.
+        released: keys that have left the quarantine and were let in.
+        dropped: keys whose held position was dropped: removed, contradicted by one that was let in, or by request.
     """
 
     revision: int
@@ -99,6 +116,9 @@ class Applied:
     evicted: int = 0
     clock: int | None = None
     expired: int = 0
+    held: Sequence[int] = ()
+    released: int = 0
+    dropped: int = 0
 
 
 NO_POINTS: Points = np.empty((0, 2))

@@ -11,14 +11,16 @@ from dynhull.arrays import Points
 
 from .batch import NO_POINTS, Applied
 from .contents import replayed
+from .contents.keyed import Keyed
 from .contents.live import AnyKeyedHull, layer_of
 from .contents.places import GeographicHull
+from .contents.quarantine import Quarantine
 from .errors import HullUnsuitableError, MisfitError, RefusedError
 from .history import History
 from .limits import Limits
 from .outline import GlobeOutline, Outline
 from .producers import Producers
-from .records import Center, Contents, Expiry, HullSettings, Kept, Record
+from .records import Center, Contents, Expiry, HullSettings, Kept, QuarantineRules, Record
 
 if TYPE_CHECKING:
     from .contents.live import AnyHull
@@ -39,6 +41,8 @@ class Counts:
         cause: what made the revision; None for revision 0, and where that is no longer known.
         center: the centre of a geographic hull; None for a hull without one.
         outlined: the revision at which the vertices or the centre changed last, or a later one.
+        held: the number of keys in quarantine.
+        rules: the rules of the quarantine; None for a hull that has never had any.
     """
 
     revision: int
@@ -48,6 +52,8 @@ class Counts:
     cause: Cause | None = None
     center: Center | None = None
     outlined: int = 0
+    held: int = 0
+    rules: QuarantineRules | None = None
 
 
 # The keys of vertices: an array of str, or of uint64.
@@ -70,7 +76,7 @@ class HullState:
         self.hull: AnyHull = contents.hull
         last, cause = kept.last_revision, _last_cause(kept)
         self._follow_center()
-        self.counts = Counts(last, len(self.hull), self.hull.distinct, contents.clock, cause, self.center, last)
+        self.counts = self._counted(last, len(self.hull), cause, last)
         self._limits = limits
         self._producers: Producers | None = None  # most of ten thousand hulls have none
         if sequences := _last_sequences(kept):
@@ -90,6 +96,11 @@ class HullState:
         """The centre of a geographic hull; None for a plane, and for a hull without points that has none so far."""
         globe = self.contents.globe
         return None if globe is None else globe.center
+
+    @property
+    def quarantine(self) -> Quarantine | None:
+        """The positions of a keyed hull that break its rules; None for a hull that has never had any rule."""
+        return self.contents.quarantine if isinstance(self.contents, Keyed) else None
 
     @property
     def vertex_count(self) -> int:
@@ -241,7 +252,14 @@ class HullState:
             self._history.changed(revision)
         if self.center != self.counts.center:
             outlined = revision
-        self.counts = Counts(revision, points, self.hull.distinct, self.contents.clock, cause, self.center, outlined)
+        self.counts = self._counted(revision, points, cause, outlined)
+
+    def _counted(self, revision: int, points: int, cause: Cause | None, outlined: int) -> Counts:
+        distinct, clock, quarantine = self.hull.distinct, self.contents.clock, self.quarantine
+        if quarantine is None:
+            return Counts(revision, points, distinct, clock, cause, self.center, outlined)
+        held, rules = len(quarantine), quarantine.rules
+        return Counts(revision, points, distinct, clock, cause, self.center, outlined, held, rules)
 
     # Reads
 
@@ -316,6 +334,7 @@ class HullState:
             clock=self.contents.clock,
             center=self.center,
             skipping=frozenset() if self._producers is None else self._producers.skipping(),
+            rules=None if self.quarantine is None else self.quarantine.rules,
         )
 
     def _new_producers(self, last: dict[str, int], skipping: frozenset[str], now: float) -> Producers:

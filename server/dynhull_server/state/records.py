@@ -40,6 +40,21 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
+class QuarantineRules:
+    """The rules that put positions of keys into quarantine. Without a limit there is no rule.
+
+    Attributes:
+        max_speed: the speed above which a key is too fast, in units of the coordinates, or metres, a second; or None.
+        max_growth: the factor above which one position would enlarge the area of the hull too much; or None.
+        confirmations: the later positions consistent with a held one that let the key in, 0 for none: by hand only.
+    """
+
+    max_speed: float | None = None
+    max_growth: float | None = None
+    confirmations: int = 1
+
+
+@dataclass(frozen=True, slots=True)
 class HullSettings:
     """The settings of a hull, fixed at its creation.
 
@@ -50,6 +65,7 @@ class HullSettings:
         by_event_time: whether a position with an earlier event time than the stored one changes nothing.
         frame: what coordinates mean: a plane, or longitude and latitude in degrees ("geographic").
         center: the centre that a geographic hull begins with; None for its first points to choose.
+        quarantine: the rules that a keyed hull begins with, or None.
     """
 
     identity: Identity = "multiset"
@@ -58,6 +74,7 @@ class HullSettings:
     by_event_time: bool = False
     frame: Frame = "plane"
     center: Center | None = None
+    quarantine: QuarantineRules | None = None
 
     @property
     def geographic(self) -> bool:
@@ -108,6 +125,49 @@ class PointRows:
 
 
 @dataclass(slots=True)
+class HeldRows:
+    """Positions in quarantine.
+
+    Attributes:
+        keys: n keys, each once.
+        points: (n, 2) their positions.
+        times: (n,) the times of these, NO_TIME for none.
+        deadlines: (n,) the times at which they leave, FOREVER for none.
+        speeds: (n,) the speed of each, NaN if it is not too fast.
+        growths: (n,) the factor by which each would enlarge the area of the hull, NaN if that is not too much.
+        revisions: (n,) the revisions that have held them.
+        confirmed: (n,) the positions since then that are consistent with the one before.
+    """
+
+    keys: Keys
+    points: Points
+    times: Times
+    deadlines: Times
+    speeds: npt.NDArray[np.float64]
+    growths: npt.NDArray[np.float64]
+    revisions: npt.NDArray[np.int64]
+    confirmed: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+
+@dataclass(slots=True)
+class HeldChange:
+    """A change of the quarantine of a hull.
+
+    Attributes:
+        rows: positions held, instead of those of the same keys.
+        dropped: keys whose held position is dropped. Before `rows`.
+        rules: the rules from now on; None for the same as before.
+    """
+
+    rows: HeldRows
+    dropped: Keys
+    rules: QuarantineRules | None = None
+
+
+@dataclass(slots=True)
 class KeyRows:
     """A change of the positions of keys. Applied again to the same state, it has the same effect.
 
@@ -118,6 +178,7 @@ class KeyRows:
         deadlines: (n,) the times at which they leave, or None; FOREVER for a key without one.
         condition: which keys are put: all, or only those that are absent or present.
         removes: keys removed; missing ones are ignored.
+        held: what it changes in the quarantine, or None.
     """
 
     keys: Keys
@@ -126,6 +187,7 @@ class KeyRows:
     times: Times | None = None
     deadlines: Times | None = None
     condition: Condition | None = None
+    held: HeldChange | None = None
 
     def __len__(self) -> int:
         return len(self.keys) + len(self.removes)
@@ -208,12 +270,14 @@ class Contents:
         times: (n,) the time of each point; None for a hull without times, NO_TIME for a point without one.
         deadlines: (n,) the time at which each point leaves; None for a hull without deadlines, FOREVER for a point that
             has none.
+        held: the positions in quarantine; None for none.
     """
 
     points: Points = field(default_factory=lambda: np.empty((0, 2)))
     keys: Keys | None = None
     times: Times | None = None
     deadlines: Times | None = None
+    held: HeldRows | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -231,6 +295,7 @@ class Kept:
         clock: the hull's clock at that revision, in microseconds since 1970; None for a hull without a clock.
         center: the centre of a geographic hull at that revision; None if it has none so far.
         skipping: the producers whose numbers may be skipped.
+        rules: the rules of the quarantine at that revision; None for those of the settings.
     """
 
     revision: int = 0
@@ -240,6 +305,7 @@ class Kept:
     clock: int | None = None
     center: Center | None = None
     skipping: frozenset[str] = frozenset()
+    rules: QuarantineRules | None = None
 
     @property
     def last_revision(self) -> int:

@@ -223,7 +223,7 @@ class Trip:
     def _count(self, leg: Leg, applied: Applied) -> None:
         if not applied.duplicate:
             self.applied = True
-            leg.unsaved += applied.inserted + applied.moved + applied.deleted + applied.expired
+            leg.unsaved += applied.inserted + applied.moved + applied.deleted + applied.expired + len(applied.held)
 
     def _expire(self, request: Expire, leg: Leg) -> int:
         hull = leg.after

@@ -19,6 +19,6 @@ def replayed(kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UN
     elif settings.identity == "multiset":
         contents = Windowed(settings, kept.contents, kept.clock, most_points, globe)
     else:
-        contents = Keyed(settings, kept.contents, kept.clock, most_points, globe)
+        contents = Keyed(settings, kept.contents, kept.clock, most_points, globe, kept.rules)
     contents.replay(kept.records)
     return contents

@@ -1,9 +1,9 @@
 """Points with keys."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import compress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +16,26 @@ from ..admission import GREATEST_TIME, Admission, admit, server_clock, shown, to
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
 from ..frames import Globe
-from ..records import NO_TIME, Center, Contents, Expiry, HullSettings, KeyRows, Keys, Record, Times
+from ..records import (
+    FOREVER,
+    NO_TIME,
+    Center,
+    Contents,
+    Expiry,
+    HeldChange,
+    HullSettings,
+    KeyRows,
+    Keys,
+    QuarantineRules,
+    Record,
+    Times,
+)
 from .deadlines import Deadlines, Key
+from .judging import Plane, Sphere
 from .live import REPLAYED_TOGETHER, AnyKeyedHull
 from .mirror import Mirror
 from .places import move_center, require_puts
+from .quarantine import OFF, Quarantine, rows_of
 
 REMOVED = -1
 # Keys whose deadline has come are removed in parts of this size: reading a list of keys keeps other threads waiting.
@@ -41,6 +56,8 @@ class Admitted:
         late: the number of rows that are too old.
         clamped: the number of rows whose time was reduced.
         refuse_missing: whether a missing key among the removes refuses the batch.
+        young: (n,) which puts of the batch are not too old; None if all are not.
+        request: the batch if it is about the quarantine, otherwise None.
     """
 
     rows: KeyRows
@@ -48,6 +65,21 @@ class Admitted:
     late: int
     clamped: int
     refuse_missing: bool
+    young: npt.NDArray[np.bool_] | None = None
+    request: KeyedBatch | None = None
+
+
+class Verdict(NamedTuple):
+    """What the quarantine adds to the result of a batch; `missing` is negative for removes that it knows."""
+
+    held: Sequence[int] = ()
+    released: int = 0
+    dropped: int = 0
+    stale: int = 0
+    missing: int = 0
+
+
+NOTHING_HELD = Verdict()
 
 
 @dataclass(slots=True)
@@ -74,15 +106,23 @@ class Keyed:
         clock: its clock.
         most_points: the limit on the number of points.
         globe: the frame of a geographic hull; None for a plane.
+        rules: the rules of the quarantine; None for those of the settings.
 
     Attributes:
+        quarantine: the positions that break rules; None for a hull that has never had any rule.
         timed: whether its points have times.
         mirror: the keys of a geographic hull in the plane, while fences compare them.
         ended: the keys whose deadline had come when points last left.
     """
 
     def __init__(
-        self, settings: HullSettings, stored: Contents, clock: int | None, most_points: int, globe: Globe | None
+        self,
+        settings: HullSettings,
+        stored: Contents,
+        clock: int | None,
+        most_points: int,
+        globe: Globe | None,
+        rules: QuarantineRules | None = None,
     ) -> None:
         assert settings.identity != "multiset"
         self._settings = settings
@@ -103,6 +143,8 @@ class Keyed:
         self.timed = settings.window is not None or settings.by_event_time
         if stored.keys is not None:
             self._load(stored.keys, stored)
+        rules = rules or settings.quarantine
+        self.quarantine = None if rules is None else Quarantine(self._kind, rules, stored.held)
 
     @property
     def due(self) -> int | None:
@@ -126,9 +168,14 @@ class Keyed:
             raise MisfitError(field, f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them")
         else:  # empty
             batch = KeyedBatch(self._kind, self._no_keys(), NO_POINTS, self._no_keys())
+        if batch.of_quarantine:
+            batch = self._of_quarantine(batch)
+        quarantine = self.quarantine
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
         admission = admit(self._settings, batch.times, len(batch.keys), "puts.times", arrived, self.clock)
         rows.times = admission.times
+        if rows.times is None and quarantine is not None and quarantine.rules.max_speed is not None:
+            rows.times = np.full(len(rows.keys), arrived, np.int64)
         if self.clock is not None or batch.ttl is not None or batch.deadlines is not None:
             self._admit_deadlines(batch, rows, admission, arrived)
         if self.globe is not None:
@@ -138,9 +185,12 @@ class Keyed:
             _refuse_repeated(rows)
             late = len(rows.keys) - int(np.count_nonzero(admission.young))
             rows = _selected(rows, admission.young)
-        admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing)
-        if len(self.hull) + len(rows.keys) > self._most_points:
-            self._refuse_growth(admitted)
+        admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
+        if batch.of_quarantine:
+            admitted.request = batch
+        held = 0 if quarantine is None else len(quarantine)
+        if len(self.hull) + held + len(rows.keys) > self._most_points:
+            self._refuse_growth(admitted, held)
         return admitted
 
     def check(self, admitted: Admitted) -> None:
@@ -148,6 +198,8 @@ class Keyed:
         _refuse_repeated(admitted.rows)
         if admitted.refuse_missing:
             there = self._there(admitted.rows.removes, admitted.clock)
+            if self.quarantine is not None:
+                there |= np.array([key in self.quarantine for key in key_list(admitted.rows.removes)], np.bool_)
             if not there.all():
                 row = int(np.argmin(there))
                 raise KeyMissingError(row, _key(admitted.rows.removes, row))
@@ -165,29 +217,37 @@ class Keyed:
     def apply(self, admitted: Admitted, revision: int) -> Applied:
         """Apply the batch, or raise KeyRepeatedError or KeyMissingError."""
         rows, hull = admitted.rows, self.hull
-        if len(rows.removes) and (len(rows.keys) or admitted.refuse_missing):
+        judged = self.quarantine is not None or admitted.request is not None
+        if judged or (len(rows.removes) and (len(rows.keys) or admitted.refuse_missing)):
             self.check(admitted)
         changes = hull.changes
+        verdict = self._judge(admitted, revision) if judged else NOTHING_HELD
+        rows = admitted.rows
         try:
             put, removed, evicted = self._carry_out(rows)
         except DuplicateKeyError as error:
             part = "puts.keys" if len(rows.keys) else "removes"
             raise KeyRepeatedError(error.key, (part, error.rows[0]), (part, error.rows[1])) from None
         self.clock = admitted.clock
+        if rows.held is not None:
+            self._follow(rows.held)
         return Applied(
             revision,
             put.new,
             removed,
-            len(rows.removes) - removed,
+            len(rows.removes) - removed + verdict.missing,
             hull.changes != changes,
             len(hull),
             moved=put.moved + put.unmoved,
-            stale=put.stale,
+            stale=put.stale + verdict.stale,
             late=admitted.late,
             skipped=put.skipped,
             clamped=admitted.clamped,
             evicted=evicted,
             clock=self.clock,
+            held=verdict.held,
+            released=verdict.released,
+            dropped=verdict.dropped,
         )
 
     def rows(self, admitted: Admitted, _: Applied) -> KeyRows:
@@ -207,6 +267,8 @@ class Keyed:
         if not leaving:
             return None
         self.clock = clock
+        if self.quarantine is not None:
+            self.quarantine.expire(until, clock)
         return Expiry(until, leaving)
 
     def replay(self, records: Iterable[Record]) -> None:
@@ -229,6 +291,10 @@ class Keyed:
                 group.append(rows)
                 size += len(rows)
             self.clock = record.clock
+            if self.quarantine is not None:
+                self.quarantine.expire(too_old(self._settings, record.clock), record.clock)
+            if isinstance(rows, KeyRows) and rows.held is not None:
+                self._follow(rows.held)
         if group:
             self._carry_out(_merged(group))
 
@@ -246,7 +312,8 @@ class Keyed:
         """The points in the order of their keys. O(n log n)."""
         keys, points, times = self.hull.entities()
         deadlines = self._deadlines.of(key_list(keys)) if len(self._deadlines) else None
-        return Contents(points, keys, stored_times(times) if self.timed else None, deadlines)
+        held = self.quarantine.stored() if self.quarantine else None
+        return Contents(points, keys, stored_times(times) if self.timed else None, deadlines, held)
 
     def in_plane(self) -> KeyedHull:
         """The keys as points of a plane: those of a geographic hull at their projections. O(n log n) the first time."""
@@ -261,6 +328,66 @@ class Keyed:
         points = self.hull.positions(keys)
         times = stored_times(self.hull.times(keys)) if self.timed else None
         return Found(points, ~np.isnan(points[:, 0]), times)
+
+    # Quarantine
+
+    def _of_quarantine(self, batch: KeyedBatch) -> KeyedBatch:
+        """A batch about the quarantine, with the positions that it lets in; raises InvalidBatchError."""
+        if len(batch.keys) or len(batch.removes):
+            problem = "a batch that releases or drops keys in quarantine, or sets its rules, has no puts and removes"
+            raise InvalidBatchError(batch.field, f"{len(batch.keys) + len(batch.removes)} keys", problem)
+        named: dict[Key, tuple[str, int]] = {}
+        for field, keys in (("releases", batch.releases), ("drops", batch.drops)):
+            for row, key in enumerate(() if keys is None else key_list(keys)):
+                first = named.setdefault(key, (field, row))
+                if first != (field, row):
+                    raise KeyRepeatedError(key, first, (field, row))
+        if self.quarantine is None or batch.releases is None:
+            return batch
+        found = self.quarantine.of(key for key in key_list(batch.releases) if key in self.quarantine)
+        has_times, has_deadlines = (found.times != NO_TIME).any(), (found.deadlines != FOREVER).any()
+        return replace(
+            batch,
+            keys=found.keys,
+            points=found.points,
+            times=found.times if has_times or self._settings.by_event_time else None,
+            deadlines=found.deadlines if has_deadlines else None,
+        )
+
+    def _judge(self, admitted: Admitted, revision: int) -> Verdict:
+        """Leave in a batch the rows that are let in, and what it changes in the quarantine. Drops what is too old."""
+        rows, request, quarantine = admitted.rows, admitted.request, self.quarantine
+        if quarantine is not None:
+            quarantine.expire(too_old(self._settings, admitted.clock), admitted.clock)
+        if request is not None:
+            return self._carry_out_request(request, rows)
+        assert quarantine is not None  # `apply` has asked
+        if not quarantine.has_rules and not quarantine:
+            return NOTHING_HELD
+        written = self._written(rows)
+        frame = Plane() if self.globe is None else Sphere(self.globe.center)
+        judged = quarantine.judge(rows, written, self.hull, frame, revision)
+        held = judged.held
+        if held and admitted.young is not None:
+            held = np.flatnonzero(admitted.young)[held].tolist()
+        if not judged.let_in.all():
+            rows = admitted.rows = _selected(rows, judged.let_in)
+        rows.held = judged.change
+        return Verdict(held, judged.released, judged.dropped, judged.stale, -judged.only_held)
+
+    def _carry_out_request(self, request: KeyedBatch, rows: KeyRows) -> Verdict:
+        quarantine = self.quarantine
+        wanted = [] if request.releases is None else key_list(request.releases)
+        unwanted = [] if request.drops is None else key_list(request.drops)
+        left = [key for key in (*wanted, *unwanted) if quarantine is not None and key in quarantine]
+        rows.held = HeldChange(rows_of(self._no_keys(), []), _of_kind(left, self._no_keys()), request.rules)
+        released = sum(quarantine is not None and key in quarantine for key in wanted)
+        return Verdict([], released, len(left) - released, 0, len(wanted) + len(unwanted) - len(left))
+
+    def _follow(self, change: HeldChange) -> None:
+        if self.quarantine is None:
+            self.quarantine = Quarantine(self._kind, OFF)
+        self.quarantine.follow(change)
 
     # Changes
 
@@ -372,8 +499,8 @@ class Keyed:
             if not there.all():
                 admission.young = there if admission.young is None else there & admission.young
 
-    def _refuse_growth(self, admitted: Admitted) -> None:
-        """Raise LimitExceededError if the hull would have too many points."""
+    def _refuse_growth(self, admitted: Admitted, held: int) -> None:
+        """Raise LimitExceededError if the hull would have too many points, with those held in quarantine."""
         rows, window = admitted.rows, self._settings.window
         if rows.condition == "present":
             return
@@ -381,7 +508,7 @@ class Keyed:
         after = self._number(admitted.clock) + new - int(np.count_nonzero(self._there(rows.removes, admitted.clock)))
         if window is not None and window.max_points:
             after = min(after, window.max_points)
-        if new and after > self._most_points:
+        if new and after + held > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
 
     def _has(self, keys: Keys) -> npt.NDArray[np.bool_]:

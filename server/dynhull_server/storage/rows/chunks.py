@@ -2,24 +2,47 @@
 
 import json
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynhull.keys import PackedKeys
 
-from ...state.records import Contents, Kept, Keys, Times
+from ...state.records import Contents, Kept, Keys, QuarantineRules, Times
 from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
+from .held_rows import held_bytes, held_starts, joined_held, take_held
 
 CHUNK_BYTES = 2**19  # a commit that delays later ones only briefly; a chunk of strings can be one row longer
 
 # The number of points, and flags for the columns after them. Of 8 bytes, so that the columns of numbers are aligned.
 HEADER = struct.Struct("<II")
 HAS_TIMES, HAS_DEADLINES, STRINGS, INTEGERS = 1, 2, 4, 8
+HELD = 16  # the points of this chunk are in quarantine
 
 
-def starts(contents: Contents) -> list[int]:
-    """The first row of each chunk. O(n).
+class Cut(NamedTuple):
+    """The rows of a chunk, and whether they are those of the points in quarantine."""
+
+    rows: slice
+    held: bool = False
+
+
+def cuts(contents: Contents) -> list[Cut]:
+    """The chunks of some contents. O(n)."""
+    cuts = [Cut(rows) for rows in _slices(_starts(contents), len(contents))]
+    if contents.held is not None:
+        cuts += [Cut(rows, True) for rows in _slices(held_starts(contents.held, CHUNK_BYTES), len(contents.held))]
+    return cuts
+
+
+def _slices(firsts: list[int], end: int) -> Iterator[slice]:
+    return (slice(*ends) for ends in zip(firsts, [*firsts[1:], end], strict=True))
+
+
+def _starts(contents: Contents) -> list[int]:
+    """The first row of each chunk of points.
 
     Contents without points have one chunk, which says which columns they have.
     """
@@ -33,8 +56,13 @@ def starts(contents: Contents) -> list[int]:
     return list(range(0, max(1, len(contents)), CHUNK_BYTES // row))
 
 
-def chunk(contents: Contents, rows: slice) -> bytes:
+def chunk(contents: Contents, cut: Cut) -> bytes:
     """Some rows of the contents."""
+    rows, held = cut.rows, contents.held
+    if cut.held:
+        assert held is not None  # `cuts` has found some
+        kind = STRINGS if isinstance(held.keys, PackedKeys) else INTEGERS
+        return HEADER.pack(rows.stop - rows.start, kind | HELD) + held_bytes(held, rows)
     points, flags = contents.points[rows], 0
     columns = [point_bytes(points)]
     for flag, times in ((HAS_TIMES, contents.times), (HAS_DEADLINES, contents.deadlines)):
@@ -49,7 +77,14 @@ def chunk(contents: Contents, rows: slice) -> bytes:
 
 def state(kept: Kept) -> bytes:
     """The state of a snapshot: everything but its contents."""
-    found = {"producers": kept.producers, "clock": kept.clock, "center": kept.center, "skipping": sorted(kept.skipping)}
+    found: dict[str, Any] = {
+        "producers": kept.producers,
+        "clock": kept.clock,
+        "center": kept.center,
+        "skipping": sorted(kept.skipping),
+    }
+    if kept.rules is not None:
+        found["rules"] = asdict(kept.rules)
     return json.dumps(found).encode()
 
 
@@ -62,6 +97,8 @@ def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
     center = found.get("center")
     kept = Kept(producers=producers, clock=found["clock"], center=None if center is None else tuple(center))
     kept.skipping = frozenset(found.get("skipping", ()))
+    if "rules" in found:
+        kept.rules = QuarantineRules(**found["rules"])
     return kept, _decoded
 
 
@@ -71,12 +108,15 @@ def joined(parts: Sequence[Contents]) -> Contents:
         return parts[0]
     points = np.concatenate([np.empty((0, 2)), *(part.points for part in parts)])
     times, deadlines = (_joined_times([getattr(part, name) for part in parts]) for name in ("times", "deadlines"))
-    return Contents(points, _joined_keys([part.keys for part in parts]), times, deadlines)
+    held = joined_held([part.held for part in parts if part.held is not None])
+    return Contents(points, _joined_keys([part.keys for part in parts]), times, deadlines, held)
 
 
 def _decoded(data: bytes) -> Contents:
     cursor = Cursor(memoryview(data))
     count, flags = HEADER.unpack(cursor.take(HEADER.size))
+    if flags & HELD:
+        return Contents(held=take_held(cursor, count, strings=bool(flags & STRINGS)))
     points = cursor.points(count)
     times = cursor.times(count) if flags & HAS_TIMES else None
     deadlines = cursor.times(count) if flags & HAS_DEADLINES else None

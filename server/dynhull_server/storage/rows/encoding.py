@@ -13,6 +13,7 @@ import numpy as np
 
 from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows
 from .columns import Cursor, key_bytes, point_bytes, time_bytes
+from .held_rows import change_bytes, take_change
 
 # The number of points inserted, keys put or points expired; that of points deleted or keys removed; the sequence
 # number; the length of the producer's name; the further flags; the flags.
@@ -22,7 +23,7 @@ CENTER = struct.Struct("<dd")
 MOST_NUMBERS = 7  # in the key of a row
 NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
-HAS_CENTER, MAY_SKIP = 1, 2  # further flags
+HAS_CENTER, MAY_SKIP, HAS_HELD = 1, 2, 4  # further flags, the last one since format 8
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
 KINDS = 48  # the flags with the kind of the rows
 POINTS, STRINGS, INTEGERS, EXPIRY = 0, 16, 32, 48
@@ -41,6 +42,9 @@ def encode(records: Iterable[Record]) -> bytes:
         if record.center is not None:
             further |= HAS_CENTER
             columns.insert(0, CENTER.pack(*record.center))
+        if isinstance(record.rows, KeyRows) and record.rows.held is not None:
+            further |= HAS_HELD
+            columns.append(change_bytes(record.rows.held))
         if record.clock is not None:
             flags |= HAS_CLOCK
             columns.insert(0, TIME.pack(record.clock))
@@ -53,12 +57,16 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
     cursor = Cursor(payload)
     while not cursor.at_end:
         added, removed, sequence, name, further, flags = HEADER.unpack(cursor.take(HEADER.size))
-        if further > HAS_CENTER | MAY_SKIP:
+        if further > HAS_CENTER | MAY_SKIP | HAS_HELD:
             raise ValueError(f"a record has the unknown further flags {further:#x}")
         producer = str(cursor.take(name), "utf-8")
         clock = _time(cursor) if flags & HAS_CLOCK else None
         center = CENTER.unpack(cursor.take(CENTER.size)) if further & HAS_CENTER else None
         rows = _decoded(cursor, added, removed, flags)
+        if further & HAS_HELD:
+            if not isinstance(rows, KeyRows):
+                raise ValueError("points without keys are in quarantine")
+            rows.held = take_change(cursor, strings=flags & KINDS == STRINGS)
         yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP))
         revision += 1
 

@@ -7,9 +7,12 @@ from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
-from ...state.records import DEFAULT, HullRow, HullSettings, Window
+from ...state.records import DEFAULT, HullRow, HullSettings, QuarantineRules, Window
 from .encoding import checksum
 from .tables import Reader
+
+# The settings that are objects of their own.
+NESTED: dict[str, type[Window | QuarantineRules]] = {"window": Window, "quarantine": QuarantineRules}
 
 Values = tuple[int, str, str, float, str, int]
 
@@ -44,8 +47,9 @@ def settings_text(settings: HullSettings) -> str:
     if settings == DEFAULT:  # as of most hulls
         return "{}"
     given = _given(settings)
-    if settings.window is not None:
-        given["window"] = _given(settings.window)
+    for name in NESTED:
+        if (nested := getattr(settings, name)) is not None:
+            given[name] = _given(nested)
     return json.dumps(given, sort_keys=True)
 
 
@@ -53,13 +57,9 @@ def settings_text(settings: HullSettings) -> str:
 def settings_from(text: str) -> HullSettings:
     """The inverse of `settings_text`; ValueError or TypeError for other texts."""
     given = json.loads(text)
-    window = given.pop("window", None)
     center = given.pop("center", None)
-    return HullSettings(
-        **given,
-        window=None if window is None else Window(**window),
-        center=None if center is None else tuple(center),
-    )
+    nested: dict[str, Any] = {name: kind(**given.pop(name)) for name, kind in NESTED.items() if name in given}
+    return HullSettings(**given, **nested, center=None if center is None else tuple(center))
 
 
 def found_hulls(reader: Reader, version: int) -> Iterator[FoundHull]:
@@ -104,7 +104,7 @@ def _checksum(number: int, name: str, uid: str, created: float, settings: str) -
     return checksum(f"{name}\n{uid}\n{settings}".encode() + struct.pack("<d", created), number)
 
 
-def _given(settings: HullSettings | Window) -> dict[str, Any]:
+def _given(settings: HullSettings | Window | QuarantineRules) -> dict[str, Any]:
     return {
         each.name: getattr(settings, each.name)
         for each in fields(settings)

@@ -152,13 +152,13 @@ class RowStorage(ABC):
     def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
         """Write a snapshot, then drop the rows it supersedes."""
         contents = kept.contents
-        firsts = chunks.starts(contents)
-        ids = [next(self._ledger.chunk_ids) for _ in firsts]
+        cuts = chunks.cuts(contents)
+        ids = [next(self._ledger.chunk_ids) for _ in cuts]
         snapshot = Snapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
         self._under_way[snapshot.id] = set(ids)
         try:
-            for i, (place, first, end) in enumerate(zip(ids, firsts, [*firsts[1:], len(contents)], strict=True)):
-                yield Chunk(place, snapshot.id, i, chunks.chunk(contents, slice(first, end)))
+            for i, (place, cut) in enumerate(zip(ids, cuts, strict=True)):
+                yield Chunk(place, snapshot.id, i, chunks.chunk(contents, cut))
             yield Finish(number, snapshot, chunks.state(kept))
         finally:
             del self._under_way[snapshot.id]

@@ -1,0 +1,86 @@
+"""Quarantines of hulls as bytes, since format 8."""
+
+import struct
+
+import numpy as np
+
+from dynhull.keys import PackedKeys
+
+from ...state.records import HeldChange, HeldRows, QuarantineRules
+from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
+
+# Of a change: the positions held, the keys dropped, and whether rules follow.
+CHANGE = struct.Struct("<II?")
+RULES = struct.Struct("<ddI")  # the limits, NaN for none, and the confirmations
+# The bytes of a held position beside its key: times, deadlines, speeds, growths, revisions and confirmations.
+HELD_BYTES = POINT_BYTES + 6 * TIME_BYTES
+
+
+def held_bytes(held: HeldRows, rows: slice = slice(None)) -> bytes:
+    """Some positions in quarantine."""
+    measures = np.column_stack([held.speeds[rows], held.growths[rows]])
+    integers = (held.times, held.deadlines, held.revisions, held.confirmed)
+    columns = [key_bytes(held.keys[rows]), point_bytes(held.points[rows]), point_bytes(measures)]
+    return b"".join([*columns, *(time_bytes(column[rows]) for column in integers)])
+
+
+def take_held(cursor: Cursor, count: int, *, strings: bool) -> HeldRows:
+    """The inverse of `held_bytes`."""
+    keys = cursor.strings(count) if strings else cursor.integers(count)
+    points, measures = cursor.points(count), cursor.points(count)
+    times, deadlines, revisions, confirmed = (cursor.times(count) for _ in range(4))
+    return HeldRows(keys, points, times, deadlines, measures[:, 0], measures[:, 1], revisions, confirmed)
+
+
+def change_bytes(change: HeldChange) -> bytes:
+    """A change of a quarantine."""
+    rules = change.rules
+    parts = [CHANGE.pack(len(change.rows), len(change.dropped), rules is not None)]
+    if rules is not None:
+        parts.append(RULES.pack(_number(rules.max_speed), _number(rules.max_growth), rules.confirmations))
+    return b"".join([*parts, key_bytes(change.dropped), held_bytes(change.rows)])
+
+
+def take_change(cursor: Cursor, *, strings: bool) -> HeldChange:
+    """The inverse of `change_bytes`."""
+    held, dropped, has_rules = CHANGE.unpack(cursor.take(CHANGE.size))
+    rules = None
+    if has_rules:
+        speed, growth, confirmations = RULES.unpack(cursor.take(RULES.size))
+        rules = QuarantineRules(_limit(speed), _limit(growth), confirmations)
+    keys = cursor.strings(dropped) if strings else cursor.integers(dropped)
+    return HeldChange(take_held(cursor, held, strings=strings), keys, rules)
+
+
+def held_starts(held: HeldRows, size: int) -> list[int]:
+    """The first row of each part of about that many bytes; there are rows. O(n)."""
+    counts = np.arange(1, len(held) + 1)
+    if isinstance(held.keys, PackedKeys):
+        lengths = np.frombuffer(held.keys.lengths, np.uint8)
+        ends = counts * (HELD_BYTES + 1) + np.cumsum(lengths, dtype=np.int64)
+    else:
+        ends = counts * (HELD_BYTES + INTEGER_BYTES)
+    return [0, *np.searchsorted(ends, np.arange(size, int(ends[-1]), size), side="right").tolist()]
+
+
+def joined_held(parts: list[HeldRows]) -> HeldRows | None:
+    """All positions of several parts."""
+    if len(parts) <= 1:
+        return parts[0] if parts else None
+    keys = [part.keys for part in parts]
+    strings = [each for each in keys if isinstance(each, PackedKeys)]
+    columns = ("points", "times", "deadlines", "speeds", "growths", "revisions", "confirmed")
+    return HeldRows(
+        PackedKeys(b"".join(each.lengths for each in strings), b"".join(each.data for each in strings))
+        if strings
+        else np.concatenate([each for each in keys if isinstance(each, np.ndarray)]),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns},
+    )
+
+
+def _number(limit: float | None) -> float:
+    return np.nan if limit is None else limit
+
+
+def _limit(number: float) -> float | None:
+    return None if np.isnan(number) else number
