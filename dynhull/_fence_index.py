@@ -332,6 +332,9 @@ class FenceIndex:
         carried, self._carried = self._carried, {}
         if taken is None:
             return NO_CROSSINGS[self._subjects.key_type]
+        for column in taken:
+            if isinstance(column, np.ndarray):
+                column.setflags(write=False)  # nobody else has it
         return _only_shared(Crossings(*taken), carried) if carried else Crossings(*taken)
 
     def _keys(self, inside: Any) -> Keys | None:

@@ -1,6 +1,7 @@
 """Answers as values: they compare, hash and print by their content, arrays and NaN included."""
 
 from dataclasses import fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,12 @@ class Value:
 
 
 def _items(value: Any) -> list[tuple[str, Any]]:
-    return [(field.name, getattr(value, field.name)) for field in fields(value)]
+    return [(name, getattr(value, name)) for name in _names(value.__class__)]
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
 
 
 def _equal(a: Any, b: Any) -> bool:

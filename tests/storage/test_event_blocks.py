@@ -53,7 +53,7 @@ def many(draw):
 
 def encoded(made):
     block = block_of(made)
-    return encode_block(block, np.array([name == OWN for name in block.names])[block.hulls])
+    return encode_block(block, np.array([name == OWN for name in block.names])[block.runs["hull"]])
 
 
 @settings(max_examples=50)

@@ -603,7 +603,6 @@ class Core:
             if name not in self._registry.hulls
         }
         places = {name: self._registry.reserve_hull() for name in sorted(births)}
-        self._registry.tallies.sort()
         ground = Ground(lines, places, fences, numbers, self._registry.tallies, self._registry.limits.fences)
         legs = [Leg(name, self._registry.hulls.get(name), keeps=self._keeps) for name in names]
         return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)

@@ -8,9 +8,9 @@ from dynhull import Crossings
 from dynhull.keys import key_list
 
 from ..records import NO_TIME
-from .event_log import Swap
-from .fence_leg import NOBODY, FenceLeg, caused
+from .fence_leg import NOBODY, FenceLeg
 from .keys_changed import KeysChanged
+from .numbering import Swap, caused
 from .records import Cause, Delay, EventType, Key, Origin, Subject
 from .subjects import Subjects, keyed
 

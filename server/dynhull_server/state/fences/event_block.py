@@ -4,29 +4,60 @@ No event needs a Python object before somebody reads it.
 """
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 
-from ..records import Keys, Times
+from ..records import Keys
 from .records import EventType, FenceEvent, Key, Members, Origin
 
 Integers = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
+Records = npt.NDArray[np.void]
 
 # The keys of a run: none, strings, or integers of 8 bytes, little-endian.
 NO_KEY, STRING_KEY, INTEGER_KEY = 0, 1, 2
 INTEGER_BYTES = 8
+INTEGER_LENGTH = bytes([INTEGER_BYTES])
 MANY = 2**62
 TYPES = {kind.value: kind for kind in EventType}
-# Bytes that an event and a run take in memory, about, without keys.
-EVENT_BYTES, RUN_BYTES = 67, 57
+NOWHERE = math.nan, math.nan
+# `hull`: the place of the name of the subjects' hull; `kind`: whether the events have keys, and which; the revisions
+# and the time: as in `FenceEvent`.
+RUN = np.dtype(
+    [
+        ("fence", np.int64),
+        ("first", np.int64),
+        ("count", np.int64),
+        ("hull", np.int64),
+        ("kind", np.uint8),
+        ("subject_revision", np.int64),
+        ("area_revision", np.int64),
+        ("time", np.int64),
+    ]
+)
+COUNT = 2  # the place of that field
+# `length`: the bytes of the key; the position, that before and the distance are NaN where there is none.
+EVENT = np.dtype(
+    [
+        ("type", np.uint8),
+        ("causes", np.uint8),
+        ("length", np.uint8),
+        ("x", np.float64),
+        ("y", np.float64),
+        ("before_x", np.float64),
+        ("before_y", np.float64),
+        ("distance", np.float64),
+        ("event_time", np.int64),
+        ("first_time", np.int64),
+    ]
+)
 
 
 @dataclass(slots=True, eq=False)
@@ -34,40 +65,17 @@ class EventBlock:
     """m runs of n events in the order in which they were made. A run: consecutive events of one fence and one moment.
 
     Attributes:
-        fences: (m,) the numbers of the fences.
-        firsts: (m,) the sequence of the first event of each run.
-        counts: (m,) the number of its events.
-        hulls: (m,) the places of the names of the hulls of the subjects in `names`.
-        kinds: (m,) whether its events have keys, and which.
-        subject_revisions, area_revisions, times: (m,) as in `FenceEvent`.
-        types, causes: (n,) as in `FenceEvent`.
-        lengths: (n,) the bytes of each key.
+        runs: (m,) a RUN each: the number of the fence, the sequence of its first event, their number, and the moment.
+        rows: (n,) an EVENT each.
         keys: the bytes of all keys.
-        points, previous: (n, 2) positions, and those before; NaN where there is none.
-        distances: (n,) distances, NaN where there is none.
-        event_times, first_times: (n,) as in `FenceEvent`.
         names: the names of hulls.
         inside: by row, the subjects that were inside.
         origins: by row, where subjects come from that have changed hulls.
     """
 
-    fences: Integers
-    firsts: Integers
-    counts: Integers
-    hulls: Integers
-    kinds: Bytes
-    subject_revisions: Integers
-    area_revisions: Integers
-    times: Times
-    types: Bytes
-    causes: Bytes
-    lengths: Bytes
+    runs: Records
+    rows: Records
     keys: bytes
-    points: Points
-    previous: Points
-    distances: npt.NDArray[np.float64]
-    event_times: Times
-    first_times: Times
     names: tuple[str, ...]
     inside: dict[int, tuple[Members, ...]] = field(default_factory=dict)
     origins: dict[int, Origin] = field(default_factory=dict)
@@ -76,7 +84,27 @@ class EventBlock:
 
     def __len__(self) -> int:
         """The number of events."""
-        return len(self.types)
+        return len(self.rows)
+
+    @property
+    def fences(self) -> Integers:
+        """(m,) the numbers of the fences."""
+        return self.runs["fence"]
+
+    @property
+    def firsts(self) -> Integers:
+        """(m,) the sequence of the first event of each run."""
+        return self.runs["first"]
+
+    @property
+    def counts(self) -> Integers:
+        """(m,) the number of events of each run."""
+        return self.runs["count"]
+
+    @property
+    def types(self) -> Bytes:
+        """(n,) what happened."""
+        return self.rows["type"]
 
     @property
     def ends(self) -> Integers:
@@ -89,35 +117,21 @@ class EventBlock:
     def bytes(self) -> int:
         """The memory that it takes, about."""
         members = sum(_bytes_of(each.keys) for found in self.inside.values() for each in found)
-        return EVENT_BYTES * len(self) + RUN_BYTES * len(self.fences) + len(self.keys) + members
+        return self.rows.nbytes + self.runs.nbytes + len(self.keys) + members
 
     def events(self, run: int, skipped: int = 0, most: int = MANY) -> list[FenceEvent]:
         """The events of a run after some of them, at most that many: O(their number), and O(n) the first time."""
+        fence_first, count, hull, kind, revision, area_revision, time = self.runs[run].item()[1:]
         end = int(self.ends[run])
-        start, first = end - int(self.counts[run]) + skipped, int(self.firsts[run]) + skipped
+        start, first = end - count + skipped, fence_first + skipped
         end = min(end, start + most)
-        rows = slice(start, end)
-        columns = zip(
-            range(first, first + end - start),
-            [TYPES[kind] for kind in self.types[rows].tolist()],
-            self.causes[rows].tolist(),
-            self._keys(run, start, end),
-            self.points[rows].tolist(),
-            self.previous[rows].tolist(),
-            self.distances[rows].tolist(),
-            self.event_times[rows].tolist(),
-            self.first_times[rows].tolist(),
-            range(start, end),
-            strict=True,
-        )
-        hull, time = self.names[self.hulls[run]], int(self.times[run])
-        revision, area_revision = int(self.subject_revisions[run]), int(self.area_revisions[run])
+        rows = zip(self.rows[start:end].tolist(), self._keys(kind, start, end), strict=True)
         return [
             FenceEvent(
-                sequence,
-                kind,
+                first + number,
+                TYPES[kind],
                 causes,
-                hull,
+                self.names[hull],
                 key,
                 revision,
                 area_revision,
@@ -127,13 +141,13 @@ class EventBlock:
                 event_time,
                 time,
                 first_time,
-                self.inside.get(row, ()),
-                self.origins.get(row),
+                self.inside.get(start + number, ()),
+                self.origins.get(start + number),
             )
-            for sequence, kind, causes, key, (x, y), (
-                before_x,
-                before_y,
-            ), distance, event_time, first_time, row in columns
+            for number, (
+                (kind, causes, _, x, y, before_x, before_y, distance, event_time, first_time),
+                key,
+            ) in enumerate(rows)
         ]
 
     def by_fence(self) -> dict[int, list[FenceEvent]]:
@@ -143,46 +157,40 @@ class EventBlock:
             found.setdefault(number, []).extend(self.events(run))
         return found
 
-    def rows(self, start: int, end: int) -> Self:
+    def part(self, start: int, end: int) -> Self:
         """Some consecutive events. O(size of the result + m)."""
         first, last = np.searchsorted(self.ends, [start, end - 1], "right").tolist()
-        runs = slice(first, last + 1)
-        ends = self.ends[runs]
-        starts = ends - self.counts[runs]
+        runs = self.runs[first : last + 1].copy()
+        ends = self.ends[first : last + 1]
+        starts = ends - runs["count"]
         cut = np.maximum(starts, start)
+        runs["first"] += cut - starts
+        runs["count"] = np.minimum(ends, end) - cut
         places = self._offsets()
         return replace(
             self,
-            fences=self.fences[runs],
-            firsts=self.firsts[runs] + cut - starts,
-            counts=np.minimum(ends, end) - cut,
-            hulls=self.hulls[runs],
-            kinds=self.kinds[runs],
-            subject_revisions=self.subject_revisions[runs],
-            area_revisions=self.area_revisions[runs],
-            times=self.times[runs],
-            **{name: getattr(self, name)[start:end] for name in OF_EVENTS},
+            runs=runs,
+            rows=self.rows[start:end],
             keys=self.keys[places[start] : places[end]],
             inside={row - start: each for row, each in self.inside.items() if start <= row < end},
             origins={row - start: each for row, each in self.origins.items() if start <= row < end},
         )
 
-    def runs(self, wanted: npt.NDArray[np.bool_]) -> Self:
+    def only(self, wanted: npt.NDArray[np.bool_]) -> Self:
         """Those runs that are wanted. O(n)."""
         rows = np.repeat(wanted, self.counts)
         numbers = np.flatnonzero(rows).tolist() if self.inside or self.origins else []
-        keys = np.frombuffer(self.keys, np.uint8)[np.repeat(rows, self.lengths)]
+        keys = np.frombuffer(self.keys, np.uint8)[np.repeat(rows, self.rows["length"])]
         return replace(
             self,
-            **{name: getattr(self, name)[wanted] for name in OF_RUNS},
-            **{name: getattr(self, name)[rows] for name in OF_EVENTS},
+            runs=self.runs[wanted],
+            rows=self.rows[rows],
             keys=keys.tobytes(),
             inside={new: self.inside[row] for new, row in enumerate(numbers) if row in self.inside},
             origins={new: self.origins[row] for new, row in enumerate(numbers) if row in self.origins},
         )
 
-    def _keys(self, run: int, start: int, end: int) -> Sequence[Key | None]:
-        kind = self.kinds[run]
+    def _keys(self, kind: int, start: int, end: int) -> Sequence[Key | None]:
         if kind == NO_KEY:
             return [None] * (end - start)
         places = self._offsets()[start : end + 1].tolist()
@@ -197,12 +205,8 @@ class EventBlock:
         """(n + 1,) where the key of each event begins."""
         if self._places is None:
             self._places = np.zeros(len(self) + 1, np.int64)
-            np.cumsum(self.lengths, out=self._places[1:])
+            np.cumsum(self.rows["length"], out=self._places[1:])
         return self._places
-
-
-OF_RUNS = ("fences", "firsts", "counts", "hulls", "kinds", "subject_revisions", "area_revisions", "times")
-OF_EVENTS = ("types", "causes", "lengths", "points", "previous", "distances", "event_times", "first_times")
 
 
 def joined(blocks: Sequence[EventBlock]) -> EventBlock:
@@ -210,17 +214,14 @@ def joined(blocks: Sequence[EventBlock]) -> EventBlock:
     if len(blocks) == 1:
         return blocks[0]
     starts = np.cumsum([0, *map(len, blocks)]).tolist()
-    columns = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in (*OF_RUNS, *OF_EVENTS)}
-    return replace(
-        blocks[0],
-        **(columns | _hulls(blocks)),
-        keys=b"".join(block.keys for block in blocks),
-        inside={
-            start + row: each
-            for start, block in zip(starts, blocks, strict=False)
-            for row, each in block.inside.items()
-        },
-        origins={
+    names = tuple(dict.fromkeys(name for block in blocks for name in block.names))
+    return EventBlock(
+        np.concatenate([_runs(block, names) for block in blocks]),
+        np.concatenate([block.rows for block in blocks]),
+        b"".join([block.keys for block in blocks]),
+        names,
+        {start + row: each for start, block in zip(starts, blocks, strict=False) for row, each in block.inside.items()},
+        {
             start + row: each
             for start, block in zip(starts, blocks, strict=False)
             for row, each in block.origins.items()
@@ -228,66 +229,67 @@ def joined(blocks: Sequence[EventBlock]) -> EventBlock:
     )
 
 
-def _hulls(blocks: Sequence[EventBlock]) -> dict[str, Any]:
-    """The hulls of blocks, among their names together."""
-    names = tuple(dict.fromkeys(name for block in blocks for name in block.names))
-    if all(block.names == names for block in blocks):
-        return {}
-    place = {name: row for row, name in enumerate(names)}
-    hulls = [np.array([place[name] for name in block.names], np.int64)[block.hulls] for block in blocks]
-    return {"hulls": np.concatenate(hulls), "names": names}
+def _runs(block: EventBlock, names: tuple[str, ...]) -> Records:
+    """The runs of a block, with the places of their hulls among these names."""
+    if block.names == names[: len(block.names)]:
+        return block.runs
+    runs = block.runs.copy()
+    runs["hull"] = np.array([names.index(name) for name in block.names], np.int64)[runs["hull"]]
+    return runs
 
 
 def block_of(events: Mapping[int, Iterable[FenceEvent]]) -> EventBlock:
     """The events of some fences, by number. O(events)."""
-    runs: list[tuple[int, int, str, int, int, int, int]] = []
-    counts: list[int] = []
+    runs: list[list[int]] = []
     ordered: list[FenceEvent] = []
+    names: dict[str, int] = {}
     for number, made in events.items():
         expected, before = 0, None
         for event in made:
             ordered.append(event)
-            moment = _kind(event.key), event.subject_revision, event.area_revision, event.time
-            if (event.hull, moment) != before or event.sequence != expected:
-                runs.append((number, event.sequence, event.hull, *moment))
-                counts.append(0)
-                before = event.hull, moment
-            counts[-1] += 1
+            hull = names.setdefault(event.hull, len(names))
+            moment = hull, _kind(event.key), event.subject_revision, event.area_revision, event.time
+            if moment != before or event.sequence != expected:
+                runs.append([number, event.sequence, 0, *moment])
+                before = moment
+            runs[-1][COUNT] += 1
             expected = event.sequence + 1
     keys = [_key_bytes(event.key) for event in ordered]
-    nowhere = np.nan, np.nan
-    columns = zip(*runs, strict=True) if runs else ((),) * 7
-    numbers, firsts, hulls, kinds, subject_revisions, area_revisions, times = columns
-    names = tuple(dict.fromkeys(hulls))
     return EventBlock(
-        np.array(numbers, np.int64),
-        np.array(firsts, np.int64),
-        np.array(counts, np.int64),
-        np.array([names.index(hull) for hull in hulls], np.int64),
-        np.array(kinds, np.uint8),
-        np.array(subject_revisions, np.int64),
-        np.array(area_revisions, np.int64),
-        np.array(times, np.int64),
-        np.array([event.type for event in ordered], np.uint8),
-        np.array([event.causes for event in ordered], np.uint8),
-        np.array([len(key) for key in keys], np.uint8),
+        run_array(runs),
+        np.array(
+            [
+                (
+                    event.type,
+                    event.causes,
+                    len(key),
+                    *(event.position or NOWHERE),
+                    *(event.previous or NOWHERE),
+                    math.nan if event.distance is None else event.distance,
+                    event.event_time,
+                    event.first_time,
+                )
+                for event, key in zip(ordered, keys, strict=True)
+            ],
+            EVENT,
+        ),
         b"".join(keys),
-        np.array([event.position or nowhere for event in ordered], np.float64).reshape(-1, 2),
-        np.array([event.previous or nowhere for event in ordered], np.float64).reshape(-1, 2),
-        np.array([np.nan if event.distance is None else event.distance for event in ordered], np.float64),
-        np.array([event.event_time for event in ordered], np.int64),
-        np.array([event.first_time for event in ordered], np.int64),
-        names,
+        tuple(names),
         {row: event.inside for row, event in enumerate(ordered) if event.inside},
         {row: event.origin for row, event in enumerate(ordered) if event.origin is not None},
     )
 
 
-def key_columns(keys: Keys) -> tuple[int, Bytes, bytes]:
-    """The kind of keys, their lengths, and their bytes. O(size of the keys)."""
-    if isinstance(keys, PackedKeys):
-        return STRING_KEY, np.frombuffer(keys.lengths, np.uint8), keys.data
-    return INTEGER_KEY, np.full(len(keys), INTEGER_BYTES, np.uint8), keys.astype("<u8", copy=False).tobytes()
+def run_array(runs: Iterable[Sequence[int]]) -> Records:
+    """(m,) runs whose fields are in the order of RUN."""
+    return np.array([tuple(run) for run in runs], RUN)
+
+
+def key_columns(keys: Keys) -> tuple[int, bytes, bytes]:
+    """The kind of keys, the length of each as a byte, and their bytes. O(size of the keys)."""
+    if isinstance(keys, np.ndarray):
+        return INTEGER_KEY, INTEGER_LENGTH * len(keys), keys.astype("<u8", copy=False).tobytes()
+    return STRING_KEY, keys.lengths, keys.data
 
 
 def _kind(key: Key | None) -> int:

@@ -85,9 +85,9 @@ class Fence:
 
     def part(self, recent: RecentEvents) -> None:
         """Keep its integers for itself, after its deletion, and what is left of its events."""
-        shared, place = self.tallies, self.place
+        shared = self.tallies
         self._move(Tallies(room=1))
-        shared.remove(place)
+        shared.remove(self.number)
         self._recent = recent
 
     def _move(self, tallies: Tallies) -> None:

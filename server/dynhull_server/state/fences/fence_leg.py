@@ -12,8 +12,8 @@ from dynhull.keys import PackedKeys, key_list, take_keys
 from ..changes import FenceChange
 from ..records import NO_TIME, Keys
 from .dwelling import Dwelling
-from .event_log import Swap
 from .fence import Fence
+from .numbering import Swap, caused
 from .pair import Pair
 from .records import (
     AddFence,
@@ -343,8 +343,3 @@ def members(fence: Fence, dwelling: Dwelling | None = None) -> Iterator[Members]
         if len(keys):
             since = None if dwelling is None else dwelling.times(subjects.hull.name, keys)
             yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision, since)
-
-
-def caused(causes: int, swap: Swap | None) -> int:
-    """A set of causes with one cause in the place of another one."""
-    return causes & ~swap[0] | swap[1] if swap is not None and causes & swap[0] else causes

@@ -21,12 +21,12 @@ from ..trip import Leg
 from .config import FenceConfig
 from .delaying import end_all, end_some
 from .delays import Delays
-from .event_log import Swap
 from .fence import Fence
 from .fence_leg import FenceLeg, members
 from .fenced_trip import FencedTrip, Ground
 from .laying import check, lay_area
 from .line import Line
+from .numbering import Swap
 from .on_globe import require_frames
 from .pair import Pair
 from .records import NO_WAITS, Cause, Consumer, EventType, FenceRow, Inside, Key, Subject, Waits

@@ -18,11 +18,12 @@ from ..limits import FenceLimits
 from ..records import Record
 from ..trip import Leg, Place, Trip, write
 from .delaying import NO_ROWS, delay, take_over
-from .event_log import EventLog, Swap, first_rows
+from .event_log import EventLog
 from .fence import Fence
 from .fence_leg import NOBODY, FenceLeg
 from .keys_changed import KeysChanged, of_batch, of_expiry, with_expiries
 from .line import Line
+from .numbering import Swap, first_rows
 from .records import Cause, Key, Origin
 from .subjects import Subjects
 from .tallies import Column, Tallies
@@ -150,6 +151,12 @@ class FencedTrip(Trip):
         """Make the events of a change of these hulls."""
         try:
             for line in self.lines:
+                alone = line.alone(hulls[0].name) if len(hulls) == 1 else None
+                if alone is not None:
+                    found = alone.take()
+                    if len(found) or alone.delaying:
+                        self._cross(alone, found, line.area_revisions(), swap, now, changed.get(alone.hull.name))
+                    continue
                 carried = carry(line.subjects, changed) if len(changed) > 1 else {}
                 for name, origins in carried.items():
                     self._take_over(line.subjects[name], origins)
@@ -157,7 +164,7 @@ class FencedTrip(Trip):
                     name: (line.subjects[name], None) for name in changed if name in line.subjects
                 }
                 crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls)}
-                areas = {name: area.hull.state.counts.revision for name, area in line.areas.items()}
+                areas = line.area_revisions()
                 for name, (subjects, crossings) in sorted(crossed.items()):
                     self._cross(subjects, crossings, areas, swap, now, changed.get(name), carried.get(name, NOBODY))
                 for fence, pair, causes in line.paired(hulls):

@@ -150,6 +150,14 @@ class Line:
         pairs = [fence for fence in self.pairs.get(name, ()) if fence.row.config.subjects == name]
         return pairs if subjects is None else [*subjects.fences.values(), *pairs]
 
+    def alone(self, name: str) -> Subjects | None:
+        """The keys of a hull, if fences compare them and nothing else of the line depends on it."""
+        return None if name in self.areas or name in self.pairs else self.subjects.get(name)
+
+    def area_revisions(self) -> dict[str, int]:
+        """The revisions of the hulls that are areas of keys, by name."""
+        return {name: area.hull.state.counts.revision for name, area in self.areas.items()}
+
     def changed(self, hulls: Iterable[Hull]) -> Iterator[tuple[Subjects, Crossings]]:
         """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing."""
         touched: dict[str, Subjects] = {}

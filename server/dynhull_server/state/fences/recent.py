@@ -84,7 +84,7 @@ class RecentEvents:
         """What there is of some fences. O(events)."""
         found = RecentEvents()
         wanted = [np.isin(block.fences, numbers) for block in self._all()]
-        parts = [block.runs(each) for block, each in zip(self._all(), wanted, strict=True) if each.any()]
+        parts = [block.only(each) for block, each in zip(self._all(), wanted, strict=True) if each.any()]
         if parts:
             found._blocks.append(joined(parts))
         return found

@@ -7,13 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from .event_log import Told
     from .fence import Fence
+    from .numbering import Told
 
 Integers = npt.NDArray[np.int64]
 
 ROOM = 16
-NOBODY = -1  # the number of no fence
 
 
 class Table:
@@ -29,63 +28,41 @@ class Table:
         columns: (columns, places) the integers.
     """
 
-    __slots__ = ("_free", "_index", "_new", "_numbers", "_size", "columns")
+    __slots__ = ("_free", "_places", "columns")
 
     def __init__(self, columns: int, room: int = ROOM) -> None:
         self.columns: Integers = np.zeros((columns, room), np.int64)
-        self._numbers: Integers = np.full(room, NOBODY)
-        self._size = 0
+        self._places: dict[int, int] = {}
         self._free: list[int] = []
-        self._new = False  # whether the index lacks some
-        # The numbers, ascending, and their places; also of fences that have been removed.
-        self._index: tuple[Integers, Integers] = (np.empty(0, np.int64), np.empty(0, np.int64))
 
     def add(self, number: int) -> int:
         """Make a place for a fence, with zeros. O(1), with O(n) now and then."""
         if self._free:
             place = self._free.pop()
         else:
-            place = self._size
-            if place == len(self._numbers):
-                self._grow()
-            self._size += 1
-        self._numbers[place] = number
+            place = len(self._places)
+            self._make_room(place)
         self.columns[:, place] = 0
-        self._new = True
+        self._places[number] = place
         return place
 
-    def remove(self, place: int) -> None:
-        """Give a place away. O(1)."""
-        self._numbers[place] = NOBODY
+    def remove(self, number: int) -> int:
+        """Give the place of a fence away, and return it. O(1)."""
+        place = self._places.pop(number)
         self._free.append(place)
+        return place
 
-    def sort(self) -> None:
-        """Let `places` find the fences that were added. O(n) after some were."""
-        if self._new:
-            self._new = False
-            places = np.flatnonzero(self._numbers != NOBODY)
-            order = np.argsort(self._numbers[places], kind="stable")
-            self._index = self._numbers[places[order]], places[order]
+    def places(self, numbers: npt.NDArray[np.integer[Any]]) -> Integers:
+        """The places of some fences; KeyError if one is not there. O(1) for each."""
+        places = self._places
+        return np.array([places[number] for number in numbers.tolist()], np.int64)
 
-    def places(self, numbers: npt.NDArray[Any]) -> Integers:
-        """The places of fences; KeyError if one is not there. `sort` has been called. O(log n) for each."""
-        ascending, places = self._index
-        at = np.searchsorted(ascending, numbers)
-        if at.max(initial=NOBODY) == len(ascending):
-            raise KeyError(f"there is no fence {numbers[at.argmax()]}")
-        found: Integers = places[at]
-        missing = self._numbers[found] != numbers
-        if missing.any():
-            raise KeyError(f"there is no fence {numbers[missing.argmax()]}")
-        return found
-
-    def _grow(self) -> None:
-        room = max(2 * len(self._numbers), ROOM)
-        columns = np.zeros((len(self.columns), room), np.int64)
-        columns[:, : self._size] = self.columns[:, : self._size]
-        numbers = np.full(room, NOBODY)
-        numbers[: self._size] = self._numbers[: self._size]
-        self.columns, self._numbers = columns, numbers
+    def _make_room(self, place: int) -> None:
+        room = self.columns.shape[1]
+        if place == room:
+            columns = np.zeros((len(self.columns), max(2 * room, ROOM)), np.int64)
+            columns[:, :room] = self.columns
+            self.columns = columns
 
 
 class Column(IntEnum):
@@ -121,11 +98,12 @@ class Tallies(Table):
         self.owners: dict[int, Fence] = {}
         self.ruled = 0
 
-    def remove(self, place: int) -> None:
-        """Give a place away. O(1)."""
+    def remove(self, number: int) -> int:
+        """Give the place of a fence away, and return it. O(1)."""
+        place = super().remove(number)
         self.rule(place, rules=False)
         self.owners.pop(place, None)
-        super().remove(place)
+        return place
 
     def stirred(self) -> npt.NDArray[np.bool_]:
         """(places,) which fences have had events of crossings since this was last asked. O(places)."""
@@ -136,11 +114,11 @@ class Tallies(Table):
     def take(self, told: "Told") -> None:
         """Count events of crossings, which are committed."""
         columns, places = self.columns, told.places
-        columns[Column.LAST, places] = told.lasts
-        columns[Column.TIME, places] = told.times
-        columns[Column.UNSAVED, places] += told.made
-        columns[Column.INSIDE, places] += told.changes
-        columns[Column.STIRRED, places] = True
+        columns[Column.LAST][places] = told.lasts
+        columns[Column.TIME][places] = told.times
+        columns[Column.UNSAVED][places] += told.made
+        columns[Column.INSIDE][places] += told.changes
+        columns[Column.STIRRED][places] = True
 
     def rule(self, place: int, *, rules: bool) -> None:
         """Take note whether a fence has rules that look at each of its events."""

@@ -1,7 +1,6 @@
 """The rows of fences: which there are, and how changes of fences become statements."""
 
 from bisect import bisect_right
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -197,7 +196,7 @@ class FenceChanges:
         self._blocks: list[EventBlock] = []
         self._firsts: list[AppendFirst] = []
         self._counted: list[int] = []  # fences whose staged events are valid from now on
-        self._released: Counter[int] = Counter()  # runs by row
+        self._released: dict[int, int] = {}  # runs by row
         self._shrunk: dict[int, int] = {}  # weights by row
         self.rows = self.sum = self.next_number = 0
 
@@ -289,7 +288,7 @@ class FenceChanges:
         """Raise NotCommittedError if events do not follow the last ones of their fences."""
         lasts, numbers = self._lasts, block.fences.tolist()
         try:
-            known = self._ledger.runs.lasts(block.fences).tolist()
+            known = self._ledger.runs.lasts(block).tolist()
         except KeyError:  # one is new, or does not exist
             known = [self._ledger.runs.last(number) for number in numbers]
         gone = {number for number, now in self._now.items() if now.deleted}
@@ -318,11 +317,11 @@ class FenceChanges:
                 self._drop_staged(number)
         gone = [number for number, now in self._now.items() if now.deleted]
         if gone:
-            block = block.runs(~np.isin(block.fences, gone))
+            block = block.only(~np.isin(block.fences, gone))
         of_rows = chain(places, self._ledger.event_ids)
         for start in range(0, len(block), EVENTS_A_ROW):
             end = min(start + EVENTS_A_ROW, len(block))
-            self._write_events(block if end - start == len(block) else block.rows(start, end), next(of_rows))
+            self._write_events(block if end - start == len(block) else block.part(start, end), next(of_rows))
 
     def _write_events(self, block: EventBlock, place: int) -> None:
         each, runs = self._insert_events(block, place), len(block.fences)
@@ -346,7 +345,7 @@ class FenceChanges:
         staged = self._ledger.staged
         if step.begins:
             self._drop_staged(step.number)
-        block = step.block.rows(step.start, step.end)
+        block = step.block.part(step.start, step.end)
         row = Staged(Runs(block.fences, block.firsts, block.counts), step.place, self._insert_events(block, step.place))
         self._effects.append(lambda: staged.setdefault(step.number, []).append(row))
 
@@ -376,7 +375,7 @@ class FenceChanges:
             return self._ledger.runs.own(block)
         except KeyError:  # a fence is new
             subjects = [self._rows(number).row.config.subjects for number in block.fences.tolist()]
-            names = [block.names[hull] for hull in block.hulls.tolist()]
+            names = [block.names[hull] for hull in block.runs["hull"].tolist()]
             return np.array([name == own for name, own in zip(names, subjects, strict=True)])
 
     def _shrink(self, step: ShrinkEvents) -> None:
@@ -384,7 +383,7 @@ class FenceChanges:
         if not events.needs(place):
             return
         (left,), (before,) = (column.tolist() for column in events.left(np.array([place])))
-        if left == self._released[place]:
+        if left == self._released.get(place, 0):
             return
         stored = checksum(step.payload, *MANY)
         each = self._shrunk[place] = weight(stored, *MANY)
@@ -405,9 +404,10 @@ class FenceChanges:
         left, weights = self._ledger.events.left(places)
         left = left - counts
         for at, place in enumerate(places.tolist() if self._released or self._shrunk else ()):
-            left[at] -= self._released[place]
+            left[at] -= self._released.get(place, 0)
             weights[at] = self._shrunk.get(place, weights[at])
-        self._released.update(dict(zip(places.tolist(), counts.tolist(), strict=True)))
+        for place, count in zip(places.tolist(), counts.tolist(), strict=True):
+            self._released[place] = self._released.get(place, 0) + count
         empty = left == 0
         self.rows -= int(empty.sum())
         self.sum -= sum(weights[empty].tolist())

@@ -114,8 +114,8 @@ def shrunk(reader: Reader, place: int, starts: Mapping[int, int]) -> ShrinkEvent
         ends = (block.firsts + block.counts).tolist()
         needed = [end > starts.get(number, end) for number, end in zip(block.fences.tolist(), ends, strict=True)]
         if any(needed):
-            left = block.runs(np.array(needed))
-            own = np.array([name == OWN for name in left.names])[left.hulls]
+            left = block.only(np.array(needed))
+            own = np.array([name == OWN for name in left.names])[left.runs["hull"]]
             return ShrinkEvents(place, len(left.fences), encode_block(left, own))
     return None
 

@@ -203,6 +203,7 @@ class FenceRuns:
     _name_ids: "count[int]" = field(default_factory=count)
     _new: Integers = field(default_factory=lambda: np.empty((3, MOST_NEW), np.int64))  # number, sequence, row
     _end: int = 0
+    _placed: tuple[EventBlock | Runs, Integers] | None = None
     _turn: Any = field(default_factory=Lock)  # fences take runs for commits, and for readers
 
     def begin(self, number: int) -> None:
@@ -217,16 +218,16 @@ class FenceRuns:
 
     def forget(self, fence: FenceRows) -> None:
         """Forget a fence that is deleted."""
-        self.table.remove(fence.at)
+        self.table.remove(fence.row.number)
         name = fence.row.config.subjects
         self._uses[name] -= 1
         if not self._uses[name]:
             del self._uses[name], self._names[name]
 
-    def lasts(self, numbers: npt.NDArray[np.int64]) -> Integers:
-        """The sequence of the last event of each of some fences; KeyError if one does not exist."""
-        self.table.sort()
-        found: Integers = self.table.columns[LAST, self.table.places(numbers)]
+    def lasts(self, block: EventBlock) -> Integers:
+        """The sequence of the last event of the fence of each run; KeyError if a fence does not exist."""
+        self._placed = None
+        found: Integers = self.table.columns[LAST][self._places(block)]
         return found
 
     def last(self, number: int) -> int | None:
@@ -236,15 +237,13 @@ class FenceRuns:
 
     def own(self, block: EventBlock) -> npt.NDArray[np.bool_]:
         """Of which runs the hull is the one that the fence names; KeyError if a fence does not exist."""
-        self.table.sort()
-        subjects = self.table.columns[SUBJECTS, self.table.places(block.fences)]
+        subjects = self.table.columns[SUBJECTS][self._places(block)]
         names = np.array([self._names.get(name, NO_NAME) for name in block.names])
-        found: npt.NDArray[np.bool_] = names[block.hulls] == subjects
+        found: npt.NDArray[np.bool_] = names[block.runs["hull"]] == subjects
         return found
 
     def add(self, block: EventBlock | Runs, row: int) -> None:
         """Add the runs of a row. O(runs), with O(all new runs) now and then."""
-        self.table.sort()
         for first in range(0, len(block.fences), MOST_NEW):
             fences = block.fences[first : first + MOST_NEW]
             if self._end + len(fences) > MOST_NEW:
@@ -255,7 +254,14 @@ class FenceRuns:
             self._new[2, self._end : end] = row
             self._end = end
         # A fence may have several runs: the last one counts.
-        self.table.columns[LAST, self.table.places(block.fences)] = block.firsts + block.counts - 1
+        self.table.columns[LAST][self._places(block)] = block.firsts + block.counts - 1
+        self._placed = None
+
+    def _places(self, block: EventBlock | Runs) -> Integers:
+        """Where the fence of each run is in the table. A commit asks several times, from `lasts` to `add`."""
+        if self._placed is None or self._placed[0] is not block:
+            self._placed = block, self.table.places(block.fences)
+        return self._placed[1]
 
     def update(self, fence: FenceRows) -> None:
         """Let a fence have all of its runs. O(new runs of all)."""

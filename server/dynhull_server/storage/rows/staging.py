@@ -43,7 +43,7 @@ def staging(
         if not tails:
             continue
         edges = [0, *(edge for _, *both in tails for edge in both), len(block)]
-        first = joined([block.rows(start, end) for start, end in list(pairwise(edges))[::2] if start < end])
+        first = joined([block.part(start, end) for start, end in list(pairwise(edges))[::2] if start < end])
         then[-1] = AppendFirst(first, [place() for _ in range(0, len(first), EVENTS_A_ROW)])
         for number, begin, last in tails:
             for start in range(begin, last, EVENTS_A_ROW):

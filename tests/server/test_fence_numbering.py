@@ -1,0 +1,95 @@
+"""Few crossings and many become the same events, in different ways."""
+
+import random
+from typing import Any
+
+import numpy as np
+import pytest
+from live_engine import LIMITS
+
+from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.core import Core
+from dynhull_server.state.events import (
+    Arrived,
+    Birth,
+    Commit,
+    Committed,
+    Compute,
+    Computed,
+    CreateHull,
+    Tick,
+    WriteBatch,
+)
+from dynhull_server.state.fences import numbering
+from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea
+from dynhull_server.state.fences.records import AppendEvents, Cause
+from dynhull_server.state.fences.requests import CreateFence
+from dynhull_server.state.records import HullSettings
+
+KEYS = 30
+NO_KEYS = np.empty(0, np.uint64)
+CREATED = Birth("uid", 0.0)
+
+
+class Everyone:
+    """Receives all answers."""
+
+    def answer(self, request: Any) -> None:
+        assert request.error is None
+
+
+class Life:
+    """A core whose commits succeed; it keeps the events that it commits."""
+
+    def __init__(self) -> None:
+        self.core = Core(LIMITS)
+        self.made: list[Any] = []
+
+    def step(self, event: Any) -> None:
+        for effect in self.core.step(event):
+            if isinstance(effect, Compute):
+                effect.ticket.run()
+                self.step(Computed(effect.ticket))
+            if isinstance(effect, Commit) and effect.ticket is not None:
+                self.made += [each.block.by_fence() for each in effect.changes if isinstance(each, AppendEvents)]
+                self.step(Committed(effect.ticket))
+
+
+def put(dice: random.Random, name: str, now: int) -> WriteBatch:
+    keys = np.array(sorted(dice.sample(range(KEYS), dice.randrange(1, KEYS))), np.uint64)
+    points = np.array([[dice.uniform(-2, 2), dice.uniform(-2, 2)] for _ in keys])
+    removes = np.array(sorted(set(range(KEYS)) - set(keys.tolist()))[:3], np.uint64)
+    ttl = dice.choice([None, 40])
+    request = WriteBatch(len(keys), lambda: KeyedBatch("int", keys, points, removes, ttl=ttl))
+    request.to, request.name, request.arrived = Everyone(), name, now
+    return request
+
+
+def life(seed: str) -> list[Any]:
+    dice, of_seed = random.Random(seed), Life()
+    for name in ("fleet/1", "fleet/2"):
+        of_seed.step(CreateHull(Everyone(), name, CREATED, HullSettings("int")))
+    areas = [CircleArea(x, y, 0.7) for x in (-1, 0, 1) for y in (-1, 0, 1)]
+    configs = [FenceConfig(area, "prefix", "fleet/", initial="none") for area in areas]
+    configs += [FenceConfig(HullArea("fleet/1"), "hull", "fleet/2", crosses=True, initial="none")]
+    configs += [FenceConfig(areas[0], "hull", "fleet/1", dwell=10, initial="none")]
+    for number, config in enumerate(configs):
+        of_seed.step(CreateFence(Everyone(), f"fence/{number}", 0, config, CREATED))
+    for now in range(100, 1000, 30):
+        name = dice.choice(["fleet/1", "fleet/2"])
+        batches = [put(dice, name, now + dice.randrange(-20, 20)) for _ in range(dice.randrange(1, 4))]
+        of_seed.step(Arrived(batches))
+        of_seed.step(Tick(now / 1e6, now, Everyone()))
+    return of_seed.made
+
+
+@pytest.mark.parametrize("seed", ["a", "b"])
+def test_events_do_not_depend_on_how_many_are_few(seed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for few in (0, 10**9):
+        monkeypatch.setattr(numbering, "FEW", few)
+        found.append(life(seed))
+    assert len(found[0]) > 10
+    causes = {event.causes for made in found[0] for events in made.values() for event in events}
+    assert causes >= {Cause.MOVED, Cause.AREA, Cause.APPEARED, Cause.REMOVED, Cause.EXPIRED}
+    assert found[0] == found[1]

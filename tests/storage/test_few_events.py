@@ -1,0 +1,91 @@
+"""Few events and many take different ways to the same bytes."""
+
+import math
+import random
+
+import pytest
+
+from dynhull_server.state.fences.event_block import EventBlock, block_of, joined
+from dynhull_server.state.fences.records import EventType, FenceEvent, Origin
+from dynhull_server.state.records import NO_TIME
+from dynhull_server.storage.rows import event_columns
+from dynhull_server.storage.rows.event_blocks import decode_block, encode_block
+
+HULLS = "fleet", "others/1", "others/2"
+
+
+def coordinate(dice: random.Random, *, decimal: bool) -> float:
+    if decimal:
+        return dice.choice([0.0, 180.0, dice.randrange(-(10**9), 10**9) / 1e7])
+    return dice.choice([0.0, -0.0, 5e-324, -1.5e308, dice.uniform(-1, 1), float(dice.randrange(-4, 4))])
+
+
+def place(dice: random.Random, *, decimal: bool) -> tuple[float, float] | None:
+    return None if dice.random() < 0.2 else (coordinate(dice, decimal=decimal), coordinate(dice, decimal=decimal))
+
+
+def events(dice: random.Random, number: int, *, timed: bool) -> dict[int, list[FenceEvent]]:
+    """Events of some fences, with keys of both kinds, and without some of what an event may have."""
+    made: dict[int, list[FenceEvent]] = {}
+    decimal = dice.random() < 0.5
+    for _ in range(number):
+        fence = dice.randrange(1, 2**40)
+        position = place(dice, decimal=decimal)
+        key = dice.choice([2**64 - 1, dice.randrange(1000), "é" * dice.randrange(1, 100)])
+        event = FenceEvent(
+            dice.choice([1, 2**53]),
+            dice.choice([EventType.ENTER, EventType.EXIT, EventType.CROSS]),
+            dice.randrange(256),
+            dice.choice(HULLS),
+            key,
+            dice.randrange(2**48),
+            dice.choice([0, 7]),
+            position,
+            place(dice, decimal=decimal),
+            None if position is None else dice.choice([0.0, math.inf, dice.random()]),
+            dice.randrange(-(2**50), 2**50) if timed and dice.random() < 0.7 else NO_TIME,
+            dice.randrange(2**50),
+            dice.randrange(2**50) if timed and dice.random() < 0.3 else NO_TIME,
+            origin=Origin("yard", 3) if timed and dice.random() < 0.2 else None,
+        )
+        made.setdefault(fence, []).append(event)
+    return made
+
+
+def encoded(block: EventBlock, own: str) -> bytes:
+    return encode_block(block, block.runs["hull"] == (block.names.index(own) if own in block.names else -1))
+
+
+def in_order(block: EventBlock) -> list[FenceEvent]:
+    return [event for run in range(len(block.runs)) for event in block.events(run)]
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 17, 64, 65])
+@pytest.mark.parametrize("timed", [False, True], ids=["plain", "timed"])
+def test_the_bytes_do_not_depend_on_how_many_events_are_few(
+    number: int, timed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for seed in range(5):
+        made = events(random.Random(f"{number} {timed} {seed}"), number, timed=timed)
+        block = block_of(made)
+        found = []
+        for few in (0, 1000):
+            monkeypatch.setattr(event_columns, "FEW", few)
+            found.append(encoded(block, HULLS[0]))
+        assert found[0] == found[1]
+        read = decode_block(found[0], lambda _: HULLS[0])
+        assert repr(read.by_fence()) == repr(made)
+
+
+def test_blocks_are_joined_and_parted() -> None:
+    dice = random.Random(7)
+    made = [events(dice, number, timed=True) for number in (3, 1, 20)]
+    blocks = [block_of(each) for each in made]
+    together = joined(blocks)
+    expected = [event for each in made for of_fence in each.values() for event in of_fence]
+    assert repr(in_order(together)) == repr(expected)
+    parts = [together.part(start, min(start + 5, len(together))) for start in range(0, len(together), 5)]
+    assert repr([event for part in parts for event in in_order(part)]) == repr(expected)
+    some = together.only(together.fences % 2 == 0)
+    left = {number: of_fence for each in made for number, of_fence in each.items() if number % 2 == 0}
+    assert repr(some.by_fence()) == repr(left)
