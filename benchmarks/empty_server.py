@@ -1,14 +1,14 @@
 """The fastest handlers that grpcio allows: they read, acknowledge and do nothing else. `server.py` measures them.
 
-gRPC has the options of our server, so that only the handlers differ. With a port as the last argument, several of these
-processes share it.
+gRPC has the options and the event loop of our server, so that only the handlers differ. With a port as the last
+argument, several of these processes share it.
 """
 
-import asyncio
 import sys
 
 import grpc
 
+from dynhull_server import event_loop
 from dynhull_server.entrance import grpc_server
 from dynhull_server.settings import Settings
 
@@ -38,9 +38,4 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    if "--uvloop" in sys.argv:
-        import uvloop
-
-        uvloop.run(main())
-    else:
-        asyncio.run(main())
+    event_loop.run(main())

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from prometheus_client import generate_latest
 
-from dynhull_server import logs
+from dynhull_server import event_loop, logs
 from dynhull_server.app import Server
 from dynhull_server.failure import code_of, fail, text_of
 from dynhull_server.malloc import return_large_blocks
@@ -27,7 +27,7 @@ def main(end: socket.socket) -> None:
     """Serve until SIGTERM, or until the supervisor at the other end of the line has ended."""
     os.setpgid(0, 0)  # the signals of a terminal are for the supervisor
     try:
-        asyncio.run(_run(end))
+        event_loop.run(_run(end))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 
 from dynhull import set_threads
 
-from . import logs
+from . import event_loop, logs
 from .app import Server
 from .failure import code_of, fail, text_of
 from .malloc import return_large_blocks
@@ -32,7 +32,7 @@ def run(settings: Settings) -> None:
     share_processors(settings)
     allow_connections(settings.max_connections)
     try:
-        asyncio.run(_serve(settings))
+        event_loop.run(_serve(settings))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 
