@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 import grpc
@@ -13,11 +12,12 @@ from . import _layers as peeling
 from . import _uses as uses
 from ._errors import DynhullError, error_of
 from ._methods import answer_of, described, documented
-from ._outcomes import settle
+from ._outcomes import Outcome, settle
 from ._questions import Questions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from concurrent.futures import Future
     from types import TracebackType
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -56,7 +56,7 @@ class Pipeline:
 
     def __init__(self, connection: BlockingConnection, piping: Piping) -> None:
         self._connection = connection
-        self._questions: Questions[Future[Any]] = Questions(piping, connection.retries, Future)
+        self._questions: Questions[Future[Any]] = Questions(piping, connection.retries, Outcome)
         self._turn = threading.Condition()
         self._connections = 0
         self._closed = False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Future
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
@@ -13,11 +12,12 @@ import grpc
 from ._calls import Writing, last_sequence
 from ._errors import DynhullError, error_of
 from ._gathering import put_parts, remove_parts
-from ._outcomes import settle
+from ._outcomes import Outcome, settle
 from ._window import Window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from concurrent.futures import Future
     from types import TracebackType
 
     import numpy.typing as npt
@@ -169,7 +169,7 @@ class Writer:
                 raise RuntimeError(CLOSED)
             if self._window is None:
                 begin = self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
-                self._window = Window(self._writing, begin, _new_outcome)
+                self._window = Window(self._writing, begin, Outcome)
                 name = f"writer to {self._writing.name}"
                 self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
                 self._thread.start()
@@ -239,7 +239,3 @@ class Writer:
                         self._turn.wait(window.due_in(monotonic()))
                 self._turn.notify_all()
             yield request
-
-
-def _new_outcome() -> Future[Applied]:
-    return Future()
