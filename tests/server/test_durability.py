@@ -8,7 +8,7 @@ import grpc
 import numpy as np
 import pytest
 from patience import PATIENCE
-from server_process import run, server_process
+from server_process import run, server_process, shape_options
 
 import dynhull
 from dynhull_client import HullClient, LimitExceededError
@@ -106,7 +106,7 @@ def test_a_watch_resumes_across_a_kill(tmp_path):
 def test_a_second_server_on_the_folder_is_refused(tmp_path):
     options = ["--data", str(tmp_path / "data")]
     with server_process(*options):
-        second = run("serve", "--port", "0", *options)
+        second = run("serve", "--port", "0", *shape_options(), *options)
     assert second.returncode == 2
     assert "another server" in second.stderr
     assert "Traceback" not in second.stderr

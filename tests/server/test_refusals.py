@@ -322,21 +322,21 @@ def test_limits_are_told() -> None:
     options = ("--max-hulls", "1", "--max-message-bytes", "4096")
     with server_process(*options) as server, grpc.insecure_channel(server.address) as channel:
         stub = HullServiceStub(channel)
-        stub.CreateHull(pb.CreateHullRequest(name="one"))
-        code, info, details = refusal(lambda: stub.CreateHull(pb.CreateHullRequest(name="two")))
+        stub.CreateHull(pb.CreateHullRequest(name="a/one"))
+        code, info, details = refusal(lambda: stub.CreateHull(pb.CreateHullRequest(name="a/two")))
         assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
         assert dict(info.metadata) == {"limit": "max_hulls", "value": "1"}
         assert details[0].violations[0].subject == "max_hulls"
         batch = batch_pb2.Batch(inserts=points_pb2.Points(packed=bytes(16 * 4096)))
-        code, info, _ = refusal(lambda: stub.Apply(pb.ApplyRequest(name="one", batch=batch)))
+        code, info, _ = refusal(lambda: stub.Apply(pb.ApplyRequest(name="a/one", batch=batch)))
         assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
         assert dict(info.metadata) == {"limit": "max_message_bytes", "value": "4096"}
-        assert stub.GetHull(pb.GetHullRequest(name="one")).hull.revision == 0
+        assert stub.GetHull(pb.GetHullRequest(name="a/one")).hull.revision == 0
         # An answer is limited like a request.
         parabola = [[x, x * x] for x in range(300)]
         for half in (parabola[:150], parabola[150:]):
             points = points_pb2.Points(packed=struct.pack("<300d", *chain.from_iterable(half)))
-            stub.Apply(pb.ApplyRequest(name="one", batch=batch_pb2.Batch(inserts=points)))
-        code, info, _ = refusal(lambda: stub.GetHull(pb.GetHullRequest(name="one")))
+            stub.Apply(pb.ApplyRequest(name="a/one", batch=batch_pb2.Batch(inserts=points)))
+        code, info, _ = refusal(lambda: stub.GetHull(pb.GetHullRequest(name="a/one")))
         assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
         assert dict(info.metadata) == {"limit": "max_message_bytes", "value": "4096"}

@@ -4,6 +4,7 @@ import asyncio
 
 import grpc
 import numpy as np
+import pytest
 from forgetful import FORGETFUL
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from live_engine import engine_in_memory, insert
@@ -73,6 +74,7 @@ def test_a_hull_that_is_as_it_was_is_left_out() -> None:
     asyncio.run(run())
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_health_tells_of_a_wrong_hull_until_the_server_ends() -> None:
     complaint = "differs from Chan's algorithm"
     with (

@@ -19,12 +19,13 @@ HALF_AN_HOUR, THREE_HOURS = 1800, 10800  # seconds: less and more than the clock
 # Batches read the server's clock in these steps.
 TICK = SECOND // 10
 T = 1_700_000_000 * SECOND
+# One first part: the time of a worker does not go back, but two workers read it at different moments.
 CONFIGS = {
-    "brief": hull_pb2.HullConfig(identity=STRINGS, window=window(BRIEF)),
-    "points": hull_pb2.HullConfig(window=window(BRIEF)),
-    "half-an-hour": hull_pb2.HullConfig(identity=STRINGS, window=window(HALF_AN_HOUR)),
-    "data": hull_pb2.HullConfig(identity=STRINGS, window=window(HALF_AN_HOUR, clock=hull_pb2.CLOCK_DATA)),
-    "deadlines": hull_pb2.HullConfig(identity=STRINGS),
+    "t/brief": hull_pb2.HullConfig(identity=STRINGS, window=window(BRIEF)),
+    "t/points": hull_pb2.HullConfig(window=window(BRIEF)),
+    "t/half-an-hour": hull_pb2.HullConfig(identity=STRINGS, window=window(HALF_AN_HOUR)),
+    "t/data": hull_pb2.HullConfig(identity=STRINGS, window=window(HALF_AN_HOUR, clock=hull_pb2.CLOCK_DATA)),
+    "t/deadlines": hull_pb2.HullConfig(identity=STRINGS),
 }
 
 
@@ -72,41 +73,41 @@ def test_points_leave_once_and_in_time_whatever_the_wall_clock_says(tmp_path: Pa
     with life(tmp_path / "data", "-0") as stub:
         for name, config in CONFIGS.items():
             stub.CreateHull(pb.CreateHullRequest(name=name, config=config))
-        put(stub, "data", puts({"a": (0, 0)}, at=[T]))
-        put(stub, "half-an-hour", puts({"a": (0, 0)}))
-        start = put(stub, "deadlines", puts({"half an hour": (0, 0)}, ttl=duration(HALF_AN_HOUR)))
-        put(stub, "deadlines", puts({"three hours": (1, 1)}, expire_times=times(start + THREE_HOURS * SECOND)))
-        put(stub, "deadlines", puts({"a": (2, 2)}, ttl=duration(BRIEF)))
-        put(stub, "brief", puts({"a": (0, 0)}))
-        wait_for(stub, "brief", revision=2, count=0)
-        wait_for(stub, "deadlines", revision=4, count=2)
-        put(stub, "points", batch_pb2.Batch(inserts=points(0, 0, 1, 1)))
-        deadline = put(stub, "deadlines", puts({"b": (2, 2)}, ttl=duration(BRIEF))) + brief
-        end = put(stub, "brief", puts({"b": (0, 0)})) + brief
+        put(stub, "t/data", puts({"a": (0, 0)}, at=[T]))
+        put(stub, "t/half-an-hour", puts({"a": (0, 0)}))
+        start = put(stub, "t/deadlines", puts({"half an hour": (0, 0)}, ttl=duration(HALF_AN_HOUR)))
+        put(stub, "t/deadlines", puts({"three hours": (1, 1)}, expire_times=times(start + THREE_HOURS * SECOND)))
+        put(stub, "t/deadlines", puts({"a": (2, 2)}, ttl=duration(BRIEF)))
+        put(stub, "t/brief", puts({"a": (0, 0)}))
+        wait_for(stub, "t/brief", revision=2, count=0)
+        wait_for(stub, "t/deadlines", revision=4, count=2)
+        put(stub, "t/points", batch_pb2.Batch(inserts=points(0, 0, 1, 1)))
+        deadline = put(stub, "t/deadlines", puts({"b": (2, 2)}, ttl=duration(BRIEF))) + brief
+        end = put(stub, "t/brief", puts({"b": (0, 0)})) + brief
         before = clocks(stub)
     with life(tmp_path / "data", "-1h") as stub:
         after = clocks(stub)
         assert all(after[name] >= before[name] for name in CONFIGS)
-        assert end <= wait_for(stub, "brief", revision=4, count=0) < end + HALF_AN_HOUR * SECOND
-        assert deadline <= wait_for(stub, "deadlines", revision=6, count=2)
-        wait_for(stub, "points", revision=2, count=0)
-        clock = put(stub, "brief", puts({"c": (0, 0)}))
+        assert end <= wait_for(stub, "t/brief", revision=4, count=0) < end + HALF_AN_HOUR * SECOND
+        assert deadline <= wait_for(stub, "t/deadlines", revision=6, count=2)
+        wait_for(stub, "t/points", revision=2, count=0)
+        clock = put(stub, "t/brief", puts({"c": (0, 0)}))
         assert clock >= end
-        assert put(stub, "half-an-hour", puts({"b": (1, 1)})) > end - TICK
-        assert time_of(stub, "half-an-hour", "b") >= end
-        assert clock + brief <= wait_for(stub, "brief", revision=6, count=0) < end + HALF_AN_HOUR * SECOND
+        assert put(stub, "t/half-an-hour", puts({"b": (1, 1)})) > end - TICK
+        assert time_of(stub, "t/half-an-hour", "b") >= end
+        assert clock + brief <= wait_for(stub, "t/brief", revision=6, count=0) < end + HALF_AN_HOUR * SECOND
         before = clocks(stub)
     with life(tmp_path / "data", "+1h") as stub:
-        end = wait_for(stub, "half-an-hour", revision=3, count=0)
-        assert end >= before["half-an-hour"] + HALF_AN_HOUR * SECOND
-        wait_for(stub, "deadlines", revision=7, count=1)
-        assert hulls(stub)["data"].clock_time.ToMicroseconds() == T
+        end = wait_for(stub, "t/half-an-hour", revision=3, count=0)
+        assert end >= before["t/half-an-hour"] + HALF_AN_HOUR * SECOND
+        wait_for(stub, "t/deadlines", revision=7, count=1)
+        assert hulls(stub)["t/data"].clock_time.ToMicroseconds() == T
         quiet = hulls(stub)
     with life(tmp_path / "data", "-0") as stub:
         assert hulls(stub) == quiet
-        clock = put(stub, "brief", puts({"d": (0, 0)}))
+        clock = put(stub, "t/brief", puts({"d": (0, 0)}))
         assert clock > end - TICK
-        assert clock + brief <= wait_for(stub, "brief", revision=8, count=0) < end + HALF_AN_HOUR * SECOND
-        assert {name: hull for name, hull in hulls(stub).items() if name != "brief"} == {
-            name: hull for name, hull in quiet.items() if name != "brief"
+        assert clock + brief <= wait_for(stub, "t/brief", revision=8, count=0) < end + HALF_AN_HOUR * SECOND
+        assert {name: hull for name, hull in hulls(stub).items() if name != "t/brief"} == {
+            name: hull for name, hull in quiet.items() if name != "t/brief"
         }

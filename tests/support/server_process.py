@@ -15,6 +15,12 @@ from patience import PATIENCE
 SHAPES = {"process": (), "workers": ("--workers", "2", "--gateways", "2")}
 shape = "process"
 
+
+def shape_options() -> tuple[str, ...]:
+    """The options for servers of this shape."""
+    return SHAPES[shape]
+
+
 UNFINISHED = "is incomplete or damaged and was dropped, with at most 1 of the newest commits"
 
 
@@ -40,7 +46,7 @@ def server_process(
     wrote: it may say that it dropped the commit that was under way.
     """
     memory = [] if "--data" in options else ["--in-memory"]
-    command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *SHAPES[shape], *memory, *options]
+    command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *shape_options(), *memory, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
         Process(command, stdout=PIPE, stderr=errors, text=True) as process,
