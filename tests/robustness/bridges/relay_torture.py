@@ -36,7 +36,7 @@ PATIENCE = ["10ms", "200ms"]
 # Seconds between two kills, at most.
 BETWEEN = 1.0
 PAUSE = 0.02
-# Seconds in which what has waited for the endpoint arrives, besides the relay's last pause and the backlog of a long time.
+# Seconds in which what has waited for the endpoint arrives, besides those of the last pause and of a long backlog.
 DELIVERED_WITHIN = 120
 
 
@@ -151,7 +151,7 @@ def run(downs: int, down: float, kills: int, patience: list[str], seed: int, fol
 
 
 def _arrive(client: HullClient, writer: Writer, within: float) -> None:
-    """Wait until the relay has acknowledged all events up to now; AssertionError if that takes more than `within` seconds."""
+    """Wait until the relay has acknowledged all events up to now, at most for so many seconds."""
     up_to = {name: len(writer.expected[name]) for name in FENCES}
     end = time.monotonic() + within
     while True:
