@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers properties robustness simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers properties robustness robustness-cluster ray simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -129,6 +129,15 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/fences/kill_torture.py --steps 1000000 --kills 1000
 	$(BIN)/python tests/robustness/bridges/relay_torture.py --kills 100
 	$(BIN)/python tests/robustness/bridges/ingest_torture.py --kills 50
+
+SCHEDULES ?= 100000
+
+robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost messages, killed roots and shards; and the faults that they must find
+	PYTHONPATH=tests $(BIN)/python -m shards.simulation --schedules $(SCHEDULES)
+	PYTHONPATH=tests $(BIN)/python -m shards.mutants
+
+ray: .venv/.test  ## all tests of Ray Datasets; `make test` runs the cheap ones
+	RAY_CASES=all $(BIN)/pytest tests/ray
 
 SEED ?= 1
 MUTANTS ?= 200

@@ -1,6 +1,7 @@
 """A fully dynamic planar convex hull with exact answers."""
 
 from sys import modules as _modules
+from typing import Any as _Any
 
 from . import _hull, static
 from ._entities import DuplicateKeyError, MissingKeyError
@@ -38,7 +39,11 @@ __version__: str
 """The version of the installed distribution."""
 
 
-def __getattr__(name: str) -> str:
+def __getattr__(name: str) -> _Any:
+    if name == "ray":  # most programs need none
+        from importlib import import_module
+
+        return import_module("dynhull.ray")
     if name == "__version__":  # read when asked for: it takes as long as a tenth of the import
         from importlib.metadata import version
 

@@ -112,13 +112,8 @@ def _plane(positions: Iterable[Sequence[float]]) -> Iterator[Sequence[float]]:
 
 def _of_frame(frame: Any, name: str) -> npt.NDArray[Any]:
     columns = list(getattr(frame, "column_names", frame.columns))
-    lower = [str(column).lower() for column in columns]
-    pairs = [pair for pair in COLUMN_NAMES if all(lower.count(each) == 1 for each in pair)]
-    if len(pairs) == 1:
-        chosen = [columns[lower.index(each)] for each in pairs[0]]
-    elif len(columns) == 2 and not _other_way_round(lower):
-        chosen = columns
-    else:
+    chosen = coordinate_columns(columns)
+    if chosen is None:
         listed = ", ".join(map(str, columns))
         example = [str(column) for column in columns[:2]]
         raise ValueError(f"{name} has the columns {listed}: choose two, x first, as in frame[{example}]")
@@ -126,6 +121,18 @@ def _of_frame(frame: Any, name: str) -> npt.NDArray[Any]:
     if x.dtype != y.dtype:  # numpy would round large integers to join them with floats
         x, y = x.astype(np.object_), y.astype(np.object_)
     return np.column_stack((x, y))
+
+
+def coordinate_columns(columns: Sequence[Any]) -> tuple[Any, Any] | None:
+    """The two columns of a frame that hold coordinates, x first, by their names; None if they do not say which."""
+    lower = [str(column).lower() for column in columns]
+    pairs = [pair for pair in COLUMN_NAMES if all(lower.count(each) == 1 for each in pair)]
+    if len(pairs) == 1:
+        x, y = (columns[lower.index(each)] for each in pairs[0])
+        return x, y
+    if len(columns) == 2 and not _other_way_round(lower):
+        return columns[0], columns[1]
+    return None
 
 
 def _other_way_round(names: Sequence[str]) -> bool:
