@@ -182,7 +182,7 @@ class Keyed:
             require_puts(self.globe, batch.points, admission.young)
         late = 0
         if admission.young is not None:
-            _refuse_repeated(rows)
+            refuse_repeated(rows)
             late = len(rows.keys) - int(np.count_nonzero(admission.young))
             rows = _selected(rows, admission.young)
         admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
@@ -195,7 +195,7 @@ class Keyed:
 
     def check(self, admitted: Admitted) -> None:
         """Raise KeyRepeatedError or KeyMissingError if `apply` would."""
-        _refuse_repeated(admitted.rows)
+        refuse_repeated(admitted.rows)
         if admitted.refuse_missing:
             there = self._there(admitted.rows.removes, admitted.clock)
             if self.quarantine is not None:
@@ -566,7 +566,7 @@ def select_keys(keys: Keys, which: npt.NDArray[np.bool_]) -> Keys:
     return PackedKeys(lengths[which], np.frombuffer(keys.data, np.uint8)[np.repeat(which, lengths)])
 
 
-def _refuse_repeated(rows: KeyRows) -> None:
+def refuse_repeated(rows: KeyRows) -> None:
     """Raise KeyRepeatedError if a key comes twice among the puts and removes. O(k)."""
     keys = [*key_list(rows.keys), *key_list(rows.removes)]
     if len(set(keys)) == len(keys):

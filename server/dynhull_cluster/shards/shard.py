@@ -1,0 +1,215 @@
+"""A shard: the points that belong to it, their hull, and its log."""
+
+from dataclasses import dataclass
+from itertools import compress
+from typing import Any, assert_never
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull import convex_hull
+from dynhull_server.state.batch import NO_POINTS
+from dynhull_server.state.contents import replayed
+from dynhull_server.state.contents.keyed import Keyed
+from dynhull_server.state.contents.live import LiveContents
+from dynhull_server.state.errors import RefusedError
+from dynhull_server.state.numbers import as_numbers
+from dynhull_server.state.records import HullSettings, Record
+from dynhull_server.state.sample import sample
+
+from .inverse import Inverse, inverse_of
+from .logs import ShardLog
+from .messages import (
+    Answered,
+    Ask,
+    Change,
+    Closed,
+    Corners,
+    CountOf,
+    Open,
+    Opened,
+    PositionsOf,
+    Question,
+    Reply,
+    Request,
+    SampleOf,
+    StaticHull,
+    Step,
+    Stepped,
+    Totals,
+    Undo,
+    Undone,
+)
+
+Rows = npt.NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class _Last:
+    """The last step, which another shard may refuse.
+
+    Attributes:
+        number: its number.
+        before: the number of the step before it.
+        corners: the vertices before it.
+        inverse: how to undo it; None for a step that the root will not undo.
+    """
+
+    number: int
+    before: int
+    corners: Corners
+    inverse: Inverse | None
+
+
+class Shard:
+    """One shard of a hull. A new one knows nothing but its log, and waits for the root to open it.
+
+    Args:
+        settings: the settings of the hull.
+        log: its log.
+    """
+
+    def __init__(self, settings: HullSettings, log: ShardLog) -> None:
+        self._settings = settings
+        self._log = log
+        self._contents: LiveContents | None = None
+        self._epoch = self._ticket = 0
+        self._reply: Reply | None = None
+        self._number = 0
+        self._last: _Last | None = None
+        self._corners = Corners(NO_POINTS, None)
+        self._corners_as_of = -1
+
+    def receive(self, message: Request) -> Reply | None:
+        """Handle a message of the root. Returns the reply, None for a message that is too late.
+
+        Raises:
+            Exception: memory or the log failed in the middle: the shard must be replaced by a new one.
+        """
+        if message.epoch < self._log.epoch:
+            return None
+        known = self._contents is not None and message.epoch == self._epoch
+        if known and message.ticket <= self._ticket:
+            return self._reply if message.ticket == self._ticket else None
+        if not known and (not isinstance(message, Open) or message.epoch == self._log.epoch):
+            return Closed(message.epoch, message.ticket)
+        reply = self._handle(message)
+        self._epoch, self._ticket, self._reply = message.epoch, message.ticket, reply
+        return reply
+
+    def _handle(self, message: Request) -> Reply:
+        match message:
+            case Open():
+                return self._open(message)
+            case Step():
+                return self._step(message)
+            case Undo():
+                return self._undo(message)
+            case Ask():
+                return Answered(message.epoch, message.ticket, self._answer(message.question))
+        assert_never(message)
+
+    def _open(self, message: Open) -> Opened:
+        self._log.begin(message.epoch, message.decided)
+        contents = self._contents
+        if contents is None or self._number > message.decided:
+            kept = self._log.read()
+            contents, self._number = replayed(kept, self._settings), kept.last_revision
+        self._contents, self._last = contents, None
+        self._corners, self._corners_as_of = _corners(contents), contents.hull.changes
+        return Opened(message.epoch, message.ticket, _totals(contents), self._corners)
+
+    def _step(self, message: Step) -> Stepped:
+        contents, part, before = self._opened, message.part, self._corners
+        inverse = inverse_of(part, contents, self._settings) if message.undoable else None
+        records: list[Record] = []
+        expired, applied, left, changed = 0, None, None, None
+        try:
+            if message.clock is not None:
+                if part is not None:
+                    contents.check(part)  # a refused batch makes no points leave
+                expiry = contents.expire(message.clock)
+                if expiry is not None:
+                    expired, left = expiry.points, self._follow(contents)
+                    records.append(Record(message.number, expiry, clock=contents.clock))
+            if part is not None:
+                applied = contents.apply(part, message.number)
+                changed = self._follow(contents)
+                records.append(Record(message.number, contents.rows(part, applied), clock=contents.clock))
+        except RefusedError as error:
+            return Stepped(message.epoch, message.ticket, _totals(contents), error=error)
+        if records:
+            self._log.add(message.number, records)
+            self._last = _Last(message.number, self._number, before, inverse)
+            self._number = message.number
+        return Stepped(message.epoch, message.ticket, _totals(contents), expired, left, applied, changed)
+
+    def _undo(self, message: Undo) -> Undone:
+        last = self._last
+        if last is not None and last.number == message.number:
+            assert last.inverse is not None  # the root undoes what it has called undoable
+            self._log.drop(message.number)
+            self._contents = last.inverse()
+            self._number, self._corners, self._last = last.before, last.corners, None
+            self._corners_as_of = self._contents.hull.changes
+        return Undone(message.epoch, message.ticket)
+
+    def _follow(self, contents: LiveContents) -> Change | None:
+        """How the vertices have changed since this was last called. O(1) where they have not and have no keys."""
+        before, self._corners_as_of, as_of = self._corners, contents.hull.changes, self._corners_as_of
+        if not isinstance(contents, Keyed) and self._corners_as_of == as_of:
+            return None
+        self._corners = _corners(contents)
+        return _difference(before, self._corners)
+
+    def _answer(self, question: Question) -> Any:
+        contents = self._opened
+        match question:
+            case SampleOf(size):
+                points = contents.hull.points()
+                return points if len(points) <= size else sample(points, size)
+            case CountOf(points):
+                return contents.hull.count_many(points)
+            case PositionsOf(keys):
+                assert isinstance(contents, Keyed)  # the root asks no others
+                return contents.find(keys).points
+            case StaticHull():
+                return convex_hull(contents.hull.points())
+        assert_never(question)
+
+    @property
+    def _opened(self) -> LiveContents:
+        assert self._contents is not None  # `receive` has seen to it
+        return self._contents
+
+
+def _totals(contents: LiveContents) -> Totals:
+    return Totals(len(contents.hull), contents.hull.distinct, contents.due)
+
+
+def _corners(contents: LiveContents) -> Corners:
+    keys = tuple(contents.hull.vertex_keys()) if isinstance(contents, Keyed) else None
+    return Corners(contents.hull.vertices().copy(), keys)
+
+
+def _difference(before: Corners, after: Corners) -> Change | None:
+    if before.keys is None or after.keys is None:
+        old, new = as_numbers(before.points), as_numbers(after.points)
+        gone = np.isin(old, new, assume_unique=True, invert=True)
+        come = np.isin(new, old, assume_unique=True, invert=True)
+    else:
+        named = [set(zip(map(tuple, each.points.tolist()), each.keys or (), strict=True)) for each in (before, after)]
+        gone, come = _missing_from(named[1], before), _missing_from(named[0], after)
+    if not gone.any() and not come.any():
+        return None
+    return Change(_selected(before, gone), _selected(after, come))
+
+
+def _missing_from(named: set[Any], corners: Corners) -> Rows:
+    pairs = zip(map(tuple, corners.points.tolist()), corners.keys or (), strict=True)
+    return np.array([pair not in named for pair in pairs], np.bool_)
+
+
+def _selected(corners: Corners, which: Rows) -> Corners:
+    keys = None if corners.keys is None else tuple(compress(corners.keys, which.tolist()))
+    return Corners(corners.points[which], keys)

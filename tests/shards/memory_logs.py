@@ -1,0 +1,98 @@
+"""Logs in memory, and a cluster whose messages arrive at once."""
+
+from collections.abc import Callable
+
+from dynhull_cluster.shards.logs import Decision, FencedError
+from dynhull_cluster.shards.root import Request, Root
+from dynhull_cluster.shards.shard import Shard
+from dynhull_server.state.limits import Limits
+from dynhull_server.state.records import HullSettings, Kept, Record
+
+# Called before and after each change of a log; may raise, as a process that dies there would.
+Hook = Callable[[], None]
+
+
+def nothing() -> None:
+    pass
+
+
+class MemoryRootLog:
+    def __init__(self, hook: Hook = nothing) -> None:
+        self.epoch = 0
+        self.decisions: list[Decision] = []
+        self.hook = hook
+
+    def begin(self, epoch: int | None) -> tuple[int, list[Decision]]:
+        if epoch not in (None, self.epoch):
+            raise FencedError
+        self.hook()
+        self.epoch += 1
+        self.hook()
+        return self.epoch, list(self.decisions)
+
+    def decide(self, epoch: int, decision: Decision) -> None:
+        if epoch != self.epoch:
+            raise FencedError
+        self.hook()
+        self.decisions.append(decision)
+        self.hook()
+
+
+class MemoryShardLog:
+    def __init__(self, hook: Hook = nothing) -> None:
+        self.epoch = 0
+        self.steps: list[tuple[int, list[Record]]] = []
+        self.hook = hook
+
+    def begin(self, epoch: int, decided: int) -> None:
+        assert epoch > self.epoch
+        self.hook()
+        self.epoch = epoch
+        self.steps = [(number, records) for number, records in self.steps if number <= decided]
+        self.hook()
+
+    def add(self, number: int, records: list[Record]) -> None:
+        assert not self.steps or number > self.steps[-1][0]
+        self.hook()
+        self.steps.append((number, records))
+        self.hook()
+
+    def drop(self, number: int) -> None:
+        self.hook()
+        if self.steps and self.steps[-1][0] == number:
+            del self.steps[-1]
+        self.hook()
+
+    def read(self) -> Kept:
+        return Kept(records=[record for _, records in self.steps for record in records])
+
+
+class Cluster:
+    """A root and its shards, whose messages arrive at once."""
+
+    def __init__(self, settings: HullSettings, limits: Limits, count: int) -> None:
+        self._settings, self._limits = settings, limits
+        self._logs = [MemoryShardLog() for _ in range(count)]
+        self._log = MemoryRootLog()
+        self.shards = [Shard(settings, log) for log in self._logs]
+        self.restart_root()
+
+    def restart_root(self) -> None:
+        self.root = Root(self._settings, self._limits, len(self._logs), self._log, now=0.0)
+        self.deliver()
+
+    def restart_shard(self, shard: int) -> None:
+        self.shards[shard] = Shard(self._settings, self._logs[shard])
+
+    def deliver(self) -> None:
+        while messages := self.root.messages():
+            for shard, message in messages:
+                reply = self.shards[shard].receive(message)
+                if reply is not None:
+                    self.root.receive(shard, reply)
+
+    def serve(self, request: Request) -> Request:
+        self.root.submit(request)
+        self.deliver()
+        assert request.answered
+        return request

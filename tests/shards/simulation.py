@@ -1,0 +1,350 @@
+"""Schedules of one hull over shards: messages are lost, doubled and overtaken, roots and shards die in any moment.
+
+    PYTHONPATH=tests python -m shards.simulation --schedules 100000 [--first 0]
+
+A schedule follows from its seed. Processes die between two messages or at a change of their log, before or after it;
+a root that was replaced may go on for a while. Clients number their batches and send them again until they are
+answered. In the end the decisions are replayed on one hull, which must agree with every answer that anybody got.
+"""
+
+import argparse
+import random
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dynhull_cluster.shards import root as root_module
+from dynhull_cluster.shards import shard as shard_module
+from dynhull_cluster.shards.logs import FencedError
+from dynhull_cluster.shards.messages import SampleOf, StaticHull
+from dynhull_cluster.shards.root import Expire, Read, Request, Write
+from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.records import Kept
+
+from .memory_logs import MemoryRootLog, MemoryShardLog
+from .workload import KINDS, LIMITS, Workload
+
+EVERYTHING = 10**6
+FEW_POINTS = replace(LIMITS, max_points=20)  # so that the limit is met
+STEPS, CLIENTS = 120, 2
+# Steps without faults within which everything that waits is answered.
+PATIENCE = 400
+
+
+class BrokenPromiseError(AssertionError):
+    pass
+
+
+class KilledError(Exception):
+    """A process died here."""
+
+
+@dataclass(eq=False)
+class RootProcess:
+    root: Any
+
+
+@dataclass
+class InFlight:
+    """A message, or a reply if `reply` is set, between a root and a shard."""
+
+    root: RootProcess
+    shard: int
+    message: Any
+    reply: bool = False
+
+
+class Client:
+    """Sends one numbered batch after the other, each again until it is answered."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.sequence = 0
+        self.write: WriteBatch | None = None
+        self.request: Write | None = None
+
+
+class World:
+    """One schedule. `root_type` and `shard_type` may have faults that it must find."""
+
+    def __init__(self, seed: int, root_type: Any = root_module.Root, shard_type: Any = shard_module.Shard) -> None:
+        self._draw = draw = random.Random(seed)
+        self._root_type, self._shard_type = root_type, shard_type
+        self._settings = KINDS[draw.choice(list(KINDS))]
+        self._workload = Workload(self._settings, seed)
+        self._deadly = draw.choice((0.0, 0.01, 0.05))  # that a process dies at a change of its log
+        self._lossy = draw.choice((0.0, 0.05, 0.3))
+        self._faults = True
+        self._log = MemoryRootLog(self._perhaps_die)
+        self._shard_logs = [MemoryShardLog(self._perhaps_die) for _ in range(draw.choice((1, 2, 2, 3)))]
+        self._shards = [shard_type(self._settings, log) for log in self._shard_logs]
+        self._in_flight: list[InFlight] = []
+        self._process: RootProcess | None = None
+        self._replaced: list[RootProcess] = []
+        self._clients = [Client(name) for name in "ab"[:CLIENTS]]
+        self._reads: list[Read] = []
+        self._expiries: list[Expire] = []
+        self._batches: dict[tuple[str, int], WriteBatch] = {}
+        self._acknowledged: dict[tuple[str, int], Any] = {}
+        self._refused: list[tuple[int, WriteBatch, Exception]] = []
+        self._read: list[tuple[int, Any, Any]] = []
+
+    def _perhaps_die(self) -> None:
+        if self._faults and self._draw.random() < self._deadly:
+            raise KilledError
+
+    # Turns
+
+    def play(self) -> None:
+        draw = self._draw
+        actions = [self._send, self._deliver, self._deliver, self._deliver, self._ask]
+        for _ in range(draw.randint(20, STEPS)):
+            roll = draw.random()
+            if roll < 0.01:
+                self._kill_shard(draw.randrange(len(self._shards)))
+            elif roll < 0.02:
+                self._replace_root()
+            else:
+                draw.choice(actions)()
+        self._faults = False
+        for _ in range(PATIENCE):
+            if not self._waits():
+                break
+            self._resume()
+            self._send()
+            while self._in_flight:
+                self._deliver()
+        if self._waits():
+            raise BrokenPromiseError("a request is never answered")
+        self._restart_everything()
+        self._check()
+
+    def _waits(self) -> bool:
+        requests = [client.request for client in self._clients if client.request]
+        return self._process is None or any(not each.answered for each in (*requests, *self._reads, *self._expiries))
+
+    def _resume(self) -> None:
+        """A root is started where there is none, and clients send again what they have no answer to."""
+        if self._process is None:
+            try:
+                root = self._root_type(self._settings, FEW_POINTS, len(self._shards), self._log, now=0.0)
+            except KilledError:
+                return
+            self._process = RootProcess(root)
+            self._reads, self._expiries = [], []
+            for client in self._clients:
+                if client.write is not None:
+                    self._submit(client)
+
+    def _ask(self) -> None:
+        self._resume()
+        if self._process is None:
+            return
+        draw = self._draw
+        roll = draw.random()
+        if roll < 0.15:
+            read = Read(draw.choice((SampleOf(EVERYTHING), StaticHull())))
+            self._reads.append(read)
+            self._ask_root(read)
+        elif roll < 0.3 and self._settings.window is not None and self._settings.window.clock == "server":
+            self._workload.time += draw.choice((0, 10**6))
+            expiry = Expire(self._workload.time)
+            self._expiries.append(expiry)
+            self._ask_root(expiry)
+        else:
+            client = draw.choice(self._clients)
+            if client.write is None:
+                client.write = write = self._workload.batch()
+                write.producer, write.sequence = client.name, client.sequence + 1
+                self._submit(client)
+
+    def _submit(self, client: Client) -> None:
+        assert client.write is not None
+        client.request = Write(client.write, now=0.0)
+        self._batches[client.name, client.write.sequence] = client.write
+        self._ask_root(client.request)
+
+    def _ask_root(self, request: Request) -> None:
+        process = self._process
+        assert process is not None
+        try:
+            process.root.submit(request)
+        except KilledError:
+            self._lose_root()
+        self._hear()
+
+    def _send(self) -> None:
+        self._resume()
+        for process in [self._process, *self._replaced]:
+            if process is not None:
+                self._in_flight += [InFlight(process, *each) for each in process.root.messages()]
+
+    def _deliver(self) -> None:
+        if not self._in_flight:
+            return
+        draw = self._draw
+        at = draw.randrange(len(self._in_flight))
+        each = self._in_flight[at]
+        if not (self._faults and draw.random() < self._lossy):  # else it comes again
+            self._in_flight[at] = self._in_flight[-1]
+            self._in_flight.pop()
+        if self._faults and draw.random() < self._lossy:
+            return
+        if each.reply:
+            self._deliver_reply(each)
+        else:
+            try:
+                reply = self._shards[each.shard].receive(each.message)
+            except KilledError:
+                self._kill_shard(each.shard)
+                return
+            if reply is not None:
+                self._in_flight.append(InFlight(each.root, each.shard, reply, reply=True))
+
+    def _deliver_reply(self, each: InFlight) -> None:
+        current = each.root is self._process
+        if not current and each.root not in self._replaced:
+            return
+        try:
+            each.root.root.receive(each.shard, each.message)
+        except KilledError:
+            if current:
+                self._lose_root()
+            else:
+                self._replaced.remove(each.root)
+        except FencedError:
+            if current:
+                raise BrokenPromiseError("the latest root is fenced") from None
+            self._replaced.remove(each.root)
+        self._hear()
+
+    def _kill_shard(self, shard: int) -> None:
+        self._shards[shard] = self._shard_type(self._settings, self._shard_logs[shard])
+
+    def _lose_root(self) -> None:
+        self._process = None
+
+    def _replace_root(self) -> None:
+        """Another root takes over; the old one may go on, unaware of that."""
+        if self._process is not None and self._draw.random() < 0.5:
+            self._replaced.append(self._process)
+        self._lose_root()
+
+    # Answers
+
+    def _hear(self) -> None:
+        """Take note of what is answered, by whichever root."""
+        for client in self._clients:
+            request, write = client.request, client.write
+            if request is None or write is None or not request.answered:
+                continue
+            client.request = client.write = None
+            if request.error is None:
+                client.sequence = write.sequence
+                self._acknowledged[client.name, write.sequence] = request.result
+                self._workload.applied(write)
+            else:  # its number is free again
+                self._refused.append((len(self._log.decisions), write, request.error))
+        for read in self._reads:
+            if read.answered:
+                self._read.append((*read.result, read.question))
+        self._reads = [read for read in self._reads if not read.answered]
+        self._expiries = [expiry for expiry in self._expiries if not expiry.answered]
+
+    # The end
+
+    def _restart_everything(self) -> None:
+        self._replaced, self._in_flight, self._process = [], [], None
+        for shard in range(len(self._shards)):
+            self._kill_shard(shard)
+        self._resume()
+        for question in (SampleOf(EVERYTHING), StaticHull()):
+            self._reads.append(Read(question))
+            self._ask_root(self._reads[-1])
+        for _ in range(PATIENCE):
+            if not self._waits():
+                return
+            self._send()
+            while self._in_flight:
+                self._deliver()
+        raise BrokenPromiseError("no answer after a restart")
+
+    def _check(self) -> None:
+        one = HullState(FEW_POINTS, self._settings, Kept(), now=0.0)
+        reads: dict[int, list[tuple[Any, Any]]] = {}
+        for revision, answer, question in self._read:
+            reads.setdefault(revision, []).append((answer, question))
+        refused: dict[int, list[tuple[WriteBatch, Exception]]] = {}
+        for position, write, error in self._refused:
+            refused.setdefault(position, []).append((write, error))
+        for position in range(len(self._log.decisions) + 1):
+            self._check_reads(one, reads.pop(one.counts.revision, []))
+            for write, error in refused.get(position, []):
+                check_refused(one, write, error)
+            if position < len(self._log.decisions):
+                self._replay(one, self._log.decisions[position])
+        if reads:
+            raise BrokenPromiseError(f"reads of the revisions {sorted(reads)}, which never were")
+        if self._acknowledged:
+            raise BrokenPromiseError(f"acknowledged, but not there: {sorted(self._acknowledged)}")
+        assert self._process is not None
+        root = self._process.root
+        if not np.array_equal(root.hull.vertices(), one.vertices()):
+            raise BrokenPromiseError("the hull has other vertices")
+        if (root.points, root.revision, root.clock) != (one.counts.points, one.counts.revision, one.counts.clock):
+            raise BrokenPromiseError("other counts")
+        if root.distinct is None and root.vertex_keys() != one.vertex_keys().tolist():
+            raise BrokenPromiseError("other keys at the vertices")
+
+    def _check_reads(self, one: HullState, reads: list[tuple[Any, Any]]) -> None:
+        for answer, question in reads:
+            right = answer if isinstance(question, StaticHull) else np.array_equal(answer, one.hull.points())
+            if not right:
+                raise BrokenPromiseError(f"another answer to {question} at revision {one.counts.revision}")
+
+    def _replay(self, one: HullState, decision: Any) -> None:
+        if decision.cause == "expiry":
+            if not one.expire(decision.clock, None):
+                raise BrokenPromiseError("an expiry without points")
+        else:
+            number = decision.producer, decision.sequence
+            try:
+                expected = one.apply(self._batches[number], 0.0, None)
+            except Exception as error:
+                raise BrokenPromiseError(f"one hull refuses {number}: {error}") from error
+            if expected.duplicate:
+                raise BrokenPromiseError(f"{number} is applied twice")
+            told = self._acknowledged.pop(number, None)
+            if told is not None and not told.duplicate and told != expected:
+                raise BrokenPromiseError(f"{number}: {told}, not {expected}")
+        if one.counts.revision != decision.revision:
+            raise BrokenPromiseError(f"revision {decision.revision}, not {one.counts.revision}")
+
+
+def check_refused(one: HullState, write: WriteBatch, error: Exception) -> None:
+    try:
+        one.apply(write, 0.0, None)
+    except Exception:
+        return
+    raise BrokenPromiseError(f"refused, but one hull applies it: {error}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--schedules", type=int, default=100_000)
+    parser.add_argument("--first", type=int, default=0, help="the seed of the first one")
+    arguments = parser.parse_args()
+    begun = time.monotonic()
+    for seed in range(arguments.first, arguments.first + arguments.schedules):
+        try:
+            World(seed).play()
+        except Exception as error:
+            raise SystemExit(f"schedule {seed}: {type(error).__name__}: {error}") from error
+    print(f"{arguments.schedules} schedules in {time.monotonic() - begun:.0f} s: no promise is broken")
+
+
+if __name__ == "__main__":
+    main()

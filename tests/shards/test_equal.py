@@ -1,0 +1,99 @@
+"""A hull over shards gives the answers of one hull: verdicts, rows, counts, flags, vertices."""
+
+import random
+from collections import Counter
+
+import numpy as np
+import pytest
+from shards.memory_logs import Cluster
+from shards.workload import KINDS, LIMITS, Workload
+
+from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
+from dynhull_cluster.shards.root import Expire, Read, Write
+from dynhull_server.state.errors import LimitExceededError
+from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.records import HullSettings, Kept, Window
+from dynhull_server.state.sample import sample
+
+BATCHES = 150
+
+
+@pytest.mark.parametrize("shards", [2, 5])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hull_over_shards_is_one_hull(kind, shards):
+    settings = KINDS[kind]
+    met: Counter[str] = Counter()
+    for seed in range(2):
+        one = HullState(LIMITS, settings, Kept(), now=0.0)
+        cluster = Cluster(settings, LIMITS, shards)
+        workload, draw = Workload(settings, seed), random.Random(seed)
+        for _ in range(BATCHES):
+            if draw.random() < 0.03:
+                cluster.restart_root()
+            if draw.random() < 0.05:
+                cluster.restart_shard(draw.randrange(shards))
+            if one.contents.clock is not None and one.contents.follows_server and draw.random() < 0.2:
+                workload.time += draw.choice((0, 10**6))
+                assert cluster.serve(Expire(workload.time)).result == one.expire(workload.time, None)
+            write = workload.batch()
+            request = cluster.serve(Write(write, now=0.0))
+            met[compare(one, request, write, workload)] += 1
+            check(one, cluster)
+        check_reads(one, cluster, settings)
+    assert met["applied"] > BATCHES / 3
+    assert met["refused"] > BATCHES / 20
+
+
+def compare(one, request, write, workload):
+    """Apply the batch to one hull, and compare. Returns what came of it."""
+    refusal = None
+    try:
+        applied = one.apply(write, 0.0, None)
+    except Exception as error:
+        refusal = error
+    if refusal is not None:
+        assert request.error is not None, refusal
+        if not isinstance(refusal, LimitExceededError):  # it may break other rules, too, any of which may be named
+            assert (type(request.error), str(request.error)) == (type(refusal), str(refusal))
+        return "refused"
+    assert request.error is None, request.error
+    assert request.result == applied
+    workload.applied(write)
+    return "duplicate" if applied.duplicate else "applied"
+
+
+def check(one, cluster):
+    root = cluster.root
+    assert (root.revision, root.points, root.clock) == (one.counts.revision, one.counts.points, one.counts.clock)
+    assert root.cause == one.counts.cause
+    assert np.array_equal(root.hull.vertices(), one.vertices())
+    if root.distinct is not None:
+        assert root.distinct == one.counts.distinct
+    else:
+        assert root.vertex_keys() == one.vertex_keys().tolist()
+
+
+def check_reads(one, cluster, settings):
+    def read(question):
+        revision, answer = cluster.serve(Read(question)).result
+        assert revision == one.counts.revision
+        return answer
+
+    points = one.hull.points()
+    places = np.array([(x, y) for x in range(-9, 10) for y in range(-9, 10)], float)
+    assert np.array_equal(read(CountOf(places)), one.hull.count_many(places))
+    assert np.array_equal(read(SampleOf(1000)), points)
+    assert np.array_equal(read(SampleOf(5)), sample(points, 5) if len(points) > 5 else points)
+    assert read(StaticHull())
+    if settings.identity == "int":
+        keys = np.arange(100, dtype=np.uint64)
+        assert np.array_equal(read(PositionsOf(keys)), one.hull.positions(keys), equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [(HullSettings(frame="geographic"), "frame"), (HullSettings(window=Window(max_points=5)), "window.max_points")],
+)
+def test_what_cannot_be_divided_is_refused(settings, field):
+    with pytest.raises(ValueError, match=field):
+        Cluster(settings, LIMITS, 2)
