@@ -6,13 +6,15 @@ from collections import Counter
 import numpy as np
 import pytest
 from shards.memory_logs import Cluster
-from shards.workload import KINDS, LIMITS, Workload
+from shards.workload import KINDS, LIMITS, Workload, same_effect
 
 from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
 from dynhull_cluster.shards.root import Expire, Read, Write
-from dynhull_server.state.errors import LimitExceededError
+from dynhull_server.state.batch import NO_POINTS, KeyedBatch
+from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
+from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
-from dynhull_server.state.records import HullSettings, Kept, Window
+from dynhull_server.state.records import HullSettings, Kept, QuarantineRules, Window
 from dynhull_server.state.sample import sample
 
 BATCHES = 150
@@ -46,7 +48,7 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
 
 def compare(one, request, write, workload):
     """Apply the batch to one hull, and compare. Returns what came of it."""
-    refusal = None
+    refusal, before = None, one.vertices()
     try:
         applied = one.apply(write, 0.0, None)
     except Exception as error:
@@ -57,7 +59,7 @@ def compare(one, request, write, workload):
             assert (type(request.error), str(request.error)) == (type(refusal), str(refusal))
         return "refused"
     assert request.error is None, request.error
-    assert request.result == applied
+    assert same_effect(request.result, applied, before, one.vertices()), (request.result, applied)
     workload.applied(write)
     return "duplicate" if applied.duplicate else "applied"
 
@@ -92,8 +94,24 @@ def check_reads(one, cluster, settings):
 
 @pytest.mark.parametrize(
     ("settings", "field"),
-    [(HullSettings(frame="geographic"), "frame"), (HullSettings(window=Window(max_points=5)), "window.max_points")],
+    [
+        (HullSettings(frame="geographic"), "frame"),
+        (HullSettings(window=Window(max_points=5)), "window.max_points"),
+        (HullSettings("int", quarantine=QuarantineRules(max_growth=2.0)), "quarantine"),
+    ],
 )
 def test_what_cannot_be_divided_is_refused(settings, field):
     with pytest.raises(ValueError, match=field):
         Cluster(settings, LIMITS, 2)
+
+
+def test_a_batch_about_the_quarantine_is_refused():
+    no_keys = np.empty(0, np.uint64)
+    batch = KeyedBatch("int", no_keys, NO_POINTS, no_keys, drops=np.array([7], np.uint64))
+    write = WriteBatch(rows=1, make=lambda: batch)
+    write.name = "hull"
+    cluster = Cluster(HullSettings("int"), LIMITS, 2)
+    request = cluster.serve(Write(write, now=0.0))
+    assert isinstance(request.error, HullUnsuitableError)
+    assert "has shards, so it has no quarantine" in str(request.error)
+    assert cluster.root.revision == 0

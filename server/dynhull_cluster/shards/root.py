@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, assert_never
 import numpy as np
 
 from dynhull import DynamicHull, convex_hull
-from dynhull_server.state.batch import NO_POINTS, Applied, Batch
+from dynhull_server.state.batch import NO_POINTS, Applied, Batch, KeyedBatch
 from dynhull_server.state.contents import keyed, replayed
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError, MisfitError, RefusedError
 from dynhull_server.state.events import WriteBatch
@@ -105,6 +105,8 @@ class Root:
             raise ValueError("frame is geographic: the points of such a hull share one centre, so it has no shards")
         if settings.window is not None and settings.window.max_points:
             raise ValueError("window.max_points is set: no shard knows the oldest points of all, so use max_age")
+        if settings.quarantine is not None:
+            raise ValueError("quarantine is set: no shard knows the hull that its rules compare with")
         self._gate = replayed(Kept(), settings)  # admits batches as a hull does; has no points
         self._most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self._log = log
@@ -319,8 +321,11 @@ class Root:
     def _admitted(self, write: WriteBatch) -> tuple[Admitted, int | None]:
         """The batch as one hull admits it, and the clock that it leads to; or raise what refuses it."""
         self._gate.clock = self.clock
+        batch = write.make()
         try:
-            admitted: Admitted = self._gate.admit(write.make(), write.arrived)
+            if isinstance(batch, KeyedBatch) and batch.of_quarantine:
+                raise MisfitError(batch.field, "has shards, so it has no quarantine")
+            admitted: Admitted = self._gate.admit(batch, write.arrived)
         except MisfitError as misfit:
             raise HullUnsuitableError(write.name, str(misfit), field=f"batch.{misfit.field}") from None
         if isinstance(admitted, Batch):
