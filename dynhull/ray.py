@@ -19,6 +19,8 @@ __all__ = ["convex_hull"]
 
 PATH = "path"  # the column that Ray adds with `include_paths=True`
 VERTICES, PROBLEM = "vertices", "problem"
+# Rows whose coordinates are joined at a time: no cache holds those of a whole block.
+PIECE = 2**17
 # Vertices that are gathered before the next hull of hulls. It waits for as many as the hull has, where these are more,
 # so that all of them together take no longer than a few times the last one.
 GATHERED = 2**20
@@ -99,8 +101,8 @@ def _block_hull(block: "Table", columns: tuple[str, str]) -> "Table":
     import pyarrow as pa
 
     try:
-        hulls = [static_hull(_points(part, columns, path)) for path, part in _files(block)]
-        vertices, problem = hulls[0] if len(hulls) == 1 else static_hull(np.concatenate(hulls)), None
+        hulls = [_hull(part, columns, path) for path, part in _files(block)]
+        vertices, problem = static_hull(np.concatenate(hulls)), None
     except (TypeError, ValueError) as error:
         kind = TypeError if isinstance(error, TypeError) else ValueError
         vertices, problem = np.empty((0, 2)), f"{kind.__name__} {error}"
@@ -120,10 +122,16 @@ def _files(block: "Table") -> Iterator[tuple[str | None, "Table"]]:
         yield str(paths[start]), block.slice(start, end - start)
 
 
-def _points(block: "Table", columns: tuple[str, str], path: str | None) -> Points:
+def _hull(block: "Table", columns: tuple[str, str], path: str | None) -> Points:
     name = f"columns {columns[0]} and {columns[1]}, block of {len(block)} rows" + (f" of {path}" if path else "")
     for column in columns:
         if block[column].null_count:
             row = int(np.flatnonzero(block[column].is_null().to_numpy())[0])
             raise ValueError(f"{name}, row {row}: {column} is missing")
-    return as_points(block.select(columns).rename_columns(["x", "y"]), f"{name},")
+    points = block.select(columns).rename_columns(["x", "y"])
+    try:
+        hulls = [static_hull(piece) for piece in points.to_batches(max_chunksize=PIECE)]
+    except (TypeError, ValueError):
+        as_points(points, f"{name},")  # raises it again, and says where
+        raise
+    return static_hull(np.concatenate(hulls)) if hulls else np.empty((0, 2))
