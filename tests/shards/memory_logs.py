@@ -1,9 +1,10 @@
 """Logs in memory, and a cluster whose messages arrive at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from dynhull_cluster.shards.logs import Decision, FencedError
-from dynhull_cluster.shards.root import Request, Root
+from dynhull_cluster.shards.requests import Request
+from dynhull_cluster.shards.root import Root
 from dynhull_cluster.shards.shard import Shard
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings, Kept, Record
@@ -30,11 +31,11 @@ class MemoryRootLog:
         self.hook()
         return self.epoch, list(self.decisions)
 
-    def decide(self, epoch: int, decision: Decision) -> None:
+    def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
         if epoch != self.epoch:
             raise FencedError
         self.hook()
-        self.decisions.append(decision)
+        self.decisions += decisions
         self.hook()
 
 
@@ -51,16 +52,16 @@ class MemoryShardLog:
         self.steps = [(number, records) for number, records in self.steps if number <= decided]
         self.hook()
 
-    def add(self, number: int, records: list[Record]) -> None:
-        assert not self.steps or number > self.steps[-1][0]
+    def add(self, steps: Sequence[tuple[int, list[Record]]]) -> None:
+        numbers = [number for number, _ in (*self.steps[-1:], *steps)]
+        assert numbers == sorted(set(numbers))
         self.hook()
-        self.steps.append((number, records))
+        self.steps += steps
         self.hook()
 
     def drop(self, number: int) -> None:
         self.hook()
-        if self.steps and self.steps[-1][0] == number:
-            del self.steps[-1]
+        self.steps = [step for step in self.steps if step[0] < number]
         self.hook()
 
     def read(self) -> Kept:
@@ -91,8 +92,10 @@ class Cluster:
                 if reply is not None:
                     self.root.receive(shard, reply)
 
-    def serve(self, request: Request) -> Request:
-        self.root.submit(request)
+    def serve(self, *requests: Request) -> Request:
+        """Have requests answered, those that can be in one round. Returns the last one."""
+        for request in requests:
+            self.root.submit(request)
         self.deliver()
-        assert request.answered
-        return request
+        assert all(request.answered for request in requests)
+        return requests[-1]

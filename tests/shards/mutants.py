@@ -5,10 +5,13 @@ PYTHONPATH=tests python -m shards.mutants [NAME ...]
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from dynhull_cluster.shards.root import Root
 
 from .simulation import World
 
@@ -16,7 +19,7 @@ MOST_SCHEDULES = 2000
 
 # Name: the module, what stands there once, and what stands there instead.
 MUTANTS = {
-    "a shard replies before it has the step in its log": ("shard", "self._log.add(message.number, records)", "pass"),
+    "a shard replies before it has the step in its log": ("shard", "self._log.add(log)", "pass"),
     "an uncertain step stays after a root was lost": (
         "shard",
         "if contents is None or self._number > message.decided:",
@@ -36,12 +39,16 @@ MUTANTS = {
     "an undone step stays in the log": ("shard", "self._log.drop(message.number)", "pass"),
     "an undone step leaves its vertices": (
         "shard",
-        "self._number, self._corners, self._last = last.before, last.corners, None",
-        "self._number, self._last = last.before, None",
+        "self._number, self._corners = last.before, last.corners",
+        "self._number = last.before",
     ),
     "an undone step leaves its points": ("shard", "self._contents = last.inverse()", "pass"),
     "points leave before a batch that is refused": ("shard", "contents.check(part)", "pass"),
-    "a refused batch is not undone": ("root", "if reply.error is None]", "if False]"),
+    "a refused batch is not undone": (
+        "root",
+        "if any(each >= number and effect.error is None for each, effect in own.items())",
+        "if False",
+    ),
     "the root decides before all shards have the step": (
         "root",
         "if len(self._replies) == len(self._sent):",
@@ -59,30 +66,56 @@ MUTANTS = {
     ),
     "the root answers without a decision": (
         "root",
-        'self._log.decide(self._epoch, Decision(self._number + 1, revision, "batch", clock, *numbered))',
-        "pass",
+        "            self._log.decide(self._epoch, decisions)",
+        "            pass",
     ),
     "the root keeps no producers": ("root", "self._producers.applied(", "(lambda *_, **__: None)("),
-    "a request is forgotten where a shard restarts": ("root", "self._waiting.appendleft(self._current)", "pass"),
-    "a shard without rows keeps what is too old": (
+    "a request is forgotten where a shard restarts": (
         "root",
-        "concerned = range(len(self._totals)) if clock != self.clock else parts",
-        "concerned = parts",
+        "self._waiting.extendleft(reversed(self._current))",
+        "pass",
+    ),
+    "a shard without rows keeps what is too old": (
+        "planning",
+        "range(self._shards) if clock != self._clock else parts",
+        "parts",
     ),
     "vertices of what was too old stay": (
         "root",
-        "        self._take_changes(reply.left for reply in replies.values())\n        hull_changed",
-        "        hull_changed",
+        "        self._take_changes(effect.left for effect in effects.values())\n",
+        "",
     ),
     "a step that may be refused cannot be undone": (
-        "root",
-        "undoable = suspect or (refusable(admitted) and len(concerned) > 1)",
+        "planning",
+        "undoable = self._doubtful or suspect or (refusable(admitted) and len(shards) > 1)",
+        "undoable = suspect",
+    ),
+    "a step behind one that may be refused cannot be undone": (
+        "planning",
+        "undoable = self._doubtful or suspect",
         "undoable = suspect",
     ),
     "the limit on points is forgotten": (
-        "root",
-        "if grows and after > self._most_points else None",
+        "planning",
+        "if grows and after > most_points else None",
         "if False else None",
+    ),
+    "batches of a round are limited one by one": ("planning", "        self._points += most_growth(admitted)\n", ""),
+    "a batch joins a round with a number that is not the next one": (
+        "planning",
+        "if not last or write.sequence != last + 1 or write.after not in (None, last):",
+        "if not last:",
+    ),
+    "batches behind a refused one are decided": (
+        "root",
+        "self._decide(plans[:refused], effects)",
+        "self._decide(plans, effects)",
+    ),
+    "batches behind a refused one are forgotten": ("root", "self._waiting.extendleft(reversed(behind))", "pass"),
+    "batches behind a refused one change places": (
+        "root",
+        "self._waiting.extendleft(reversed(behind))",
+        "self._waiting.extendleft(behind)",
     ),
 }
 
@@ -104,9 +137,13 @@ def mutated(name: str) -> dict[str, Any]:
         sys.modules[original.__name__] = before
     if module == "shard":
         return {"shard_type": copy.Shard}
-    for shared in ("Write", "Expire", "Read", "Request"):  # the simulation's own requests
-        setattr(copy, shared, getattr(original, shared))
-    return {"root_type": copy.Root}
+    return {"root_type": copy.Root if module == "root" else partial(with_planner, copy.Planner)}
+
+
+def with_planner(planner: Any, settings: Any, limits: Any, shards: int, log: Any, now: float) -> Root:
+    root = Root(settings, limits, shards, log, now)
+    root._planner = planner(settings, root._most_points, root._producers, shards)
+    return root
 
 
 def found(name: str, schedules: int = MOST_SCHEDULES) -> tuple[int, str] | None:

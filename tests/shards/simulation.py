@@ -19,7 +19,7 @@ from dynhull_cluster.shards import root as root_module
 from dynhull_cluster.shards import shard as shard_module
 from dynhull_cluster.shards.logs import FencedError
 from dynhull_cluster.shards.messages import SampleOf, StaticHull
-from dynhull_cluster.shards.root import Expire, Read, Request, Write
+from dynhull_cluster.shards.requests import Expire, Read, Request, Write
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Kept
@@ -29,7 +29,7 @@ from .workload import KINDS, LIMITS, Workload, same_effect
 
 EVERYTHING = 10**6
 FEW_POINTS = replace(LIMITS, max_points=20)  # so that the limit is met
-STEPS, CLIENTS = 120, 2
+STEPS, CLIENTS, AT_A_TIME = 120, 2, 3
 # Steps without faults within which everything that waits is answered.
 PATIENCE = 400
 
@@ -58,13 +58,16 @@ class InFlight:
 
 
 class Client:
-    """Sends one numbered batch after the other, each again until it is answered."""
+    """Sends numbered batches, some at a time, and all of them again until they are answered."""
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.sequence = 0
-        self.write: WriteBatch | None = None
-        self.request: Write | None = None
+        self.sequence = 0  # of the last batch that was applied
+        self.waiting: list[Write] = []
+        self.refused = False  # so that those behind it are out of order
+
+    def may_send(self) -> bool:
+        return not self.waiting or not (self.refused or len(self.waiting) == AT_A_TIME)
 
 
 class World:
@@ -123,7 +126,7 @@ class World:
         self._check()
 
     def _waits(self) -> bool:
-        requests = [client.request for client in self._clients if client.request]
+        requests = [request for client in self._clients for request in client.waiting]
         return self._process is None or any(not each.answered for each in (*requests, *self._reads, *self._expiries))
 
     def _resume(self) -> None:
@@ -136,8 +139,9 @@ class World:
             self._process = RootProcess(root)
             self._reads, self._expiries = [], []
             for client in self._clients:
-                if client.write is not None:
-                    self._submit(client)
+                client.waiting = [Write(request.batch, now=0.0) for request in client.waiting]
+                for request in client.waiting:
+                    self._ask_root(request)
 
     def _ask(self) -> None:
         self._resume()
@@ -156,20 +160,18 @@ class World:
             self._ask_root(expiry)
         else:
             client = draw.choice(self._clients)
-            if client.write is None:
-                client.write = write = self._workload.batch()
-                write.producer, write.sequence = client.name, client.sequence + 1
-                self._submit(client)
-
-    def _submit(self, client: Client) -> None:
-        assert client.write is not None
-        client.request = Write(client.write, now=0.0)
-        self._batches[client.name, client.write.sequence] = client.write
-        self._ask_root(client.request)
+            if client.may_send():
+                client.refused = False
+                write = self._workload.batch()
+                write.producer, write.sequence = client.name, client.sequence + len(client.waiting) + 1
+                self._batches[client.name, write.sequence] = write
+                client.waiting.append(Write(write, now=0.0))
+                self._ask_root(client.waiting[-1])
 
     def _ask_root(self, request: Request) -> None:
         process = self._process
-        assert process is not None
+        if process is None:  # it died of the request before
+            return
         try:
             process.root.submit(request)
         except KilledError:
@@ -238,16 +240,16 @@ class World:
     def _hear(self) -> None:
         """Take note of what is answered, by whichever root."""
         for client in self._clients:
-            request, write = client.request, client.write
-            if request is None or write is None or not request.answered:
-                continue
-            client.request = client.write = None
-            if request.error is None:
-                client.sequence = write.sequence
-                self._acknowledged[client.name, write.sequence] = request.result
-                self._workload.applied(write)
-            else:  # its number is free again
-                self._refused.append((len(self._log.decisions), write, request.error))
+            answered = [request for request in client.waiting if request.answered]
+            client.waiting = [request for request in client.waiting if not request.answered]
+            for request in answered:
+                write = request.batch
+                if request.error is None:
+                    client.sequence = max(client.sequence, write.sequence)
+                    self._acknowledged[client.name, write.sequence] = request.result
+                else:  # its number is free again
+                    client.refused = True
+                    self._refused.append((len(self._log.decisions), write, request.error))
         for read in self._reads:
             if read.answered:
                 self._read.append((*read.result, read.question))

@@ -9,7 +9,7 @@ from shards.memory_logs import Cluster
 from shards.workload import KINDS, LIMITS, Workload, same_effect
 
 from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
-from dynhull_cluster.shards.root import Expire, Read, Write
+from dynhull_cluster.shards.requests import Expire, Read, Write
 from dynhull_server.state.batch import NO_POINTS, KeyedBatch
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
 from dynhull_server.state.events import WriteBatch
@@ -17,7 +17,7 @@ from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import HullSettings, Kept, QuarantineRules, Window
 from dynhull_server.state.sample import sample
 
-BATCHES = 150
+ROUNDS = 80
 
 
 @pytest.mark.parametrize("shards", [2, 5])
@@ -29,7 +29,7 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
         one = HullState(LIMITS, settings, Kept(), now=0.0)
         cluster = Cluster(settings, LIMITS, shards)
         workload, draw = Workload(settings, seed), random.Random(seed)
-        for _ in range(BATCHES):
+        for _ in range(ROUNDS):
             if draw.random() < 0.03:
                 cluster.restart_root()
             if draw.random() < 0.05:
@@ -37,20 +37,21 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
             if one.contents.clock is not None and one.contents.follows_server and draw.random() < 0.2:
                 workload.time += draw.choice((0, 10**6))
                 assert cluster.serve(Expire(workload.time)).result == one.expire(workload.time, None)
-            write = workload.batch()
-            request = cluster.serve(Write(write, now=0.0))
-            met[compare(one, request, write, workload)] += 1
+            requests = [Write(workload.batch(), now=0.0) for _ in range(draw.choice((1, 1, 2, 5)))]
+            cluster.serve(*requests)
+            for request in requests:
+                met[compare(one, request, workload)] += 1
             check(one, cluster)
         check_reads(one, cluster, settings)
-    assert met["applied"] > BATCHES / 3
-    assert met["refused"] > BATCHES / 20
+    assert met["applied"] > ROUNDS
+    assert met["refused"] > ROUNDS / 10
 
 
-def compare(one, request, write, workload):
+def compare(one, request, workload):
     """Apply the batch to one hull, and compare. Returns what came of it."""
     refusal, before = None, one.vertices()
     try:
-        applied = one.apply(write, 0.0, None)
+        applied = one.apply(request.batch, 0.0, None)
     except Exception as error:
         refusal = error
     if refusal is not None:
@@ -60,7 +61,7 @@ def compare(one, request, write, workload):
         return "refused"
     assert request.error is None, request.error
     assert same_effect(request.result, applied, before, one.vertices()), (request.result, applied)
-    workload.applied(write)
+    workload.applied(request.batch)
     return "duplicate" if applied.duplicate else "applied"
 
 

@@ -9,9 +9,11 @@ Messages may be lost, doubled or overtaken, and every process may die at any mom
 
 * The root sends one round of messages at a time, and sends them again until each is answered. A round has a ticket,
   which is never used again. A shard handles each ticket once, keeps its reply, and ignores what is older.
-* A shard has a step in its log before it replies; the root has its decision in its own log before it answers the
-  caller. What a shard has logged beyond the root's last decision did not happen.
-* A refused step is undone by its inverse where a shard has applied it, before the next step.
+* A round has the batches that wait, as steps. A shard has its steps in its log before it replies; the root has its
+  decisions in its own log before it answers the callers. What a shard has logged beyond the root's last decision did
+  not happen.
+* A refused step, and those behind it, are undone by their inverses where a shard has applied them, before the next
+  round, which has the batches behind the refused one again.
 * A root begins with an epoch that no root had before. So does it again when a shard has lost its memory: each shard
   goes back to the last decision, says which vertices it has, and ignores earlier epochs from then on, also after a
   restart.

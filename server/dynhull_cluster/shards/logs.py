@@ -1,5 +1,6 @@
 """What a root and its shards need of a log. A change is durable when the method returns."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -43,8 +44,8 @@ class RootLog(Protocol):
         A root that has an epoch names it. Raises FencedError where a later one has begun since.
         """
 
-    def decide(self, epoch: int, decision: Decision) -> None:
-        """Add a decision. Raises FencedError where a later epoch has begun."""
+    def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
+        """Add decisions, as one change. Raises FencedError where a later epoch has begun."""
 
 
 class ShardLog(Protocol):
@@ -55,13 +56,13 @@ class ShardLog(Protocol):
         """The last epoch that was begun, 0 before the first."""
 
     def begin(self, epoch: int, decided: int) -> None:
-        """Begin an epoch, and drop the steps after `decided`, as one change."""
+        """Begin an epoch, later than all before, and drop the steps after `decided`, as one change."""
 
-    def add(self, number: int, records: list[Record]) -> None:
-        """Add a step, later than all others; each record has its number as the revision."""
+    def add(self, steps: Sequence[tuple[int, list[Record]]]) -> None:
+        """Add steps, as one change: the number of each, later than all before, which is the revision of its records."""
 
     def drop(self, number: int) -> None:
-        """Drop the last step, if it has this number."""
+        """Drop the steps from this number on."""
 
     def read(self) -> Kept:
         """All points."""

@@ -33,8 +33,8 @@ class Open(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class Step(Message):
-    """Apply a part of a batch, after the points have left that leave at `clock`. The reply is Stepped.
+class Step:
+    """A part of a batch, to be applied after the points have left that leave at `clock`.
 
     Attributes:
         number: the number of the step.
@@ -50,8 +50,15 @@ class Step(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Apply(Message):
+    """Apply steps, in order, up to the first one that is refused. The steps before are decided. The reply is Done."""
+
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Undo(Message):
-    """Undo the last step, which another shard has refused. The reply is Undone."""
+    """Undo the steps from `number` on, the first of which another shard has refused. The reply is Undone."""
 
     number: int
 
@@ -143,18 +150,20 @@ class Opened(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class Stepped(Message):
+class Effect:
     """What a step did.
 
     Attributes:
+        number: the number of the step.
         totals: the counts after it.
         expired: the number of points that left before the part.
-        left: how the vertices changed then; None where no point left.
+        left: how the vertices changed then; None where they did not.
         applied: the effect of the part; None where it is refused or there was no part.
         changed: how the vertices changed then; None where they did not.
         error: why the part is refused, which has changed nothing; None if it is not.
     """
 
+    number: int
     totals: Totals
     expired: int = 0
     left: Change | None = None
@@ -164,8 +173,15 @@ class Stepped(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Done(Message):
+    """What the steps did; the last one is refused if it has an error, and those behind it have not begun."""
+
+    effects: tuple[Effect, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Undone(Message):
-    """The step is undone, and no longer in the log."""
+    """The steps are undone, and no longer in the log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,5 +196,5 @@ class Closed(Message):
     """The shard has lost its memory since this epoch began, or never knew it: it needs an Open of a later one."""
 
 
-Request = Open | Step | Undo | Ask
-Reply = Opened | Stepped | Undone | Answered | Closed
+Request = Open | Apply | Undo | Ask
+Reply = Opened | Done | Undone | Answered | Closed

@@ -1,31 +1,31 @@
 """The root: the only writer of a hull over shards, and the hull of the vertices of all shards."""
 
 from collections import deque
-from collections.abc import Generator, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, assert_never
 
 import numpy as np
 
 from dynhull import DynamicHull, convex_hull
-from dynhull_server.state.batch import NO_POINTS, Applied, Batch, KeyedBatch
-from dynhull_server.state.contents import keyed, replayed
-from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError, MisfitError, RefusedError
-from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.batch import NO_POINTS, Applied
+from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.producers import Producers
-from dynhull_server.state.records import HullSettings, Kept
+from dynhull_server.state.records import HullSettings
 from dynhull_server.state.sample import sample
 
 from . import messages as say
 from .logs import Decision, RootLog
 from .messages import Corners, Totals
-from .parts import Admitted, Part, divided, first_refusal, merged, most_growth, refusable, refuse_repeated
+from .parts import merged
+from .planning import Plan, Planner
+from .requests import Expire, Read, Request, Write
 
 if TYPE_CHECKING:
     from dynhull_server.state.hull_state import Cause
 
 Round = dict[int, say.Request]
+Effects = Mapping[int, say.Effect]
 Replies = dict[int, Any]
 Talk = Generator[Round, Any, Any]
 Names = dict[tuple[float, float], list[Any]]
@@ -33,51 +33,6 @@ Names = dict[tuple[float, float], list[Any]]
 
 class ShardsDifferError(Exception):
     """Shards have other vertices than they reported: data on a disk or in memory are damaged."""
-
-
-@dataclass(slots=True, eq=False)
-class Request:
-    """A request of a caller.
-
-    Attributes:
-        answered: whether it is answered.
-        result: the result, once it is.
-        error: the reason of a refusal, once it is; None where it was not refused.
-    """
-
-    answered: bool = field(default=False, init=False)
-    result: Any = field(default=None, init=False)
-    error: Exception | None = field(default=None, init=False)
-
-
-@dataclass(slots=True, eq=False)
-class Write(Request):
-    """Apply a batch that arrived at `now`, seconds on a monotonic clock. The result is an Applied."""
-
-    batch: WriteBatch
-    now: float
-
-
-@dataclass(slots=True, eq=False)
-class Expire(Request):
-    """Make the points leave that leave at `clock`. The result is their number."""
-
-    clock: int
-
-
-@dataclass(slots=True, eq=False)
-class Read(Request):
-    """A question about all points. The result is the revision, and the answer; for StaticHull, whether it is equal."""
-
-    question: say.Question
-
-
-class _RefusedBatchError(Exception):
-    """A batch is refused for this reason, which is the answer to the caller."""
-
-    def __init__(self, reason: Exception) -> None:
-        super().__init__(reason)
-        self.reason = reason
 
 
 class Root:
@@ -107,13 +62,14 @@ class Root:
             raise ValueError("window.max_points is set: no shard knows the oldest points of all, so use max_age")
         if settings.quarantine is not None:
             raise ValueError("quarantine is set: no shard knows the hull that its rules compare with")
-        self._gate = replayed(Kept(), settings)  # admits batches as a hull does; has no points
+        self._keyed = settings.identity != "multiset"
         self._most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self._log = log
         self._epoch, decisions = log.begin(None)
         last = {each.producer: each.sequence for each in decisions if each.producer}
         skipping = {each.producer for each in decisions if each.may_skip}
         self._producers = Producers(limits.max_producers, limits.max_producers_per_caller, last, skipping, now)
+        self._planner = Planner(settings, self._most_points, self._producers, shards)
         self._number, self.revision = (decisions[-1].number, decisions[-1].revision) if decisions else (0, 0)
         self.cause: Cause | None = decisions[-1].cause if decisions else None
         self.clock: int | None = decisions[-1].clock if decisions else None
@@ -121,7 +77,7 @@ class Root:
         self._names: Names = {}  # the key of each shard that has this vertex
         self._totals = [Totals(0, 0, None)] * shards
         self._waiting: deque[Request] = deque()
-        self._current: Request | None = None
+        self._current: list[Request] = []
         self._ticket = 0
         self._talk: Talk | None = self._open()
         self._sent: Round = {}
@@ -159,10 +115,9 @@ class Root:
             self._go_on(self._talk, self._replies)
 
     def _begin_again(self) -> None:
-        """Open all shards in a new epoch, and serve the current request anew: it has decided nothing."""
-        if self._current is not None:
-            self._waiting.appendleft(self._current)
-            self._current = None
+        """Open all shards in a new epoch, and serve the current requests anew: nothing is decided about them."""
+        self._waiting.extendleft(reversed(self._current))
+        self._current = []
         self._epoch, _ = self._log.begin(self._epoch)
         self._ticket = 0
         self._go_on(self._open(), None)
@@ -185,22 +140,20 @@ class Root:
     def _next(self) -> Talk | None:
         if not self._waiting:
             return None
-        self._current = self._waiting.popleft()
-        return self._serve(self._current)
+        request = self._waiting.popleft()
+        self._current = [request]
+        match request:
+            case Write():
+                return self._write(request)
+            case Expire():
+                return self._expire(request)
+            case Read():
+                return self._read(request)
+        raise AssertionError(f"not a request: {request}")
 
-    def _serve(self, request: Request) -> Talk:
-        try:
-            match request:
-                case Write():
-                    request.result = yield from self._write(request.batch, request.now)
-                case Expire():
-                    request.result = yield from self._expire(request.clock)
-                case Read():
-                    request.result = yield from self._read(request.question)
-        except _RefusedBatchError as refusal:
-            request.error = refusal.reason
-        request.answered = True
-        self._current = None
+    def _answer(self, request: Request, result: Any = None, error: Exception | None = None) -> None:
+        self._current.remove(request)
+        request.answer(result, error)
 
     # Reads
 
@@ -212,7 +165,7 @@ class Root:
     @property
     def distinct(self) -> int | None:
         """The number of different points; None with keys, where several shards may have points at one place."""
-        if isinstance(self._gate, keyed.Keyed):
+        if self._keyed:
             return None
         return sum(each.distinct for each in self._totals)
 
@@ -226,11 +179,11 @@ class Root:
         assert self.hull is not None  # asked once it is open
         return [min(self._names[x, y]) for x, y in self.hull.vertices().tolist()]
 
-    def _read(self, question: say.Question) -> Talk:
+    def _read(self, request: Read) -> Talk:
         everywhere = range(len(self._totals))
-        replies = yield {shard: say.Ask(self._epoch, self._ticket, question) for shard in everywhere}
+        replies = yield dict.fromkeys(everywhere, say.Ask(self._epoch, self._ticket, request.question))
         answers = [replies[shard].answer for shard in everywhere]
-        return self.revision, self._composed(question, answers)
+        self._answer(request, (self.revision, self._composed(request.question, answers)))
 
     def _composed(self, question: say.Question, answers: Sequence[Any]) -> Any:
         match question:
@@ -263,98 +216,105 @@ class Root:
             raise ShardsDifferError("shards have other vertices after a restart than before")
         self.hull, self._names = hull, names
 
-    def _write(self, write: WriteBatch, now: float) -> Talk:
+    def _write(self, first: Write) -> Talk:
         try:
-            if not self._is_new(write, now):
-                return Applied(self.revision, 0, 0, 0, False, self.points, duplicate=True, clock=self.clock)
-            admitted, clock = self._admitted(write)
+            plan = self._planner.begin(first, self._number, self.points, self.clock)
         except Exception as error:  # any error is the answer to the caller
-            raise _RefusedBatchError(error) from error
-        parts = divided(admitted, len(self._totals))
-        concerned = range(len(self._totals)) if clock != self.clock else parts
-        suspect = self.points + most_growth(admitted) > self._most_points
-        undoable = suspect or (refusable(admitted) and len(concerned) > 1)
-        header = self._epoch, self._ticket, self._number + 1
-        replies = yield {
-            shard: say.Step(*header, parts[shard].admitted if shard in parts else None, clock, undoable)
-            for shard in concerned
-        }
-        reason = self._reason_to_refuse(admitted, parts, replies)
+            self._answer(first, error=error)
+            return
+        if plan is None:
+            applied = Applied(self.revision, 0, 0, 0, False, self.points, duplicate=True, clock=self.clock)
+            self._answer(first, applied)
+            return
+        plans = [plan, *self._joining()]
+        steps: dict[int, list[say.Step]] = {}
+        for plan in plans:
+            for shard in plan.shards:
+                steps.setdefault(shard, []).append(plan.step(shard))
+        replies = yield {shard: say.Apply(self._epoch, self._ticket, tuple(each)) for shard, each in steps.items()}
+        by_shard = {shard: {each.number: each for each in reply.effects} for shard, reply in replies.items()}
+        effects = [{shard: own[plan.number] for shard, own in by_shard.items() if plan.number in own} for plan in plans]
+        refused, reason = self._first_refused(plans, effects)
+        self._decide(plans[:refused], effects)
         if reason is not None:
-            stepped = [shard for shard, reply in replies.items() if reply.error is None]
-            yield {shard: say.Undo(self._epoch, self._ticket, self._number + 1) for shard in stepped}
-            raise _RefusedBatchError(reason)
-        expired = sum(reply.expired for reply in replies.values())
-        revision = self.revision + (2 if expired else 1)
-        numbered = write.producer, write.sequence, write.may_skip
-        self._log.decide(self._epoch, Decision(self._number + 1, revision, "batch", clock, *numbered))
-        self._number, self.revision, self.cause, self.clock = self._number + 1, revision, "batch", clock
-        if write.producer:
-            self._producers.applied(write.producer, write.sequence, write.owner, now, may_skip=write.may_skip)
-        self._take_totals(replies)
-        self._take_changes(reply.left for reply in replies.values())
-        hull_changed = self._take_changes(reply.changed for reply in replies.values())
-        effects = [reply.applied for reply in replies.values() if reply.applied is not None]
-        applied = merged(admitted, effects, revision, hull_changed=hull_changed, points=self.points)
-        applied.expired = expired
-        return applied
+            request, number = plans[refused].request, plans[refused].number
+            behind = [plan.request for plan in plans[refused + 1 :]]
+            self._current = [request]
+            self._waiting.extendleft(reversed(behind))
+            undo = say.Undo(self._epoch, self._ticket, number)
+            yield {
+                shard: undo
+                for shard, own in by_shard.items()
+                if any(each >= number and effect.error is None for each, effect in own.items())
+            }
+            self._answer(request, error=reason)
 
-    def _expire(self, clock: int) -> Talk:
-        clock = clock if self.clock is None else max(clock, self.clock)
-        step = say.Step(self._epoch, self._ticket, self._number + 1, None, clock, undoable=False)
-        replies = yield dict.fromkeys(range(len(self._totals)), step)
-        expired = sum(reply.expired for reply in replies.values())
+    def _joining(self) -> Iterator[Plan]:
+        """The plans of the batches behind the first one that make the round with it."""
+        while self._waiting and isinstance(self._waiting[0], Write):
+            plan = self._planner.join(self._waiting[0])
+            if plan is None:
+                return
+            self._current.append(self._waiting.popleft())
+            yield plan
+
+    def _first_refused(self, plans: Sequence[Plan], effects: Sequence[Effects]) -> tuple[int, RefusedError | None]:
+        """The place of the first batch that is refused, or the number of batches; and the reason."""
+        points, totals = self.points, list(self._totals)
+        for place, (plan, own) in enumerate(zip(plans, effects, strict=True)):
+            reason = plan.reason_to_refuse(own, points, self._most_points)
+            if reason is not None:
+                return place, reason
+            for shard, effect in own.items():
+                points += effect.totals.points - totals[shard].points
+                totals[shard] = effect.totals
+        return len(plans), None
+
+    def _decide(self, plans: Sequence[Plan], effects: Sequence[Effects]) -> None:
+        """Decide that batches are applied, and answer them."""
+        decisions: list[Decision] = []
+        revision = self.revision
+        for plan, own in zip(plans, effects, strict=False):
+            revision += 2 if any(effect.expired for effect in own.values()) else 1
+            write = plan.request.batch
+            numbered = write.producer, write.sequence, write.may_skip
+            decisions.append(Decision(plan.number, revision, "batch", plan.clock, *numbered))
+        if decisions:
+            self._log.decide(self._epoch, decisions)
+        for plan, own, decision in zip(plans, effects, decisions, strict=False):
+            write = plan.request.batch
+            if write.producer:
+                number = write.producer, write.sequence, write.owner
+                self._producers.applied(*number, plan.request.now, may_skip=write.may_skip)
+            hull_changed = self._follow(decision, own)
+            applied = [effect.applied for effect in own.values() if effect.applied is not None]
+            revision, points = decision.revision, self.points
+            result = merged(plan.admitted, applied, revision, hull_changed=hull_changed, points=points)
+            result.expired = sum(effect.expired for effect in own.values())
+            self._answer(plan.request, result)
+
+    def _expire(self, request: Expire) -> Talk:
+        clock = request.clock if self.clock is None else max(request.clock, self.clock)
+        number = self._number + 1
+        step = say.Step(number, None, clock, undoable=False)
+        everywhere = range(len(self._totals))
+        replies = yield dict.fromkeys(everywhere, say.Apply(self._epoch, self._ticket, (step,)))
+        effects = {shard: replies[shard].effects[0] for shard in everywhere}
+        expired = sum(effect.expired for effect in effects.values())
         if expired:
-            decision = Decision(self._number + 1, self.revision + 1, "expiry", clock)
-            self._log.decide(self._epoch, decision)
-            self._number, self.revision, self.cause, self.clock = decision.number, decision.revision, "expiry", clock
-            self._take_totals(replies)
-            self._take_changes(reply.left for reply in replies.values())
-        return expired
+            decision = Decision(number, self.revision + 1, "expiry", clock)
+            self._log.decide(self._epoch, [decision])
+            self._follow(decision, effects)
+        self._answer(request, expired)
 
-    def _is_new(self, write: WriteBatch, now: float) -> bool:
-        """Whether a batch is the next one of its producer, or not numbered; or raise what refuses it."""
-        return not write.producer or self._producers.is_new(
-            write.producer, write.sequence, write.owner, now, may_skip=write.may_skip, after=write.after
-        )
-
-    def _admitted(self, write: WriteBatch) -> tuple[Admitted, int | None]:
-        """The batch as one hull admits it, and the clock that it leads to; or raise what refuses it."""
-        self._gate.clock = self.clock
-        batch = write.make()
-        try:
-            if isinstance(batch, KeyedBatch) and batch.of_quarantine:
-                raise MisfitError(batch.field, "has shards, so it has no quarantine")
-            admitted: Admitted = self._gate.admit(batch, write.arrived)
-        except MisfitError as misfit:
-            raise HullUnsuitableError(write.name, str(misfit), field=f"batch.{misfit.field}") from None
-        if isinstance(admitted, Batch):
-            if self.points + admitted.growth > self._most_points:
-                raise LimitExceededError("max_points", self._most_points)
-            return admitted, None
-        if isinstance(admitted, keyed.Admitted):
-            refuse_repeated(admitted.rows)
-        return admitted, admitted.clock
-
-    def _reason_to_refuse(self, admitted: Admitted, parts: Mapping[int, Part], replies: Replies) -> RefusedError | None:
-        """Why a batch is refused, if it is: by a shard, or because of the limit on points."""
-        refusals = [(parts[shard], reply.error) for shard, reply in replies.items() if reply.error is not None]
-        if refusals:
-            return first_refusal(admitted, refusals)
-        after = self.points - sum(reply.expired for reply in replies.values())
-        if isinstance(admitted, keyed.Admitted):
-            effects = [reply.applied for reply in replies.values() if reply.applied is not None]
-            new = sum(each.inserted for each in effects)
-            after += new - sum(each.deleted for each in effects)
-            grows = new > 0 and admitted.rows.condition != "present"
-        else:
-            after += most_growth(admitted)
-            grows = True
-        return LimitExceededError("max_points", self._most_points) if grows and after > self._most_points else None
-
-    def _take_totals(self, replies: Replies) -> None:
-        for shard, reply in replies.items():
-            self._totals[shard] = reply.totals
+    def _follow(self, decision: Decision, effects: Effects) -> bool:
+        """Bring the hull to what was decided. Returns whether it has changed after points had left because of age."""
+        self._number, self.revision = decision.number, decision.revision
+        self.cause, self.clock = decision.cause, decision.clock
+        for shard, effect in effects.items():
+            self._totals[shard] = effect.totals
+        self._take_changes(effect.left for effect in effects.values())
+        return self._take_changes(effect.changed for effect in effects.values())
 
     def _take_changes(self, changes: Iterable[say.Change | None]) -> bool:
         """Bring the hull to what the shards have. Returns whether it has changed."""

@@ -21,11 +21,14 @@ from .inverse import Inverse, inverse_of
 from .logs import ShardLog
 from .messages import (
     Answered,
+    Apply,
     Ask,
     Change,
     Closed,
     Corners,
     CountOf,
+    Done,
+    Effect,
     Open,
     Opened,
     PositionsOf,
@@ -35,7 +38,6 @@ from .messages import (
     SampleOf,
     StaticHull,
     Step,
-    Stepped,
     Totals,
     Undo,
     Undone,
@@ -45,8 +47,8 @@ Rows = npt.NDArray[np.bool_]
 
 
 @dataclass(slots=True)
-class _Last:
-    """The last step, which another shard may refuse.
+class _Uncertain:
+    """A step that the root may undo.
 
     Attributes:
         number: its number.
@@ -76,7 +78,7 @@ class Shard:
         self._epoch = self._ticket = 0
         self._reply: Reply | None = None
         self._number = 0
-        self._last: _Last | None = None
+        self._uncertain: list[_Uncertain] = []
         self._corners = Corners(NO_POINTS, None)
         self._corners_as_of = -1
 
@@ -101,8 +103,8 @@ class Shard:
         match message:
             case Open():
                 return self._open(message)
-            case Step():
-                return self._step(message)
+            case Apply():
+                return self._apply(message)
             case Undo():
                 return self._undo(message)
             case Ask():
@@ -115,42 +117,55 @@ class Shard:
         if contents is None or self._number > message.decided:
             kept = self._log.read()
             contents, self._number = replayed(kept, self._settings), kept.last_revision
-        self._contents, self._last = contents, None
+        self._contents, self._uncertain = contents, []
         self._corners, self._corners_as_of = _corners(contents), contents.hull.changes
         return Opened(message.epoch, message.ticket, _totals(contents), self._corners)
 
-    def _step(self, message: Step) -> Stepped:
-        contents, part, before = self._opened, message.part, self._corners
-        inverse = inverse_of(part, contents, self._settings) if message.undoable else None
-        records: list[Record] = []
+    def _apply(self, message: Apply) -> Done:
+        self._uncertain = []
+        effects: list[Effect] = []
+        log: list[tuple[int, list[Record]]] = []
+        for step in message.steps:
+            records: list[Record] = []
+            effects.append(self._step(step, records))
+            if effects[-1].error is not None:
+                break
+            if records:
+                log.append((step.number, records))
+        if log:
+            self._log.add(log)
+        return Done(message.epoch, message.ticket, tuple(effects))
+
+    def _step(self, step: Step, records: list[Record]) -> Effect:
+        contents, part, before = self._opened, step.part, self._corners
+        inverse = inverse_of(part, contents, self._settings) if step.undoable else None
         expired, applied, left, changed = 0, None, None, None
         try:
-            if message.clock is not None:
+            if step.clock is not None:
                 if part is not None:
                     contents.check(part)  # a refused batch makes no points leave
-                expiry = contents.expire(message.clock)
+                expiry = contents.expire(step.clock)
                 if expiry is not None:
                     expired, left = expiry.points, self._follow(contents)
-                    records.append(Record(message.number, expiry, clock=contents.clock))
+                    records.append(Record(step.number, expiry, clock=contents.clock))
             if part is not None:
-                applied = contents.apply(part, message.number)
+                applied = contents.apply(part, step.number)
                 changed = self._follow(contents)
-                records.append(Record(message.number, contents.rows(part, applied), clock=contents.clock))
+                records.append(Record(step.number, contents.rows(part, applied), clock=contents.clock))
         except RefusedError as error:
-            return Stepped(message.epoch, message.ticket, _totals(contents), error=error)
+            return Effect(step.number, _totals(contents), error=error)
         if records:
-            self._log.add(message.number, records)
-            self._last = _Last(message.number, self._number, before, inverse)
-            self._number = message.number
-        return Stepped(message.epoch, message.ticket, _totals(contents), expired, left, applied, changed)
+            self._uncertain.append(_Uncertain(step.number, self._number, before, inverse))
+            self._number = step.number
+        return Effect(step.number, _totals(contents), expired, left, applied, changed)
 
     def _undo(self, message: Undo) -> Undone:
-        last = self._last
-        if last is not None and last.number == message.number:
+        self._log.drop(message.number)
+        while self._uncertain and self._uncertain[-1].number >= message.number:
+            last = self._uncertain.pop()
             assert last.inverse is not None  # the root undoes what it has called undoable
-            self._log.drop(message.number)
             self._contents = last.inverse()
-            self._number, self._corners, self._last = last.before, last.corners, None
+            self._number, self._corners = last.before, last.corners
             self._corners_as_of = self._contents.hull.changes
         return Undone(message.epoch, message.ticket)
 

@@ -1,0 +1,49 @@
+"""What callers ask of a hull over shards."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from dynhull_server.state.events import WriteBatch
+
+from .messages import Question
+
+
+@dataclass(slots=True, eq=False)
+class Request:
+    """A request of a caller.
+
+    Attributes:
+        answered: whether it is answered.
+        result: the result, once it is.
+        error: the reason of a refusal, once it is; None where it was not refused.
+    """
+
+    answered: bool = field(default=False, init=False)
+    result: Any = field(default=None, init=False)
+    error: Exception | None = field(default=None, init=False)
+
+    def answer(self, result: Any = None, error: Exception | None = None) -> None:
+        """Answer it."""
+        self.result, self.error, self.answered = result, error, True
+
+
+@dataclass(slots=True, eq=False)
+class Write(Request):
+    """Apply a batch that arrived at `now`, seconds on a monotonic clock. The result is an Applied."""
+
+    batch: WriteBatch
+    now: float
+
+
+@dataclass(slots=True, eq=False)
+class Expire(Request):
+    """Make the points leave that leave at `clock`. The result is their number."""
+
+    clock: int
+
+
+@dataclass(slots=True, eq=False)
+class Read(Request):
+    """A question about all points. The result is the revision, and the answer; for StaticHull, whether it is equal."""
+
+    question: Question
