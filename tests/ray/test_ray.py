@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE
 
+pytestmark = pytest.mark.long
+
 CASES = os.environ.get("RAY_CASES", "few")
 PROBLEMS = {
     "file": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),

@@ -73,17 +73,17 @@ class Cluster:
 
     def __init__(self, settings: HullSettings, limits: Limits, count: int) -> None:
         self._settings, self._limits = settings, limits
-        self._logs = [MemoryShardLog() for _ in range(count)]
+        self.shard_logs = [MemoryShardLog() for _ in range(count)]
         self._log = MemoryRootLog()
-        self.shards = [Shard(settings, log) for log in self._logs]
+        self.shards = [Shard(settings, log) for log in self.shard_logs]
         self.restart_root()
 
     def restart_root(self) -> None:
-        self.root = Root(self._settings, self._limits, len(self._logs), self._log, now=0.0)
+        self.root = Root(self._settings, self._limits, len(self.shard_logs), self._log, now=0.0)
         self.deliver()
 
     def restart_shard(self, shard: int) -> None:
-        self.shards[shard] = Shard(self._settings, self._logs[shard])
+        self.shards[shard] = Shard(self._settings, self.shard_logs[shard])
 
     def deliver(self) -> None:
         while messages := self.root.messages():

@@ -116,3 +116,8 @@ def test_a_batch_about_the_quarantine_is_refused():
     assert isinstance(request.error, HullUnsuitableError)
     assert "has shards, so it has no quarantine" in str(request.error)
     assert cluster.root.revision == 0
+
+
+def test_points_without_keys_have_no_positions_of_keys():
+    with pytest.raises(ValueError, match="positions of keys"):
+        Cluster(HullSettings(), LIMITS, 2).serve(Read(PositionsOf(np.arange(3, dtype=np.uint64))))

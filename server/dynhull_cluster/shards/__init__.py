@@ -15,6 +15,6 @@ Messages may be lost, doubled or overtaken, and every process may die at any mom
 * A refused step, and those behind it, are undone by their inverses where a shard has applied them, before the next
   round, which has the batches behind the refused one again.
 * A root begins with an epoch that no root had before. So does it again when a shard has lost its memory: each shard
-  goes back to the last decision, says which vertices it has, and ignores earlier epochs from then on, also after a
-  restart.
+  goes back to the last decision, says which step and which vertices it has, and ignores earlier epochs from then on,
+  also after a restart. If these are not those that were decided, its log is damaged, and the root stops.
 """

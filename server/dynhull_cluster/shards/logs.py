@@ -17,6 +17,7 @@ class Decision:
         revision: the revision of the hull after it.
         cause: what made this revision.
         clock: the clock of the hull after it, None for a hull without a clock.
+        shards: the shards that have it in their logs.
         producer: the producer that numbered the batch; empty where it has no number.
         sequence: its number.
         may_skip: whether numbers of the producer may be skipped.
@@ -26,6 +27,7 @@ class Decision:
     revision: int
     cause: Cause
     clock: int | None
+    shards: frozenset[int]
     producer: str = ""
     sequence: int = 0
     may_skip: bool = False

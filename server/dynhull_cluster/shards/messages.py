@@ -143,8 +143,9 @@ class Totals:
 
 @dataclass(frozen=True, slots=True)
 class Opened(Message):
-    """The shard is at the root's last decision: its counts and all of its vertices."""
+    """The shard is at the root's last decision: the last step in its log, its counts, and all of its vertices."""
 
+    number: int
     totals: Totals
     corners: Corners
 
@@ -170,6 +171,11 @@ class Effect:
     applied: Applied | None = None
     changed: Change | None = None
     error: RefusedError | None = None
+
+    @property
+    def logged(self) -> bool:
+        """Whether the step has changed the shard, and is in its log."""
+        return self.applied is not None or self.expired > 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,9 +30,11 @@ Replies = dict[int, Any]
 Talk = Generator[Round, Any, Any]
 Names = dict[tuple[float, float], list[Any]]
 
+NOTHING = Corners(NO_POINTS, None)
+
 
 class ShardsDifferError(Exception):
-    """Shards have other vertices than they reported: data on a disk or in memory are damaged."""
+    """A shard has not what was decided: data on a disk or in memory are damaged."""
 
 
 class Root:
@@ -76,6 +78,10 @@ class Root:
         self.hull: DynamicHull | None = None
         self._names: Names = {}  # the key of each shard that has this vertex
         self._totals = [Totals(0, 0, None)] * shards
+        self._numbers = [0] * shards  # the last step in the log of each
+        for decision in decisions:
+            for shard in decision.shards:
+                self._numbers[shard] = decision.number
         self._waiting: deque[Request] = deque()
         self._current: list[Request] = []
         self._ticket = 0
@@ -87,7 +93,13 @@ class Root:
     # Requests and messages
 
     def submit(self, request: Request) -> None:
-        """Serve the request after those before it."""
+        """Serve the request after those before it.
+
+        Raises:
+            ValueError: it asks for the positions of keys, and the hull has none.
+        """
+        if isinstance(request, Read) and isinstance(request.question, say.PositionsOf) and not self._keyed:
+            raise ValueError("question asks for the positions of keys, and the points of this hull have none")
         self._waiting.append(request)
         if self._talk is None:
             self._go_on(self._next(), None)
@@ -208,6 +220,9 @@ class Root:
         hull = DynamicHull()
         names: Names = {}
         for shard in everywhere:
+            if replies[shard].number != self._numbers[shard]:
+                steps = f"is at step {replies[shard].number}, not {self._numbers[shard]}"
+                raise ShardsDifferError(f"shard {shard} {steps}: its log has lost steps, or is that of another hull")
             self._totals[shard] = replies[shard].totals
             _take(hull, names, [say.Change(NOTHING, replies[shard].corners)])
         if self.hull is not None and not (
@@ -278,7 +293,7 @@ class Root:
             revision += 2 if any(effect.expired for effect in own.values()) else 1
             write = plan.request.batch
             numbered = write.producer, write.sequence, write.may_skip
-            decisions.append(Decision(plan.number, revision, "batch", plan.clock, *numbered))
+            decisions.append(Decision(plan.number, revision, "batch", plan.clock, _logged(own), *numbered))
         if decisions:
             self._log.decide(self._epoch, decisions)
         for plan, own, decision in zip(plans, effects, decisions, strict=False):
@@ -302,7 +317,7 @@ class Root:
         effects = {shard: replies[shard].effects[0] for shard in everywhere}
         expired = sum(effect.expired for effect in effects.values())
         if expired:
-            decision = Decision(number, self.revision + 1, "expiry", clock)
+            decision = Decision(number, self.revision + 1, "expiry", clock, _logged(effects))
             self._log.decide(self._epoch, [decision])
             self._follow(decision, effects)
         self._answer(request, expired)
@@ -313,6 +328,8 @@ class Root:
         self.cause, self.clock = decision.cause, decision.clock
         for shard, effect in effects.items():
             self._totals[shard] = effect.totals
+        for shard in decision.shards:
+            self._numbers[shard] = decision.number
         self._take_changes(effect.left for effect in effects.values())
         return self._take_changes(effect.changed for effect in effects.values())
 
@@ -324,7 +341,8 @@ class Root:
         return self.hull.changes != before
 
 
-NOTHING = Corners(NO_POINTS, None)
+def _logged(effects: Effects) -> frozenset[int]:
+    return frozenset(shard for shard, effect in effects.items() if effect.logged)
 
 
 def _take(hull: DynamicHull, names: Names, changes: Sequence[say.Change]) -> None:

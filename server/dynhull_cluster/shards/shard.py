@@ -119,7 +119,7 @@ class Shard:
             contents, self._number = replayed(kept, self._settings), kept.last_revision
         self._contents, self._uncertain = contents, []
         self._corners, self._corners_as_of = _corners(contents), contents.hull.changes
-        return Opened(message.epoch, message.ticket, _totals(contents), self._corners)
+        return Opened(message.epoch, message.ticket, self._number, _totals(contents), self._corners)
 
     def _apply(self, message: Apply) -> Done:
         self._uncertain = []
@@ -171,10 +171,10 @@ class Shard:
 
     def _follow(self, contents: LiveContents) -> Change | None:
         """How the vertices have changed since this was last called. O(1) where they have not and have no keys."""
-        before, self._corners_as_of, as_of = self._corners, contents.hull.changes, self._corners_as_of
-        if not isinstance(contents, Keyed) and self._corners_as_of == as_of:
+        if not isinstance(contents, Keyed) and contents.hull.changes == self._corners_as_of:
             return None
-        self._corners = _corners(contents)
+        before, self._corners = self._corners, _corners(contents)
+        self._corners_as_of = contents.hull.changes
         return _difference(before, self._corners)
 
     def _answer(self, question: Question) -> Any:
@@ -186,7 +186,7 @@ class Shard:
             case CountOf(points):
                 return contents.hull.count_many(points)
             case PositionsOf(keys):
-                assert isinstance(contents, Keyed)  # the root asks no others
+                assert isinstance(contents, Keyed)  # the root has checked it
                 return contents.find(keys).points
             case StaticHull():
                 return convex_hull(contents.hull.points())
