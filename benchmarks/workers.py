@@ -3,9 +3,9 @@
 Server and clients share the cores; the shapes take turns, and the figures are medians of rounds. h2load (Debian's
 nghttp2-client) makes unary calls of Locate, of one point, over 16 connections: the system deals connections to gateways
 at random, so four of them would often all be at one. The limit is that of handlers that do nothing, in one and in two
-processes. The processor time of a call is that of all processes of a server. Large batches are a stream of messages of
-10,000 points each, inserted and deleted. A restart is the time from the kill of a worker with a million points to its
-next answer.
+processes. The processor time of a call or a message is that of all processes of a server, then those of its workers and
+gateways. Large batches are a stream of messages of 10,000 points each, inserted and deleted. A restart is the time
+from the kill of a worker with a million points to its next answer.
 """
 
 import argparse
@@ -79,15 +79,38 @@ def turns(repeat, works):
     return found
 
 
+class Spending:
+    """The processor time of servers, of the kinds of their processes.
+
+    Args:
+        supervisors: the first process of each server.
+    """
+
+    def __init__(self, *supervisors):
+        self._pids = {"all": supervisors}
+        for supervisor in supervisors:
+            for name, pid in processes(supervisor).items():
+                kind = name.partition("-")[0] + "s"
+                self._pids[kind] = (*self._pids.get(kind, ()), pid)
+        self._times = []
+
+    def during(self, work, number):
+        """The result of some work, which makes so many calls."""
+        before = self._now()
+        result = work()
+        self._times.append({kind: (now - before[kind]) / number * 1e6 for kind, now in self._now().items()})
+        return result
+
+    def __str__(self):
+        medians = {kind: median(each[kind] for each in self._times[1:] or self._times) for kind in self._pids}
+        return ", ".join(f"{kind} {microseconds:.0f}" for kind, microseconds in medians.items()) + " us of processor"
+
+    def _now(self):
+        return {kind: sum(map(processor_time, pids)) for kind, pids in self._pids.items()}
+
+
 def small(repeat, calls):
     """Unary calls a second, and the processor time of one."""
-    spent = {}
-
-    def work(name, address, pids):
-        before = sum(map(processor_time, pids))
-        rate = h2load(address, calls, CONNECTIONS)
-        spent[name] = (sum(map(processor_time, pids)) - before) / calls * 1e6
-        return rate
 
     with ExitStack() as stack:
         servers = {name: [stack.enter_context(serving([*DYNHULL, *shape]))] for name, shape in SHAPES.items()}
@@ -100,33 +123,39 @@ def small(repeat, calls):
         shared = stack.enter_context(serving(EMPTY))
         port = shared[0].rpartition(":")[2]
         servers["empty handlers, 2 processes"] = [shared, stack.enter_context(serving([*EMPTY, port]))]
+        spent = {name: Spending(*(pid for _, pid in found)) for name, found in servers.items()}
         works = {
-            name: lambda name=name, found=found: work(name, found[0][0], [pid for _, pid in found])
+            name: lambda name=name, address=found[0][0]: spent[name].during(
+                lambda: h2load(address, calls, CONNECTIONS), calls
+            )
             for name, found in servers.items()
         }
         found = turns(repeat, works)
     base = median(found["one process"])
     for name, values in found.items():
-        ratio = f"{median(values) / base:.2f} of one process"
-        yield f"h2load: {name}", values, f"/s, {ratio}, {spent[name]:.0f} us of processor a call"
+        yield f"h2load: {name}", values, f"/s, {median(values) / base:.2f} of one process, a call: {spent[name]}"
 
 
 def large(repeat):
     """Messages of many points a second."""
     messages = cycle("large", LARGE)
     with ExitStack() as stack:
-        addresses = {name: stack.enter_context(serving([*DYNHULL, *shape]))[0] for name, shape in SHAPES.items()}
-        for address in addresses.values():
+        servers = {name: stack.enter_context(serving([*DYNHULL, *shape])) for name, shape in SHAPES.items()}
+        for address, _ in servers.values():
             with HullClient(address) as client:
                 client.create_hull("large")
+        spent = {name: Spending(pid) for name, (_, pid) in servers.items()}
         works = {
-            name: lambda address=address: asyncio.run(stream(address, messages, 2 * CYCLE, 8))
-            for name, address in addresses.items()
+            name: lambda name=name, address=address: spent[name].during(
+                lambda: asyncio.run(stream(address, messages, 2 * CYCLE, 8)), 2 * CYCLE
+            )
+            for name, (address, _) in servers.items()
         }
         found = turns(repeat, works)
     base = median(found["one process"])
     for name, values in found.items():
-        yield f"messages of 10,000 points: {name}", values, f"/s, {median(values) / base:.2f} of one process"
+        ratio = f"{median(values) / base:.2f} of one process"
+        yield f"messages of 10,000 points: {name}", values, f"/s, {ratio}, a message: {spent[name]}"
 
 
 def restarts(repeat):

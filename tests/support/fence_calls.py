@@ -66,7 +66,7 @@ def events(fences: FenceServiceStub, fence: str, after: int = 0) -> list[fence_p
         if reached >= last:
             break
     watch.cancel()
-    assert [event.sequence for event in found] == list(range(after + 1, last + 1))
+    assert [event.sequence for event in found] == list(range(after + 1, reached + 1))
     return found
 
 
