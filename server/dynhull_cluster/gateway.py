@@ -32,6 +32,7 @@ from dynhull_server.settings import Settings
 from . import worker_link
 from .composed import Composed
 from .relay import Relay, Route, within
+from .shared_fences import WATCH_FENCE, SharedFences
 from .shared_watches import WATCH, SharedWatches
 from .sockets import Sockets
 from .worker_link import WorkerLink
@@ -43,7 +44,6 @@ AWAY_SECONDS = 30.0
 # Seconds that a gateway looks for all workers before it serves some.
 FIRST_SECONDS = 5.0
 WHOLE = ""
-WATCH_FENCE = f"/{FENCES.full_name}/WatchFence"
 
 SERVING = health_pb2.HealthCheckResponse.SERVING
 NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
@@ -80,9 +80,10 @@ class Gateway:
         watched = (WHOLE, SCRUB)
         self._links = [WorkerLink(i, sockets, watched, self._update_health) for i in range(settings.workers)]
         self._away_since: dict[int, float | None] = dict.fromkeys(range(settings.workers))
-        self._relay = Relay(self._links, settings.max_watch_lag, metrics)
+        self._relay = Relay(self._links, settings.max_watch_lag)
         self._composed = Composed(self._relay, settings.max_fence_corners)
         self._watches = SharedWatches(self._relay, metrics)
+        self._fences = SharedFences(self._relay, metrics)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False
         self._all_well = asyncio.Event()
@@ -150,7 +151,7 @@ class Gateway:
         if path == WATCH:
             return self._watches.watch
         if path == WATCH_FENCE:
-            return partial(self._relay.watch, path, "fence")
+            return self._fences.watch
         if method.client_streaming:
             return partial(self._relay.write, path)
         if method.server_streaming:

@@ -3,12 +3,10 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
-from functools import partial
 from typing import Any
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.calls import Call
-from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import LimitExceededError
 
@@ -26,12 +24,10 @@ class Relay:
     Args:
         links: the workers, by their numbers.
         max_watch_lag: the seconds that a caller may take to receive one message of a call that only answers.
-        metrics: counts the watchers.
     """
 
-    def __init__(self, links: Sequence[WorkerLink], max_watch_lag: float, metrics: Metrics) -> None:
+    def __init__(self, links: Sequence[WorkerLink], max_watch_lag: float) -> None:
         self.links = links
-        self._metrics = metrics
         self._max_watch_lag = max_watch_lag
 
     def link(self, name: str) -> WorkerLink:
@@ -66,14 +62,6 @@ class Relay:
             with call.cutoff():
                 message = await call.receive()
             await self.read_from(self.route(message, call), method, call, message)
-
-    async def watch(self, method: str, kind: str, call: Call) -> None:
-        """A call with one request, and responses for as long as the caller likes; `kind` is that of their events."""
-        with call.stream(), self._metrics.watcher() as watcher:
-            with call.cutoff():
-                message = await call.receive()
-            sending = partial(self._metrics.sending, watcher, kind)
-            await self.read_from(self.route(message, call), method, call, message, sending)
 
     async def read_from(
         self,

@@ -9,9 +9,10 @@ sketches always does.
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -23,6 +24,7 @@ from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import HullNotFoundError
 
 from .callers import metadata_of, metadata_of_feed
+from .feeds import Feeds
 from .held import Held
 from .relay import Relay, one_request
 from .upstream import lost_status
@@ -48,7 +50,7 @@ class SharedWatches:
     def __init__(self, relay: Relay, metrics: Metrics) -> None:
         self._relay = relay
         self._metrics = metrics
-        self._feeds: dict[tuple[str, bytes], Feed] = {}
+        self._feeds: Feeds[Feed] = Feeds()
 
     async def watch(self, call: Call) -> None:
         """The method `Watch`."""
@@ -115,26 +117,13 @@ class SharedWatches:
                 with self._metrics.sending(watcher, event.kind):
                     await self._relay.send(call, event.message)
 
-    @contextmanager
-    def _feed(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> "Iterator[Feed]":
-        """The feed for watches like this one, of the hull with this uid; it ends with the last of them."""
+    def _feed(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> "AbstractContextManager[Feed]":
+        """The feed for watches like this one, of the hull with this uid."""
         kind = pb.WatchRequest()
         kind.CopyFrom(request)
         kind.ClearField("resume")
         kind.ClearField("min_revision")
-        key = uid, kind.SerializeToString(deterministic=True)
-        feed = self._feeds.get(key)
-        if feed is None or feed.failure is not None:
-            feed = self._feeds[key] = Feed(link, kind, uid)
-        feed.watchers += 1
-        try:
-            yield feed
-        finally:
-            feed.watchers -= 1
-            if not feed.watchers:
-                feed.close()
-                if self._feeds.get(key) is feed:
-                    del self._feeds[key]
+        return self._feeds.use((uid, kind.SerializeToString(deterministic=True)), partial(Feed, link, kind, uid))
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,14 +144,12 @@ class Feed:
 
     Attributes:
         uid: that of the hull.
-        watchers: the number of watches that use it.
         failure: what it has ended with, or None.
         recent: what watchers hold at the last revisions.
     """
 
     def __init__(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> None:
         self.uid = uid
-        self.watchers = 0
         self.failure: Exception | None = None
         self.recent: OrderedDict[int, Held] = OrderedDict()
         self._link = link
@@ -174,6 +161,11 @@ class Feed:
         self._held: Held | None = None
         self._moved = asyncio.Event()
         self._running = asyncio.create_task(self._run())
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended by itself."""
+        return self.failure is not None
 
     def close(self) -> None:
         """End the watch."""

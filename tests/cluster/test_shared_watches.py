@@ -1,70 +1,24 @@
 """Many watches of a hull at a gateway: the worker has one, and each watcher gets exactly what it would get alone."""
 
 import threading
-from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
-from hashlib import sha256
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import grpc
 import numpy as np
 import pytest
-from metrics import measured, samples
-from patience import wait_until
+from one_gateway import Place, entries
 
 from dynhull import DynamicHull
 from dynhull_client import HullClient, HullCopy, HullNotFoundError, UnauthenticatedError
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 CORNERS = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]]
 BATCHES = 40
-
-
-@dataclass(frozen=True)
-class Place:
-    """A server of one gateway and one worker: its address, that of its metrics, and its file of tokens."""
-
-    address: str
-    metrics: str
-    tokens: Path
-
-    def costs(self) -> tuple[float, float]:
-        """The watches that the worker has now, and those that it has ended."""
-        found = samples(self.metrics)
-        ended = (
-            value
-            for name, value in found.items()
-            if name.startswith("dynhull_calls_total") and 'method="Watch"' in name and "worker" in name
-        )
-        return found['dynhull_watchers{process="worker-0"}'], sum(ended)
-
-    def wait_for(self, watches: int) -> None:
-        wait_until(lambda: self.costs()[0] == watches)
-
-
-def entries(*tokens: str) -> str:
-    return "".join(
-        f'[[token]]\nsha256 = "{sha256(each.encode()).hexdigest()}"\nread = [""]\nwrite = [""]\n' for each in tokens
-    )
-
-
-@pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    tokens = tmp_path_factory.mktemp("tokens") / "tokens.toml"
-    tokens.write_text(entries("one", "two"))
-    options = ("--workers", "1", "--gateways", "1", "--tokens", str(tokens), "--log-level", "error")
-    with measured(*options, "--scrub-cpu", "0") as (server, metrics):
-        yield Place(server.address, metrics, tokens)
-
-
-@pytest.fixture
-def client(place: Place) -> Iterator[HullClient]:
-    place.wait_for(0)  # those of the test before have left
-    with HullClient(place.address, token="one") as client:
-        yield client
 
 
 class Watcher:
