@@ -10,24 +10,36 @@ of that without, median of the batches; the share of moves that crossed a fence.
 hulls: a fence around a hull, of which a point is inserted or deleted in each revision: `set_hull` and `take`, beside
 `locate` of all subjects. Columns: milliseconds a revision, median and greatest.
 
-memory: bytes a subject of the index.
+memory: how much larger the process is, a subject, once there is an index: without the fences' own, which an index of
+the same fences without subjects has. And bytes of an event with a key of 16 bytes, in the server's memory and in a row
+on the disk, alone and with others, for random positions and for decimals of five places.
 """
 
 import argparse
+import gc
+import os
 import platform
 import statistics
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
 import dynhull
+from dynhull_server.state.fences.event_block import EventBlock, block_of
+from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
+from dynhull_server.state.records import NO_TIME
+from dynhull_server.storage.rows.event_blocks import encode_block
+
+WORKS = ("moves", "hulls", "memory")
 
 EXTENT = 1000.0  # of the square where everything is
 STEP = 0.1  # standard deviation of a move
 CORNERS = 12  # of a polygon
 BATCHES = 200  # at most
 REVISIONS = 60
+NOW = 1_790_000_000_000_000  # microseconds since 1970
 
 
 def star(random: np.random.Generator, center: np.ndarray, size: float) -> np.ndarray:
@@ -57,7 +69,6 @@ def moves(n: int, fences: int, sizes: list[int]) -> Iterator[str]:
     index = indexed(fenced, fences, random)
     seconds = time.perf_counter() - began
     yield f"| set | {n:,} | {fences:,} | {seconds / fences * 1e6:.0f} µs a fence | | |"
-    yield f"| memory | {n:,} | {fences:,} | {index._fences.memory / n:.0f} bytes a subject | | |"
     for size in sizes:
         times: dict[str, list[float]] = {"plain": [], "fenced": []}
         crossed = 0
@@ -109,6 +120,58 @@ def hulls(n: int, vertices: list[int]) -> Iterator[str]:
         yield f"| hull of {len(corners)} | {n:,} | {events / REVISIONS:.0f} events | {figures} | {located} | |"
 
 
+def memory(n: int, fences: int) -> Iterator[str]:
+    random = np.random.default_rng(3)
+    before = resident()
+    empty = indexed(dynhull.KeyedHull(key_type="int"), fences, np.random.default_rng(4))
+    own = resident() - before
+    _, hull = subjects(n, random)
+    before = resident()
+    index = indexed(hull, fences, np.random.default_rng(4))
+    over = resident() - before - own
+    assert len(index) == len(empty)
+    yield f"| memory | {n:,} | {fences:,} fences | {over / n:.0f} bytes a subject, {own / fences:.0f} a fence | | |"
+    for places, decimals in (("random", None), ("decimals", 5)):
+        for size in (1, 16, 1024):
+            block = events(size, random, decimals)
+            stored = len(encode_block(block, np.ones(len(block.runs), np.bool_)))
+            figures = f"{block.bytes / size:.0f} bytes an event in memory, {stored / size:.0f} on the disk"
+            yield f"| memory | | {size:,} events in a row, {places} | {figures} | | |"
+
+
+def events(n: int, random: np.random.Generator, decimals: int | None) -> EventBlock:
+    """What moves of a moment mean for many fences: each an event of another fence and a key of 16 bytes."""
+    made = {}
+    for fence in random.choice(23_000, n, replace=False).tolist():
+        positions = random.random((2, 2)) * EXTENT
+        positions[1] = positions[0] + random.normal(scale=STEP, size=2)
+        here, before = (positions if decimals is None else positions.round(decimals)).tolist()
+        key, kind = f"vehicle/{random.integers(10**8):08}", random.choice([EventType.ENTER, EventType.EXIT])
+        away = 0.0 if kind == EventType.ENTER else random.random() * STEP
+        event = FenceEvent(
+            int(random.integers(1, 1000)),
+            EventType(kind),
+            int(Cause.MOVED),
+            "fleet",
+            key,
+            10**6,
+            0,
+            tuple(here),
+            tuple(before),
+            away,
+            NO_TIME,
+            NOW,
+        )
+        made[fence] = [event]
+    return block_of(made)
+
+
+def resident() -> int:
+    """The bytes of memory of this process."""
+    gc.collect()
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
 def number(text: str) -> int:
     return int(float(text))
 
@@ -120,17 +183,17 @@ def main() -> None:
     parser.add_argument("--fences", type=number, default=23_000, help="polygon fences (default 23000)")
     parser.add_argument("--batches", nargs="+", type=int, default=[64, 8192], help="moves in a batch (default 64 8192)")
     parser.add_argument("--vertices", nargs="+", type=int, default=[100, 1000, 3000], help="points around a hull area")
-    parser.add_argument("--works", nargs="+", default=["moves", "hulls"], choices=["moves", "hulls"])
+    parser.add_argument("--works", nargs="+", default=list(WORKS), choices=WORKS)
     arguments = parser.parse_args()
     print(f"dynhull {dynhull.KERNEL}, Python {platform.python_version()}, {platform.machine()}\n")
     print("| work | subjects | | | of the rate without | crossings |")
     print("| --- | ---: | --- | --- | ---: | ---: |")
     for work in arguments.works:
-        lines = (
-            moves(arguments.subjects, arguments.fences, arguments.batches)
-            if work == "moves"
-            else hulls(arguments.subjects, arguments.vertices)
-        )
+        lines = {
+            "moves": lambda: moves(arguments.subjects, arguments.fences, arguments.batches),
+            "hulls": lambda: hulls(arguments.subjects, arguments.vertices),
+            "memory": lambda: memory(arguments.subjects, arguments.fences),
+        }[work]()
         for line in lines:
             print(line, flush=True)
 

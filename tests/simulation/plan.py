@@ -78,6 +78,9 @@ QUERIES = (1, 1, 2, 4)
 # Where points of the parabola are asked for: most batches insert one of these.
 PLACES_ASKED = 12
 
+# The share of plans with fences in which a client does what hardly ever comes together by chance.
+WITH_SCENES = 0.5
+
 SWARM = (0, 1, 1, 5)
 
 # The share of the shell's plans in which a hull is recalled from the storage beside its deletion: by chance the two
@@ -155,7 +158,10 @@ def random_plan(seed: int, layer: str) -> Plan:
     if layer == "shell" and draw.random() < RECALLS_BESIDE_DELETES:
         draw.choice(lives)["clients"] += _recall_beside_delete(draw, names[0])
         plan["limits"]["history_bytes"] = 0
-    queries = random.Random(f"queries {seed}")  # the other plans stay as they were
+    scenes = random.Random(f"scenes {seed}")  # the other plans stay as they were
+    if fences and scenes.random() < WITH_SCENES:
+        _add_scene(scenes, plan, fences)
+    queries = random.Random(f"queries {seed}")
     if layer != "core" and queries.random() < WITH_QUERIES:
         for _ in range(queries.choice(QUERIES)):
             client = queries.choice(queries.choice(lives)["clients"])
@@ -187,6 +193,69 @@ def _recall_beside_delete(draw: random.Random, name: str) -> list[list[Operation
     write = {"do": "write", "name": name, "create": name not in GLOBE, "numbered": False, "rows": 1}
     recalls = [{"do": "recall", "name": name, "back": draw.randint(0, 1)} for _ in range(draw.randint(1, 3))]
     return [[write, write, *recalls], [{"do": "rest", "seconds": 0.001}, {"do": "delete", "name": name}]]
+
+
+def _add_scene(draw: random.Random, plan: Plan, fences: tuple[str, ...]) -> None:
+    """In one life a client is alone with a fence, and perhaps one of its commits fails."""
+    compared = [name for name in fences if FENCED[name][0] != "other"]
+    if not compared:
+        return
+    name = draw.choice(compared)
+    scenes = [_area_moves, _fence_changes, *([_few_events_dropped] if plan["layer"] == "core" else [])]
+    scene = draw.choice(scenes)
+    life = draw.choice(plan["lives"])
+    life["clients"] = [scene(draw, name)]
+    life.pop("after", None)
+    if scene is not _few_events_dropped and plan["storage"] != "immediate":
+        fault = {"at": "commit", "nth": draw.randint(4, 14), "kind": draw.choice(("lost", "full")), "calls": 1}
+        plan["faults"] = [fault]
+    plan["limits"] |= {"max_hulls": 10, "max_points": 100}
+    plan["fences"] |= {"max_fences": 10, "max_fence_consumers": 10}
+
+
+def _fence_of_scene(name: str, area: dict[str, Any]) -> list[Operation]:
+    """A fence, without margin and waiting, with or without keys before it."""
+    kind, subjects = FENCED[name]
+    config = {"kind": kind, "subjects": subjects, "initial": "events", "area": area, "closed": True, "margin": 0.0}
+    return [
+        {"do": "write", "name": "a", "create": True, "numbered": False, "rows": 1},
+        {"do": "create", "name": subjects, "max_points": 0, "by_event_time": False},
+        {"do": "fence", "name": name, "rows": 1, "config": config},
+        {"do": "refence", "name": name, "rows": 1, "config": config},
+    ]
+
+
+def _key_moves(draw: random.Random, fence: str) -> Operation:
+    """A key moves to a place that is inside of the area `a` as soon as this has a later point."""
+    put = {"do": "put", "name": FENCED[fence][1], "create": True, "numbered": False, "rows": 1, "lift": 2}
+    return put | {"keys": [draw.randrange(4)], "removes": []}
+
+
+def _area_moves(draw: random.Random, name: str) -> list[Operation]:
+    """Keys enter a fence because its area grows."""
+    write = {"do": "write", "name": "a", "create": True, "numbered": False, "rows": 1}
+    scene = _fence_of_scene(name, {"hull": "a"})
+    for _ in range(draw.randint(2, 5)):
+        scene += [_key_moves(draw, name), write]
+    return [*scene, write]
+
+
+def _fence_changes(draw: random.Random, name: str) -> list[Operation]:
+    """A fence gets events, consumers and other areas: some commits change no hull."""
+    scene = _fence_of_scene(name, {"strips": 2, "holes": False})
+    for _ in range(draw.randint(3, 8)):
+        ack = {"do": "ack", "name": name, "rows": 1, "consumer": "x", "back": 0}
+        scene.append(draw.choice((ack, ack, _key_moves(draw, name), _of_fence(draw, "refence", name))))
+    return scene
+
+
+def _few_events_dropped(draw: random.Random, name: str) -> list[Operation]:
+    """A consumer acknowledges all events, perhaps another one comes, and all are dropped."""
+    scene = _fence_of_scene(name, {"strips": 2, "holes": False})
+    of_fence = {"name": name, "rows": 1, "consumer": "x", "back": 0, "most": 1_000}
+    for _ in range(draw.randint(2, 5)):
+        scene += [of_fence | {"do": "ack"}, _key_moves(draw, name), of_fence | {"do": "keep"}]
+    return [*scene, of_fence | {"do": "follow"}]
 
 
 # The names of hulls of points, of hulls with keys or a window, and of fences.

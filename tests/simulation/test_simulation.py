@@ -22,6 +22,7 @@ QUICK = {
     "expiry_not_journalled",
     "fence_expiry_with_the_batch",
     "fence_lines_use_up_hulls",
+    "fence_not_restored",
     "fence_sequence_again",
     "row02_discarded_while_creating",
     "row06_commit_thread_catches_one_kind",

@@ -582,7 +582,9 @@ class Core:
         names: dict[str, None] = {}
         fences: dict[str, Fence | None] = {}
         for request in requests:
-            if isinstance(request, FenceRequest):
+            if type(request) is WriteBatch:  # as a rule
+                names[request.name] = None
+            elif isinstance(request, FenceRequest):
                 fences[request.name] = self._registry.fences.get(request.name)
                 names |= dict.fromkeys(request.names[1:])
             else:

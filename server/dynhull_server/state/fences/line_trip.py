@@ -48,6 +48,9 @@ class LineTrip(FenceWork):
         """The changes to commit."""
         legs = self.fence_legs.values()
         stored = self.events
+        if not legs:  # nothing but crossings
+            of_events = [] if stored is None else [AppendEvents(stored)]
+            return [*super().changes(), *of_events]
         if any(leg.deleted for leg in legs):
             stored = self._block([leg for leg in legs if not leg.deleted])
         return [
