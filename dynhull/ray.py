@@ -19,8 +19,8 @@ __all__ = ["convex_hull"]
 
 PATH = "path"  # the column that Ray adds with `include_paths=True`
 VERTICES, PROBLEM = "vertices", "problem"
-# Rows whose coordinates are joined at a time: no cache holds those of a whole block.
-PIECE = 2**17
+# Rows whose coordinates are joined at a time: fewer than a cache holds, and than a hull takes two threads for.
+PIECE = 2**16
 # Vertices that are gathered before the next hull of hulls. It waits for as many as the hull has, where these are more,
 # so that all of them together take no longer than a few times the last one.
 GATHERED = 2**20
