@@ -581,33 +581,34 @@ class Core:
         lines = [queue.line for queue in queues if queue.line is not None]
         names: dict[str, None] = {}
         fences: dict[str, Fence | None] = {}
+        numbers: dict[str, int] = {}
+        births: set[str] = set()
         for request in requests:
             if type(request) is WriteBatch:  # as a rule
                 names[request.name] = None
+                if request.birth is not None:
+                    births.add(request.name)
             elif isinstance(request, FenceRequest):
                 fences[request.name] = self._registry.fences.get(request.name)
                 names |= dict.fromkeys(request.names[1:])
+                if isinstance(request, CreateFence):
+                    self._reserve_fence(request, numbers)
             else:
                 names |= dict.fromkeys(names_of(request))
-        numbers: dict[str, int] = {}
-        for request in requests:
-            if isinstance(request, CreateFence):
-                number = self._registry.reserve_fence()
-                if number is not None:
-                    numbers[request.name] = number
-                if request.config.kind == "prefix" and request.name not in self._registry.fences:
-                    self._queues.reserve_prefix(request.name, request.config.subjects)
-        births = {
-            name
-            for request in requests
-            if isinstance(request, CreateHull | WriteBatch) and request.birth is not None
-            for name in names_of(request)
-            if name not in self._registry.hulls
-        }
-        places = {name: self._registry.reserve_hull() for name in sorted(births)}
+                if isinstance(request, CreateHull):
+                    births.add(request.name)
+        new = sorted(name for name in births if name not in self._registry.hulls)
+        places = {name: self._registry.reserve_hull() for name in new}
         ground = Ground(lines, places, fences, numbers, self._registry.tallies, self._registry.limits.fences)
         legs = [Leg(name, self._registry.hulls.get(name), keeps=self._keeps) for name in names]
         return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)
+
+    def _reserve_fence(self, request: CreateFence, numbers: dict[str, int]) -> None:
+        number = self._registry.reserve_fence()
+        if number is not None:
+            numbers[request.name] = number
+        if request.config.kind == "prefix" and request.name not in self._registry.fences:
+            self._queues.reserve_prefix(request.name, request.config.subjects)
 
     def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
         """Publish what a trip has committed of fences, and join or part the queues."""

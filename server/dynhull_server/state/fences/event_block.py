@@ -216,8 +216,8 @@ def joined(blocks: Sequence[EventBlock]) -> EventBlock:
     starts = np.cumsum([0, *map(len, blocks)]).tolist()
     names = tuple(dict.fromkeys(name for block in blocks for name in block.names))
     return EventBlock(
-        np.concatenate([_runs(block, names) for block in blocks]),
-        np.concatenate([block.rows for block in blocks]),
+        np.frombuffer(b"".join([_runs(block, names).tobytes() for block in blocks]), RUN),
+        np.frombuffer(b"".join([block.rows.tobytes() for block in blocks]), EVENT),
         b"".join([block.keys for block in blocks]),
         names,
         {start + row: each for start, block in zip(starts, blocks, strict=False) for row, each in block.inside.items()},
