@@ -95,7 +95,7 @@ def main():
         try:
             page = browser.new_context(**WINDOW).new_page()
             page.goto(f"{url}/?hull=fleet")
-            page.wait_for_function(f"picture.hulls.get('fleet')?.points.x.length > {ENTITIES // 2}")
+            page.wait_for_function(f"() => picture.hulls.get('fleet')?.points.x.length > {ENTITIES // 2}")
             for names in (False, True):
                 page.get_by_label("All names").set_checked(names)
                 for drag in (False, True):

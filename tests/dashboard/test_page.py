@@ -278,7 +278,7 @@ def test_all_keys_have_names_where_there_is_room(browser: Browser, url: str, cli
         named = f"picture.labels.shown.has('inside of {name}')"
         assert not page.evaluate(named)
         page.get_by_label("All names").check()
-        page.wait_for_function(named)
+        page.wait_for_function(f"() => {named}")
 
 
 def test_outliers_are_shown_to_those_who_look(
@@ -298,7 +298,7 @@ def test_outliers_are_shown_to_those_who_look(
         box.focus()
         page.keyboard.press("Space")
         expect(words).to_have_text(f"Without far, {name} would lose 28 square units: x 9, y 9, revision 1")
-        page.wait_for_function("picture.rings.map(({text}) => text).join() == 'far: 28 square units'")
+        page.wait_for_function("() => picture.rings.map(({text}) => text).join() == 'far: 28 square units'")
         assert page.evaluate(layers, name) == [[[1, 1], [2, 1], [1, 2]]]
         client.put(name, ["far"], [[4, 4]])
         expect(words).to_contain_text(f"Without far, {name} would lose 8 square units: x 4, y 4, revision 2")
@@ -308,7 +308,7 @@ def test_outliers_are_shown_to_those_who_look(
         expect(words).to_have_count(1)
         box.uncheck()
         expect(words).to_have_count(0)
-        page.wait_for_function("picture.rings.length == 0")
+        page.wait_for_function("() => picture.rings.length == 0")
 
 
 def test_the_picture_is_moved_by_keys_and_by_hand(browser: Browser, url: str, hull: str) -> None:
@@ -321,7 +321,7 @@ def test_the_picture_is_moved_by_keys_and_by_hand(browser: Browser, url: str, hu
         picture.press("+")
         assert place_of(page, 4, 4)[0] - place_of(page, 0, 4)[0] > 1.3 * (place_of(page, 4, 0)[1] - begun[1]) / 1.4
         picture.press("0")
-        page.wait_for_function("picture.following")
+        page.wait_for_function("() => picture.following")
         wait_until(lambda: place_of(page, 4, 4) == pytest.approx(begun))
         page.mouse.move(*begun)
         page.mouse.down()
@@ -402,7 +402,7 @@ def test_no_page_asks_another_host(browser: Browser, url: str, client: HullClien
         page.on("websocket", lambda socket: asked.append(socket.url))
         with page.expect_response("**/countries-50m.json"):
             page.goto(f"{url}?hull={name}")
-        page.wait_for_function("picture.coasts.known.get(FINE)?.coasts.length > 1000")
+        page.wait_for_function("() => picture.coasts.known.get(FINE)?.coasts.length > 1000")
     hosts = {request.split("/")[2] for request in asked if not request.startswith("data:")}
     assert len(asked) > 4
     assert hosts == {url.split("/")[2]}
@@ -430,7 +430,7 @@ def test_the_picture_has_the_edges_of_a_hull_on_the_globe(
     client.apply(name, insert=places)
     expected = GeoHull(places, center)
     with opened(browser, url, name) as page:
-        page.wait_for_function("picture.view.globe && picture.frames > 0")
+        page.wait_for_function("() => picture.view.globe && picture.frames > 0")
         for turn in ((0, 0), (200, -90)):
             page.evaluate("turn => picture.move(view => view.pan(...turn))", turn)
             found = page.evaluate(INSIDE, [name, 60, 40])
@@ -595,15 +595,15 @@ def test_axes_of_different_units_have_scales_of_their_own(
         opened(browser, url, name) as page,
     ):
         expect(page.get_by_role("columnheader", name="Area (ms by USD)")).to_be_visible()
-        page.wait_for_function(f"({heights})() > 300")
+        page.wait_for_function(f"() => ({heights})() > 300")
         page.get_by_label("Same scale for x and y").check()
-        page.wait_for_function(f"({heights})() < 10")
+        page.wait_for_function(f"() => ({heights})() < 10")
 
 
 def test_series_of_the_server_have_no_hulls_colour(browser: Browser, url: str, hull: str) -> None:
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
-        page.wait_for_function("time_lines.rows.has('')")
+        page.wait_for_function("() => time_lines.rows.has('')")
         colours = page.evaluate(
             "time_lines.lines(['updates', 'mean', 'percentile'].slice(0, 2)).map(({colour}) => colour)"
         )

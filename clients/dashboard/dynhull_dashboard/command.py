@@ -6,6 +6,8 @@ import typer
 
 from dynhull_cli.connected import Connect, connecting
 
+from .tiles import LARGEST_ZOOM, Tiles
+
 
 @connecting
 def dashboard(
@@ -28,6 +30,15 @@ def dashboard(
         str, typer.Option(help="Unit of x. If it differs from that of y, each axis has its own scale.")
     ] = "",
     y_unit: Annotated[str, typer.Option(help="Unit of y.")] = "",
+    tiles: Annotated[
+        str | None,
+        typer.Option(
+            help="URL of the tiles of a map, such as https://HOST/{z}/{x}/{y}.png, to draw under hulls on the globe. "
+            "Browsers request them there; without, they ask no other host."
+        ),
+    ] = None,
+    tiles_attribution: Annotated[str, typer.Option(help="What the provider of the tiles wants to be shown.")] = "",
+    tiles_zoom: Annotated[int, typer.Option(min=2, max=LARGEST_ZOOM, help="The largest zoom of the tiles.")] = 19,
 ) -> None:
     """Show live hulls and fences in the browser.
 
@@ -45,8 +56,10 @@ def dashboard(
     from .serve import serve  # imports Bokeh, which --help does not need
     from .units import Units
 
+    ground = None if tiles is None else Tiles(tiles, tiles_attribution, tiles_zoom)
+
     async def show() -> None:
         async with connect(AsyncHullClient, retries=0) as client:
-            await serve(Hub(client, prefix, metrics, Units(x_unit, y_unit)), host, port, origin or [])
+            await serve(Hub(client, prefix, metrics, Units(x_unit, y_unit)), host, port, origin or [], ground)
 
     asyncio.run(show())

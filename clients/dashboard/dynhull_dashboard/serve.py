@@ -13,12 +13,13 @@ from tornado.web import StaticFileHandler
 from .hub import Hub
 from .known_hosts import KnownHosts
 from .live_socket import LiveSocket
-from .page import VENDOR, PageHandler, page
+from .page import VENDOR, PageHandler, page, policy
+from .tiles import Tiles
 
 LOOPBACK = "127.0.0.1", "localhost", "[::1]"
 
 
-async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
+async def serve(hub: Hub, host: str, port: int, origins: Sequence[str], tiles: Tiles | None) -> None:
     """Serve the page until SIGTERM or SIGINT.
 
     Args:
@@ -26,6 +27,7 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
         host: the address to listen on.
         port: the port to listen on; 0 for a free one.
         origins: further names of the page, as for `KnownHosts`.
+        tiles: those of the map; None for none.
 
     Raises:
         ValueError: if one of `origins` is not a name.
@@ -38,9 +40,9 @@ async def serve(hub: Hub, host: str, port: int, origins: Sequence[str]) -> None:
     port = sockets[0].getsockname()[1]
     name = f"[{host}]" if ":" in host else host
     hosts = [f"{each}:{port}" for each in (name, *LOOPBACK)]
-    html, version = page(hub)
+    html, version = page(hub, tiles)
     handlers = [
-        ("/", PageHandler, {"html": html}),
+        ("/", PageHandler, {"html": html, "policy": policy(html, tiles)}),
         ("/live", LiveSocket, {"hub": hub, "version": version}),
         ("/vendor/(.*)", StaticFileHandler, {"path": VENDOR}),
     ]

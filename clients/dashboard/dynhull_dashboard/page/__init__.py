@@ -1,6 +1,8 @@
 """The page: its HTML with its styles and scripts, the same for all viewers."""
 
+import base64
 import hashlib
+import re
 from html import escape
 from pathlib import Path
 from string import Template
@@ -11,6 +13,7 @@ from ..cards import key, symbol
 from ..event_rows import MOST_EVENTS
 from ..hub import Hub
 from ..looks import FENCE_COLOUR, FENCE_LOOKS, INSIDE, LOOKS, MEAN, NEUTRAL, PERCENTILE
+from ..tiles import Tiles
 
 HERE = Path(__file__).parent
 # Libraries and maps of others, as published; their licences are in LICENSES.txt.
@@ -18,6 +21,7 @@ VENDOR = HERE.parent / "vendor"
 SCRIPTS = (
     "views.js",
     "coasts.js",
+    "tiles.js",
     "boxes.js",
     "hulls.js",
     "fences.js",
@@ -35,13 +39,15 @@ SCRIPTS = (
 class PageHandler(RequestHandler):
     """Answers with the page."""
 
-    def initialize(self, html: str) -> None:
+    def initialize(self, html: str, policy: str) -> None:
         """Tornado passes the application's arguments."""
         self._html = html
+        self._policy = policy
 
     def get(self) -> None:
         """The page."""
         self.set_header("Cache-Control", "no-cache")
+        self.set_header("Content-Security-Policy", self._policy)
         self.finish(self._html)
 
     def head(self) -> None:
@@ -49,7 +55,7 @@ class PageHandler(RequestHandler):
         self.finish()
 
 
-def page(hub: Hub) -> tuple[str, str]:
+def page(hub: Hub, tiles: Tiles | None) -> tuple[str, str]:
     """The HTML, and its version."""
     units = hub.units
     area = units.area if units.area == "km²" else f"{units.area}; km² on the globe"
@@ -65,12 +71,32 @@ def page(hub: Hub) -> tuple[str, str]:
         "fence_colour": FENCE_COLOUR,
         "neutral": NEUTRAL,
         "percentile_dash": " ".join(map(str, PERCENTILE.dash)),
+        "tiles": tiles.url if tiles else "",
+        "largest_zoom": tiles.largest_zoom if tiles else 0,
+        "attribution": tiles.attribution if tiles else "",
     }
     texts = {name: escape(str(value)) for name, value in settings.items()}
     pictures = {"inside": symbol(INSIDE), "mean": key(MEAN), "percentile": key(PERCENTILE)}
     parts = {"styles": _read("page.css"), "scripts": "".join(map(_read, SCRIPTS))}
-    version = hashlib.sha256((_read("page.html") + "".join(parts.values())).encode()).hexdigest()[:16]
+    content = "".join([_read("page.html"), *parts.values(), *texts.values()])
+    version = hashlib.sha256(content.encode()).hexdigest()[:16]
     return Template(_read("page.html")).substitute(texts, **pictures, **parts, version=version), version
+
+
+def policy(html: str, tiles: Tiles | None) -> str:
+    """The Content-Security-Policy of the page: nothing but its own, and pictures from the server of the tiles."""
+    hashes = {element: _hash(html, element) for element in ("script", "style")}
+    pictures = f" {tiles.origin}" if tiles else ""
+    return (
+        f"default-src 'none'; script-src 'self' '{hashes['script']}'; style-src '{hashes['style']}'; "
+        f"img-src data:{pictures}; connect-src 'self'; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hash(html: str, element: str) -> str:
+    """Names the content of an element of the page, as a policy does."""
+    (content,) = re.findall(f"<{element}>(.*?)</{element}>", html, re.DOTALL)
+    return "sha256-" + base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
 
 
 def _read(name: str) -> str:

@@ -43,9 +43,7 @@ function pieces(line) {
     const part = line.slice(first, first + PIECE + 1)
     const points = new Float64Array(3 * part.length), middle = [0, 0, 0]
     part.forEach(([lon, lat], row) => {
-      const cos = Math.cos(lat * RADIAN)
-      const vector = [cos * Math.cos(lon * RADIAN), cos * Math.sin(lon * RADIAN), Math.sin(lat * RADIAN)]
-      vector.forEach((each, axis) => {
+      unit_vector(lon, lat).forEach((each, axis) => {
         points[3 * row + axis] = each
         middle[axis] += each / part.length
       })
@@ -58,12 +56,9 @@ function pieces(line) {
   return found
 }
 function trace(canvas, view, {points, middle, reach}) {
-  const lon = view.middle[0] * RADIAN, sin_lon = Math.sin(lon), cos_lon = Math.cos(lon), {sin, cos, scale, rect} = view
+  if (!view.sees(middle, reach)) return
+  const lon = view.middle[0] * RADIAN, sin_lon = Math.sin(lon), cos_lon = Math.cos(lon), {sin, cos, scale} = view
   const [center, center_down] = view.center()
-  const [x, y, z] = middle, front = x * cos_lon + y * sin_lon
-  const across = y * cos_lon - x * sin_lon, up = cos * z - sin * front
-  if (sin * z + cos * front + reach < 0) return
-  if ((Math.abs(across) - reach) * scale > rect.width / 2 || (Math.abs(up) - reach) * scale > rect.height / 2) return
   let pen = false
   for (let i = 0; i < points.length; i += 3) {
     const front = points[i] * cos_lon + points[i + 1] * sin_lon

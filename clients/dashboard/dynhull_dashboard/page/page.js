@@ -7,7 +7,9 @@ const SILENCE = "The dashboard does not answer. Check that dynhull dashboard sti
 const settings = find(".page").dataset
 const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
   places: []}
-const picture = new Picture(find(".map"), {x_unit: settings.xUnit, y_unit: settings.yUnit})
+const picture = new Picture(find(".map"), {
+  x_unit: settings.xUnit, y_unit: settings.yUnit, tiles: {url: settings.tiles, largest_zoom: +settings.largestZoom, attribution: settings.attribution},
+})
 const events = new Events(key => seek(key))
 const recorder = new Recorder(show_drawing, () => {
   picture.live = recorder.live

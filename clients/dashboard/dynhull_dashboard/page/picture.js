@@ -11,8 +11,8 @@ function draw_names(canvas, picture) {
   picture.labels.draw(canvas, picture)
 }
 class Picture {
-  // `settings` are those of the page: units, and whether x and y have one scale.
-  constructor(element, {x_unit, y_unit}) {
+  // `settings` are those of the page: units, whether x and y have one scale, and tiles of a map.
+  constructor(element, {x_unit, y_unit, tiles}) {
     this.element = element
     this.units = {x: x_unit, y: y_unit}
     this.canvases = [...element.querySelectorAll("canvas")]
@@ -24,6 +24,10 @@ class Picture {
     this.labels = new Labels()
     this.trails = new Trails()
     this.coasts = new Coasts(() => this.draw_all())
+    this.tiles = new Tiles(tiles, () => {
+      element.querySelector(".attribution").textContent = this.tiles.failed ? `No map from ${new URL(tiles.url).host}` : tiles.attribution
+      this.draw_all()
+    })
     this.following = true  // until the viewer moves the picture
     this.moving = false
     this.live = true  // or as it was before
@@ -165,7 +169,7 @@ class Picture {
   read_colours() {
     const style = getComputedStyle(this.element)
     const colour = name => style.getPropertyValue(`--${name}`).trim()
-    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea"].map(name => [name, colour(name)]))
+    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea", "veil"].map(name => [name, colour(name)]))
   }
   draw_globe(canvas) {
     const {view, colours, width, height} = this
@@ -177,6 +181,10 @@ class Picture {
       canvas.fill()
     }
     fill({type: "Sphere"}, colours.sea)
+    if (this.tiles.url) {
+      this.tiles.draw(canvas, view, this.moving)
+      fill({type: "Sphere"}, colours.veil)  // what is drawn on the map has to stand out
+    }
     const degrees = TICK_PIXELS / view.scale / RADIAN, step = GRID_STEPS.findLast(each => each > degrees) ?? GRID_STEPS[0]
     if (degrees > GRID_STEPS.at(-1) / 2) {
       const reach = Math.min(90, Math.hypot(width, height) / 2 / view.scale / RADIAN + step)

@@ -117,6 +117,13 @@ class GlobeView {
     const [across, down] = this.center(), scale = this.scale
     return [across + scale * cos * Math.sin(east), down - scale * (this.cos * sin - this.sin * front)]
   }
+  // Whether any place of a ball is in sight: around a unit vector, with a radius of at most 2.
+  sees([x, y, z], reach) {
+    const lon = this.middle[0] * RADIAN, front = x * Math.cos(lon) + y * Math.sin(lon)
+    const across = y * Math.cos(lon) - x * Math.sin(lon), up = this.cos * z - this.sin * front
+    return this.sin * z + this.cos * front + reach >= 0
+      && (Math.abs(across) - reach) * this.scale <= this.rect.width / 2 && (Math.abs(up) - reach) * this.scale <= this.rect.height / 2
+  }
   invert(across, down) {
     return this.projection.invert([across, down])
   }
@@ -165,6 +172,10 @@ class GlobeView {
     const line = rings[0].length < 3
     d3.geoPath(this.projection, canvas)(line ? {type: "LineString", coordinates: coordinates[0]} : {type: "Polygon", coordinates})
   }
+}
+function unit_vector(lon, lat) {
+  const cos = Math.cos(lat * RADIAN)
+  return [cos * Math.cos(lon * RADIAN), cos * Math.sin(lon * RADIAN), Math.sin(lat * RADIAN)]
 }
 // Rings as d3-geo wants them: the exterior, which is smaller than half the globe, clockwise, and the holes the other way.
 function wound(rings) {
