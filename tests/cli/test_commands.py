@@ -127,6 +127,7 @@ def test_verify(hull, name):
     assert done.stderr.startswith(f"error: there is no hull '{name}-not-there'\n")
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_verify_of_a_wrong_hull():
     with server_process("--scrub-cpu", "0", wrap=FORGETFUL) as server, HullClient(server.address) as client:
         client.create_hull("a")

@@ -201,6 +201,7 @@ def test_the_first_difference_is_told():
     assert differences == [None, "the server holds 3 points, 2 were sent"]
 
 
+@pytest.mark.one_process("faults are put into the process that is started")
 def test_a_wrong_server_is_found_out(tmp_path, monkeypatch):
     @contextmanager
     def wrong_server() -> Iterator[str]:

@@ -257,22 +257,22 @@ def test_errors_are_typed_and_say_what_is_at_fault(client: HullClient, hull: str
 def test_limits_and_a_server_that_goes_away(connect: type[HullClient]) -> None:
     limits = ("--max-hulls", "1", "--max-message-bytes", "4096")
     with server_process(*limits) as server, connect(server.address) as client:
-        client.create_hull("one")
+        client.create_hull("a/one")
         with pytest.raises(LimitExceededError) as hulls:
-            client.create_hull("two")
+            client.create_hull("a/two")
         assert (hulls.value.reason, hulls.value.value) == ("LIMIT_EXCEEDED", "1")
         with pytest.raises(LimitExceededError, match="4096"):
-            client.apply("one", insert=np.zeros((4096, 2)))
-        watch = client.watch("one", reconnect=False)
+            client.apply("a/one", insert=np.zeros((4096, 2)))
+        watch = client.watch("a/one", reconnect=False)
         assert isinstance(next(watch), Snapshot)
         server.process.terminate()
         with pytest.raises(UnavailableError, match="shutting down"):
             list(watch)
         server.process.wait()
         with pytest.raises(UnavailableError):
-            client.get_hull("one")
+            client.get_hull("a/one")
         with pytest.raises(DeadlineError), connect(server.address, wait_for_ready=True, timeout=0.1) as patient:
-            patient.get_hull("one")
+            patient.get_hull("a/one")
 
 
 def test_a_copy_follows_its_hull(client: HullClient, hull: str) -> None:

@@ -155,7 +155,7 @@ def test_what_exists_and_what_does_not(client: HullClient, name: str) -> None:
     with pytest.raises(FenceExistsError, match="its area is"):
         client.create_fence(name, area=HOLE, subjects=name, exist_ok=True)
     with pytest.raises(HullNotFoundError):
-        client.create_fence(f"{name}-2", area=SQUARE, subjects="nobody")
+        client.create_fence(f"{name}-2", area=SQUARE, subjects=f"{name}-nobody")
     with pytest.raises(InvalidRequestError) as refused:
         client.create_fence(f"{name}-2", area=[[0, 0], [4, 4], [4, 0], [0, 4]], subjects=name)
     assert refused.value.field == "config.polygon_area.polygons[0].exterior"

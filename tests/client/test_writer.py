@@ -1,5 +1,6 @@
 """The writer: every batch is applied exactly once, after any failure of the connection or the server."""
 
+import os
 import signal
 import threading
 import time
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cluster import descendants
 from patience import wait_until
 from proxy import proxy
 from server_process import server_process
@@ -89,12 +91,15 @@ def test_put_waits_while_too_much_is_under_way(connect: type[HullClient]) -> Non
     with server_process() as server, connect(server.address) as client:
         client.create_hull("a")
         with client.writer("a", batch_points=10, in_flight=4) as writer:
-            server.process.send_signal(signal.SIGSTOP)
+            processes = (server.process.pid, *descendants(server.process.pid))
+            for each in processes:
+                os.kill(each, signal.SIGSTOP)
             putting = threading.Thread(target=lambda: [writer.put(insert=each) for each in POINTS[:9]])
             putting.start()
             putting.join(0.3)
             assert putting.is_alive()
-            server.process.send_signal(signal.SIGCONT)
+            for each in processes:
+                os.kill(each, signal.SIGCONT)
             putting.join()
         assert client.get_hull("a").info.points == 90
 
@@ -209,7 +214,8 @@ def test_a_writer_gives_up_a_server_that_stays_away(connect: type[HullClient]) -
     with server_process(killed=True) as server, connect(server.address) as client:
         client.create_hull("a")
         with pytest.raises(UnavailableError), client.writer("a", patience=0.3) as writer:  # noqa: PT012
-            server.process.kill()
+            for each in (server.process.pid, *descendants(server.process.pid)):
+                os.kill(each, signal.SIGKILL)
             writer.put(insert=POINTS[0])
             writer.flush()
 
