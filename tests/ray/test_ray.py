@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from patience import PATIENCE
@@ -31,10 +32,12 @@ if CASES == "all":
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ray")
+def found():
     script = Path(__file__).with_name("session.py")
-    run = subprocess.run([sys.executable, script, folder, CASES], capture_output=True, text=True, timeout=PATIENCE)
+    # Not a folder of pytest's: the names of Ray's sockets would be too long.
+    with TemporaryDirectory(dir="/tmp", ignore_cleanup_errors=True) as folder:
+        command = [sys.executable, script, folder, CASES]
+        run = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)
 
