@@ -112,8 +112,11 @@ def _block_hull(block: "Table", columns: tuple[str, str]) -> "Table":
 
 
 def _files(block: "Table") -> Iterator[tuple[str | None, "Table"]]:
-    """The parts of a block, each of one file."""
-    if PATH not in block.column_names or not len(block):
+    """The parts of a block, each of one file; the whole where a column of that name is something else."""
+    import pyarrow as pa
+
+    kind = block.schema.field(PATH).type if PATH in block.column_names else None
+    if kind is None or not (pa.types.is_string(kind) or pa.types.is_large_string(kind)) or not len(block):
         yield None, block
         return
     paths = block[PATH].to_numpy()
