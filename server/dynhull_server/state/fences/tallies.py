@@ -103,6 +103,7 @@ class Tallies(Table):
         place = super().remove(number)
         self.rule(place, rules=False)
         self.owners.pop(place, None)
+        self.columns[Column.STIRRED, place] = False  # nobody is there to be looked at
         return place
 
     def stirred(self) -> npt.NDArray[np.bool_]:
