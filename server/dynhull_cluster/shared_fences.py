@@ -65,7 +65,7 @@ class SharedFences:
                 sequence = await self._follow(call, feed, number, sending)
                 if sequence is None:
                     return
-                request = pb.WatchFenceRequest(name=request.name, uid=feed.uid, after_sequence=sequence)
+                request.uid, request.after_sequence = feed.uid, sequence
 
     async def _catch_up(
         self,
@@ -94,9 +94,9 @@ class SharedFences:
                         await self._relay.send(call, message)
                 resumed = False
                 if feed is None:
-                    kind = pb.WatchFenceRequest(name=request.name, uid=response.uid, only_new=True)
-                    if request.HasField("progress_interval"):
-                        kind.progress_interval.CopyFrom(request.progress_interval)
+                    kind = pb.WatchFenceRequest()
+                    kind.CopyFrom(request)
+                    kind.uid, kind.only_new = response.uid, True
                     begin = partial(FenceFeed, link, kind)
                     feed = joined.enter_context(self._feeds.use(kind.SerializeToString(deterministic=True), begin))
                 with call.cutoff():
