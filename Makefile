@@ -111,8 +111,8 @@ contract: .venv/.check  ## with a release: the contract that later ones must not
 	$(BIN)/buf breaking --against proto/contract.binpb
 	$(BIN)/buf build --exclude-source-info --output proto/contract.binpb
 
-workers: .venv/.test  ## the tests of the server, run against two gateways and two workers
-	$(BIN)/pytest tests/server tests/cluster --shape workers -n 2
+workers: .venv/.test  ## the tests of server, client, command line and dashboard, run against two gateways and two workers
+	$(BIN)/pytest tests/server tests/cluster tests/client tests/cli tests/dashboard --shape workers -n 2
 
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics

@@ -299,6 +299,7 @@ def test_events_that_were_dropped_while_the_server_was_away(
 
 
 @pytest.mark.long
+@pytest.mark.one_process("the fence and its hulls have no first part of their names in common")
 def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     kept = "--data", str(tmp_path)
     with server_process(*kept, killed=True) as first, HullClient(first.address) as client:
