@@ -157,9 +157,10 @@ class ChildProcess:
 
     async def _end(self) -> None:
         """Send SIGTERM, and SIGKILL if that has not ended it in time."""
-        process, ended = self._process, self._ended
+        process = self._process
         if process is None:
             return
+        ended = self._ended
         process.terminate()
         try:
             async with asyncio.timeout(self._grace + LAST_SECONDS):

@@ -13,7 +13,7 @@ from cluster import processes
 from command_line import dynhull
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from patience import PATIENCE, wait_until
-from server_process import Server, server_process
+from server_process import Server, run, server_process
 
 from dynhull_client import HullClient, UnavailableError
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -159,6 +159,17 @@ def test_a_killed_supervisor_takes_all_along_and_the_folder_is_served_again(tmp_
     manifest.write_text(manifest.read_text().replace('"workers": 2', '"workers": 3'))
     assert "workers.json is damaged: restore a backup" in refused("--workers", "3", "--data", copy)
     assert "is the folder of a server of one process" in refused(*WORKERS, "--data", copy / "worker-0")
+
+
+def test_a_worker_that_is_refused_at_its_start_says_why_and_all_end(tmp_path: Path) -> None:
+    with server_process(*WORKERS, "--data", str(tmp_path)):
+        pass
+    (tmp_path / "worker-1" / "dynhull.db").write_bytes(b"no database " * 1000)
+    result = run("serve", "--port", "0", *WORKERS, "--data", tmp_path)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "cannot serve: " in result.stderr
+    assert "worker-1/dynhull.db" in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 def refused(*options: object) -> str:
