@@ -5,6 +5,7 @@ import threading
 
 import numpy as np
 import pytest
+from command_line import dynhull
 from gateway_process import Gateway, gateway_process
 from server_process import server_process
 
@@ -220,6 +221,13 @@ def test_other_origins_only_if_allowed(gateway: Gateway, address: str) -> None:
         assert allowed.headers["Access-Control-Allow-Origin"] == "https://pages.example"
         asked["Origin"] = "https://others.example"
         assert "Access-Control-Allow-Origin" not in open_gateway.call("OPTIONS", "/hulls", **asked).headers
+
+
+@pytest.mark.parametrize("text", ["nonsense", "127.0.0.1:8000", "https://pages.example/", "https://pages.example:x"])
+def test_what_no_browser_sends_is_no_origin(text: str) -> None:
+    refused = dynhull("gateway", "--port", "0", "--origin", text)
+    assert refused.exit_code == 2
+    assert f"--origin {text!r} must be * or an origin as browsers send it" in " ".join(refused.stderr.split())
 
 
 def test_numbers_are_those_of_the_hull(gateway: Gateway, address: str, name: str) -> None:

@@ -1,5 +1,6 @@
 """`dynhull gateway`."""
 
+import re
 from typing import Annotated
 
 import typer
@@ -26,7 +27,7 @@ def gateway(
         list[str] | None,
         typer.Option(
             help="Name under which the gateway answers, as browsers and proxies send it in Host, without a port; * for "
-            "any. May be repeated. Default: the names of this machine on a loopback address, any elsewhere."
+            "any. May be repeated. Default: localhost, 127.0.0.1 and ::1 on a loopback address, any elsewhere."
         ),
     ] = None,
     root_path: Annotated[
@@ -78,7 +79,7 @@ def gateway(
     from .settings import Settings
 
     settings = Settings(
-        origins=tuple(origin or ()),
+        origins=tuple(map(_origin, origin or ())),
         hosts=hosts_of(allow_host, host),
         max_body=max_body * MIB,
         max_upload=max_upload * MIB,
@@ -92,6 +93,17 @@ def gateway(
     )
     limit = _seconds(timeout, "--timeout")
     run(lambda: connect(AsyncHullClient, timeout=limit), host, port, settings)
+
+
+def _origin(text: str) -> str:
+    """An origin as browsers send it. ValueError if it is none."""
+    origin = text.lower()
+    if origin == "*" or re.fullmatch(r"https?://(\[[0-9a-f:.]+\]|[^\s/?#@:\[\]]+)(:\d+)?", origin):
+        return origin
+    raise ValueError(
+        f"--origin {text!r} must be * or an origin as browsers send it: scheme, host and port without a path, such as "
+        "https://pages.example or http://127.0.0.1:8000"
+    )
 
 
 def _seconds(text: str, option: str) -> float:

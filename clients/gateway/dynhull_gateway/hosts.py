@@ -35,10 +35,11 @@ class KnownHosts:
         """Pass the request on, or refuse it."""
         if scope["type"] == "http":
             given = next((value for name, value in scope["headers"] if name == b"host"), b"").decode("latin-1")
-            if _name(given) not in self._hosts:
+            name = _name(given)
+            if name not in self._hosts:
                 refused = problem(
                     HTTPStatus.MISDIRECTED_REQUEST,
-                    f"this gateway does not answer to {given}; dynhull gateway --allow-host NAME allows a name",
+                    f"this gateway does not answer to {given}; dynhull gateway --allow-host {name or 'NAME'} allows it",
                     reason="UNKNOWN_HOST",
                     field="Host",
                     value=given,
