@@ -34,8 +34,8 @@ Secrets = Annotated[
     typer.Option(
         "--secret",
         envvar="DYNHULL_WEBHOOK_SECRET",
-        help="Secret whsec_... that signs webhooks; several while receivers change theirs. The environment keeps it "
-        "out of the list of processes.",
+        help="Secret whsec_... that signs webhooks, and nothing else; several while receivers change theirs. The "
+        "environment keeps it out of the list of processes.",
         show_envvar=True,
     ),
 ]

@@ -35,8 +35,8 @@ def target_of(
         if not keys and not unsigned:
             raise ValueError("webhooks are signed: give --secret or DYNHULL_WEBHOOK_SECRET, or --unsigned")
         return Webhook(to, keys, batch=batch, timeout=timeout, allow_private=allow_private)
-    if keys or batch > 1:
-        raise ValueError("--secret and --batch are for webhooks (http and https)")
+    if batch > 1:
+        raise ValueError("--batch is for webhooks (http and https)")
     match scheme:
         case "mqtt" | "mqtts":
             from .mqtt import Mqtt
