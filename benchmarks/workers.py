@@ -95,7 +95,7 @@ class Spending:
         self._times = []
 
     def during(self, work, number):
-        """The result of some work, which makes so many calls."""
+        """The result of some work, which makes `number` calls."""
         before = self._now()
         result = work()
         self._times.append({kind: (now - before[kind]) / number * 1e6 for kind, now in self._now().items()})

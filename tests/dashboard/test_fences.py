@@ -7,11 +7,11 @@ from itertools import count
 from pathlib import Path
 
 import pytest
+from chromium import chromium
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
-from peers import program
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, expect
 from proxy import proxy
 from server_process import Server, run, server_process
 
@@ -27,11 +27,8 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "i
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A real Chromium."""
-    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chromium import chromium
 from dashboard_process import dashboard_process, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
-from peers import program
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, expect
 from server_process import Server, run, server_process
 
 from dynhull import GeoHull
@@ -53,11 +53,8 @@ INSIDE = """([name, columns, rows]) => {
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A real Chromium."""
-    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 import pytest
+from chromium import chromium
 from command_line import dynhull
 from dashboard_process import dashboard_process, opened
 from patience import PATIENCE
-from peers import program
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 from dynhull_client import HullClient
 from dynhull_dashboard.tiles import Tiles
@@ -80,11 +80,8 @@ def serving(server: TileServer) -> Iterator[TileServer]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 def wait_for_tiles(page: Page) -> None:

@@ -7,10 +7,10 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from chromium import chromium
 from gateway_process import Events, Gateway, free_port, gateway_process
 from patience import PATIENCE, wait_until
-from peers import program
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from server_process import server_process
 
 from dynhull_client import HullClient
@@ -39,11 +39,8 @@ FOLLOW = """url => {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    chromium = program("chromium", "chromium-browser", "google-chrome", "chrome")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 def seen(page: Page, url: str) -> dict[str, Any]:

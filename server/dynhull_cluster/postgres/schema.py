@@ -166,7 +166,7 @@ def partitions_of(connection: Connection, database: Database) -> int | None:
 
 
 def prepare(connection: Connection, database: Database, partitions: int) -> None:
-    """Create the tables of so many partitions, or migrate those that there are. Inside a transaction, after `hold`.
+    """Create the tables for `partitions` partitions, or migrate those there are. Inside a transaction, after `hold`.
 
     Raises:
         FormatError: the database belongs to another program, or to a newer version.

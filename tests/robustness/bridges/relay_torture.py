@@ -151,7 +151,7 @@ def run(downs: int, down: float, kills: int, patience: list[str], seed: int, fol
 
 
 def _arrive(client: HullClient, writer: Writer, within: float) -> None:
-    """Wait until the relay has acknowledged all events up to now, at most for so many seconds."""
+    """Wait until the relay has acknowledged all events up to now, at most `within` seconds."""
     up_to = {name: len(writer.expected[name]) for name in FENCES}
     end = time.monotonic() + within
     while True:

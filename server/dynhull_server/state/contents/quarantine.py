@@ -156,7 +156,8 @@ class Quarantine:
             revision: the revision of the batch.
         """
         speeds, growths = self._measured(rows, written, hull, judge)
-        found = Judged(np.isnan(speeds) & np.isnan(growths), [], None, 0, 0, 0, 0)
+        unbroken = np.isnan(speeds) & np.isnan(growths)
+        found = Judged(unbroken.copy(), [], None, 0, 0, 0, 0)
         keys = key_list(rows.keys) if self._held or not found.let_in.all() else []
         rejected, dropped = np.flatnonzero(~found.let_in).tolist(), []
         new: list[Held] = []
@@ -179,7 +180,7 @@ class Quarantine:
             found.held.append(row)
             new.append(Held(x, y, time, deadline, float(speeds[row]), float(growths[row]), revision, confirmed))
         if self._held:
-            self._drop_others(rows, keys, written & (np.isnan(speeds) & np.isnan(growths)), hull, found, dropped)
+            self._drop_others(rows, keys, written & unbroken, hull, found, dropped)
         if new or dropped:
             held = take_keys(rows.keys, np.array(found.held, np.intp))
             found.change = HeldChange(rows_of(held, new), self._pack(dropped))

@@ -1,0 +1,17 @@
+"""A real Chromium."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from peers import program
+from playwright.sync_api import Browser, sync_playwright
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """Debian's Chromium, or the one that this machine has."""
+    path = program("chromium", "chromium-browser", "google-chrome", "chrome")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
