@@ -1,9 +1,11 @@
 """The futures of writers and pipelines are futures like all others, whenever and however somebody looks at them."""
 
 import asyncio
+import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Future, as_completed, wait
+from contextlib import suppress
 
 import pytest
 from patience import PATIENCE
@@ -92,3 +94,35 @@ def test_cancelling_drops_the_answer_alone(client: HullClient, name: str) -> Non
         with pytest.raises(CancelledError):
             outcome.result()
     assert client.get_hull(name).info.points == 1
+
+
+def test_those_who_wait_for_several_futures_hear_of_cancelled_ones(client: HullClient, name: str) -> None:
+    writer = client.writer(name, linger=60)
+    with suppress(ZeroDivisionError), writer:
+        outcome = writer.put(insert=[[1, 1]])
+        raise ZeroDivisionError
+    assert outcome.cancelled()
+    assert outcome.cancel()
+    assert wait([outcome], PATIENCE).not_done == set()
+
+
+@pytest.fixture
+def _threads_take_turns_often() -> Iterator[None]:
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(usual)
+
+
+@pytest.mark.usefixtures("_threads_take_turns_often")
+def test_a_future_cancelled_just_when_it_gets_its_result_harms_no_other(client: HullClient, name: str) -> None:
+    with client.writer(name, batch_points=1) as writer:
+        for begin in range(0, 3000, 300):
+            outcomes = [writer.put(insert=[[i, i * i]]) for i in range(begin, begin + 300)]
+            threads = [threading.Thread(target=lambda: [each.cancel() for each in outcomes]) for _ in range(3)]  # noqa: B023
+            for each in threads:
+                each.start()
+            for each in threads:
+                each.join()
+            writer.flush()
+    assert client.get_hull(name).info.points == 3000

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Future
-from concurrent.futures._base import FINISHED, PENDING
+from concurrent.futures import Future, InvalidStateError
+from concurrent.futures._base import CANCELLED, FINISHED, PENDING
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -41,6 +42,14 @@ class Outcome(Future[T]):
         """Whether it has a result or an error, or is cancelled."""
         return self._state == FINISHED or super().done()
 
+    def cancel(self) -> bool:
+        """Cancel it, and tell those who wait for several futures: no executor does so later."""
+        cancelled = super().cancel()
+        with self._condition:
+            if self._state == CANCELLED:
+                self.set_running_or_notify_cancel()
+        return cancelled
+
     def result(self, timeout: float | None = None) -> T:
         """The result, or raise the error, at most `timeout` seconds later; TimeoutError after these."""
         if self._state == FINISHED and self._exception is None:
@@ -67,7 +76,8 @@ def settle(settled: Iterable[tuple[Any, Any]]) -> None:
             continue
         if outcome.done():  # cancelled by its caller
             continue
-        if isinstance(result, Exception):
-            outcome.set_exception(result)
-        else:
-            outcome.set_result(result)
+        with suppress(InvalidStateError):  # cancelled just now
+            if isinstance(result, Exception):
+                outcome.set_exception(result)
+            else:
+                outcome.set_result(result)
