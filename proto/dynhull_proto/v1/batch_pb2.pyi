@@ -3,10 +3,11 @@ import datetime
 from dynhull_proto.v1 import points_pb2 as _points_pb2
 from google.protobuf import duration_pb2 as _duration_pb2
 from google.protobuf import timestamp_pb2 as _timestamp_pb2
+from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
-from collections.abc import Mapping as _Mapping
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
 from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
@@ -52,7 +53,7 @@ MISSING_POINT_POLICY_REFUSE: MissingPointPolicy
 MISSING_POINT_POLICY_COUNT: MissingPointPolicy
 
 class Batch(_message.Message):
-    __slots__ = ("inserts", "deletes", "moves", "missing_points", "puts", "removes", "missing_keys", "insert_times")
+    __slots__ = ("inserts", "deletes", "moves", "missing_points", "puts", "removes", "missing_keys", "insert_times", "releases", "drops")
     INSERTS_FIELD_NUMBER: _ClassVar[int]
     DELETES_FIELD_NUMBER: _ClassVar[int]
     MOVES_FIELD_NUMBER: _ClassVar[int]
@@ -61,6 +62,8 @@ class Batch(_message.Message):
     REMOVES_FIELD_NUMBER: _ClassVar[int]
     MISSING_KEYS_FIELD_NUMBER: _ClassVar[int]
     INSERT_TIMES_FIELD_NUMBER: _ClassVar[int]
+    RELEASES_FIELD_NUMBER: _ClassVar[int]
+    DROPS_FIELD_NUMBER: _ClassVar[int]
     inserts: _points_pb2.Points
     deletes: _points_pb2.Points
     moves: Moves
@@ -69,7 +72,9 @@ class Batch(_message.Message):
     removes: _points_pb2.Keys
     missing_keys: MissingKeyPolicy
     insert_times: _points_pb2.Times
-    def __init__(self, inserts: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., deletes: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., moves: _Optional[_Union[Moves, _Mapping]] = ..., missing_points: _Optional[_Union[MissingPointPolicy, str]] = ..., puts: _Optional[_Union[Puts, _Mapping]] = ..., removes: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., missing_keys: _Optional[_Union[MissingKeyPolicy, str]] = ..., insert_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
+    releases: _points_pb2.Keys
+    drops: _points_pb2.Keys
+    def __init__(self, inserts: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., deletes: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., moves: _Optional[_Union[Moves, _Mapping]] = ..., missing_points: _Optional[_Union[MissingPointPolicy, str]] = ..., puts: _Optional[_Union[Puts, _Mapping]] = ..., removes: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., missing_keys: _Optional[_Union[MissingKeyPolicy, str]] = ..., insert_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., releases: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., drops: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class Puts(_message.Message):
     __slots__ = ("keys", "points", "times", "condition", "ttl", "expire_times")
@@ -96,7 +101,7 @@ class Moves(_message.Message):
     def __init__(self, origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., destinations: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class BatchResult(_message.Message):
-    __slots__ = ("revision", "inserted", "deleted", "missing", "hull_changed", "point_count", "duplicate", "moved", "stale", "late", "skipped", "clamped", "evicted", "clock_time")
+    __slots__ = ("revision", "inserted", "deleted", "missing", "hull_changed", "point_count", "duplicate", "moved", "stale", "late", "skipped", "clamped", "evicted", "clock_time", "held", "held_rows", "released", "dropped")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     INSERTED_FIELD_NUMBER: _ClassVar[int]
     DELETED_FIELD_NUMBER: _ClassVar[int]
@@ -111,6 +116,10 @@ class BatchResult(_message.Message):
     CLAMPED_FIELD_NUMBER: _ClassVar[int]
     EVICTED_FIELD_NUMBER: _ClassVar[int]
     CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
+    HELD_FIELD_NUMBER: _ClassVar[int]
+    HELD_ROWS_FIELD_NUMBER: _ClassVar[int]
+    RELEASED_FIELD_NUMBER: _ClassVar[int]
+    DROPPED_FIELD_NUMBER: _ClassVar[int]
     revision: int
     inserted: int
     deleted: int
@@ -125,4 +134,8 @@ class BatchResult(_message.Message):
     clamped: int
     evicted: int
     clock_time: _timestamp_pb2.Timestamp
-    def __init__(self, revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., hull_changed: bool = ..., point_count: _Optional[int] = ..., duplicate: bool = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    held: int
+    held_rows: _containers.RepeatedScalarFieldContainer[int]
+    released: int
+    dropped: int
+    def __init__(self, revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., hull_changed: bool = ..., point_count: _Optional[int] = ..., duplicate: bool = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., held: _Optional[int] = ..., held_rows: _Optional[_Iterable[int]] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...

@@ -58,7 +58,7 @@ IDENTITY_STRING_KEYS: Identity
 IDENTITY_INTEGER_KEYS: Identity
 
 class Hull(_message.Message):
-    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time", "center")
+    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time", "center", "quarantine", "held_count")
     NAME_FIELD_NUMBER: _ClassVar[int]
     CONFIG_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
@@ -68,6 +68,8 @@ class Hull(_message.Message):
     UID_FIELD_NUMBER: _ClassVar[int]
     CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
     CENTER_FIELD_NUMBER: _ClassVar[int]
+    QUARANTINE_FIELD_NUMBER: _ClassVar[int]
+    HELD_COUNT_FIELD_NUMBER: _ClassVar[int]
     name: str
     config: HullConfig
     revision: int
@@ -77,23 +79,37 @@ class Hull(_message.Message):
     uid: str
     clock_time: _timestamp_pb2.Timestamp
     center: LonLat
-    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ...) -> None: ...
+    quarantine: Quarantine
+    held_count: int
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ..., held_count: _Optional[int] = ...) -> None: ...
 
 class HullConfig(_message.Message):
-    __slots__ = ("identity", "max_points", "window", "ordering", "frame", "center")
+    __slots__ = ("identity", "max_points", "window", "ordering", "frame", "center", "quarantine")
     IDENTITY_FIELD_NUMBER: _ClassVar[int]
     MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
     WINDOW_FIELD_NUMBER: _ClassVar[int]
     ORDERING_FIELD_NUMBER: _ClassVar[int]
     FRAME_FIELD_NUMBER: _ClassVar[int]
     CENTER_FIELD_NUMBER: _ClassVar[int]
+    QUARANTINE_FIELD_NUMBER: _ClassVar[int]
     identity: Identity
     max_points: int
     window: Window
     ordering: Ordering
     frame: Frame
     center: LonLat
-    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ..., frame: _Optional[_Union[Frame, str]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ...) -> None: ...
+    quarantine: Quarantine
+    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ..., frame: _Optional[_Union[Frame, str]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ...) -> None: ...
+
+class Quarantine(_message.Message):
+    __slots__ = ("max_speed", "max_growth", "confirmations")
+    MAX_SPEED_FIELD_NUMBER: _ClassVar[int]
+    MAX_GROWTH_FIELD_NUMBER: _ClassVar[int]
+    CONFIRMATIONS_FIELD_NUMBER: _ClassVar[int]
+    max_speed: float
+    max_growth: float
+    confirmations: int
+    def __init__(self, max_speed: _Optional[float] = ..., max_growth: _Optional[float] = ..., confirmations: _Optional[int] = ...) -> None: ...
 
 class LonLat(_message.Message):
     __slots__ = ("longitude", "latitude")

@@ -82,6 +82,58 @@ class RecenterResponse(_message.Message):
     hull_changed: bool
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., hull_changed: bool = ...) -> None: ...
 
+class SetQuarantineRequest(_message.Message):
+    __slots__ = ("name", "quarantine")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    QUARANTINE_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    quarantine: _hull_pb2.Quarantine
+    def __init__(self, name: _Optional[str] = ..., quarantine: _Optional[_Union[_hull_pb2.Quarantine, _Mapping]] = ...) -> None: ...
+
+class SetQuarantineResponse(_message.Message):
+    __slots__ = ("hull",)
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    hull: _hull_pb2.Hull
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
+
+class ListHeldRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding", "page_size", "page_token")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    PAGE_SIZE_FIELD_NUMBER: _ClassVar[int]
+    PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    page_size: int
+    page_token: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ...) -> None: ...
+
+class ListHeldResponse(_message.Message):
+    __slots__ = ("revision", "keys", "positions", "times", "speeds", "growths", "revisions", "confirmations", "held_count", "next_page_token")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    SPEEDS_FIELD_NUMBER: _ClassVar[int]
+    GROWTHS_FIELD_NUMBER: _ClassVar[int]
+    REVISIONS_FIELD_NUMBER: _ClassVar[int]
+    CONFIRMATIONS_FIELD_NUMBER: _ClassVar[int]
+    HELD_COUNT_FIELD_NUMBER: _ClassVar[int]
+    NEXT_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    keys: _points_pb2.Keys
+    positions: _points_pb2.Points
+    times: _points_pb2.Times
+    speeds: _containers.RepeatedScalarFieldContainer[float]
+    growths: _containers.RepeatedScalarFieldContainer[float]
+    revisions: _containers.RepeatedScalarFieldContainer[int]
+    confirmations: _containers.RepeatedScalarFieldContainer[int]
+    held_count: int
+    next_page_token: str
+    def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., speeds: _Optional[_Iterable[float]] = ..., growths: _Optional[_Iterable[float]] = ..., revisions: _Optional[_Iterable[int]] = ..., confirmations: _Optional[_Iterable[int]] = ..., held_count: _Optional[int] = ..., next_page_token: _Optional[str] = ...) -> None: ...
+
 class ApplyRequest(_message.Message):
     __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence")
     NAME_FIELD_NUMBER: _ClassVar[int]
@@ -147,7 +199,7 @@ class IngestRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
 
 class IngestResponse(_message.Message):
-    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted")
+    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
     INSERTED_FIELD_NUMBER: _ClassVar[int]
@@ -161,6 +213,9 @@ class IngestResponse(_message.Message):
     SKIPPED_FIELD_NUMBER: _ClassVar[int]
     CLAMPED_FIELD_NUMBER: _ClassVar[int]
     EVICTED_FIELD_NUMBER: _ClassVar[int]
+    HELD_FIELD_NUMBER: _ClassVar[int]
+    RELEASED_FIELD_NUMBER: _ClassVar[int]
+    DROPPED_FIELD_NUMBER: _ClassVar[int]
     batches: int
     revision: int
     inserted: int
@@ -174,7 +229,10 @@ class IngestResponse(_message.Message):
     skipped: int
     clamped: int
     evicted: int
-    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ...) -> None: ...
+    held: int
+    released: int
+    dropped: int
+    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., held: _Optional[int] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...
 
 class StreamRequest(_message.Message):
     __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip", "after_sequence")

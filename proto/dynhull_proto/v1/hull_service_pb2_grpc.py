@@ -84,6 +84,16 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterResponse.FromString,
                 _registered_method=True)
+        self.SetQuarantine = channel.unary_unary(
+                '/dynhull.v1.HullService/SetQuarantine',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineResponse.FromString,
+                _registered_method=True)
+        self.ListHeld = channel.unary_unary(
+                '/dynhull.v1.HullService/ListHeld',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldResponse.FromString,
+                _registered_method=True)
         self.Apply = channel.unary_unary(
                 '/dynhull.v1.HullService/Apply',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ApplyRequest.SerializeToString,
@@ -264,6 +274,22 @@ class HullServiceServicer(object):
         """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
         that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
         the new centre, or if there is no point to choose it from; then nothing changes.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def SetQuarantine(self, request, context):
+        """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
+        batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ListHeld(self, request, context):
+        """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
+        Batch.drops let them in and drop them.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -489,6 +515,16 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.Recenter,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterResponse.SerializeToString,
+            ),
+            'SetQuarantine': grpc.unary_unary_rpc_method_handler(
+                    servicer.SetQuarantine,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineResponse.SerializeToString,
+            ),
+            'ListHeld': grpc.unary_unary_rpc_method_handler(
+                    servicer.ListHeld,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldResponse.SerializeToString,
             ),
             'Apply': grpc.unary_unary_rpc_method_handler(
                     servicer.Apply,
@@ -749,6 +785,60 @@ class HullService(object):
             '/dynhull.v1.HullService/Recenter',
             dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.RecenterResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SetQuarantine(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/SetQuarantine',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ListHeld(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/ListHeld',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -74,6 +74,14 @@ class HullServiceStub:
     that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
     the new centre, or if there is no point to choose it from; then nothing changes.
     """
+    SetQuarantine: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SetQuarantineRequest, _hull_service_pb2.SetQuarantineResponse]
+    """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
+    batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+    """
+    ListHeld: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]
+    """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
+    Batch.drops let them in and drop them.
+    """
     Apply: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]
     """Applies one batch."""
     ApplyTogether: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyTogetherRequest, _hull_service_pb2.ApplyTogetherResponse]
@@ -213,6 +221,14 @@ class HullServiceAsyncStub(HullServiceStub):
     """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
     that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
     the new centre, or if there is no point to choose it from; then nothing changes.
+    """
+    SetQuarantine: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SetQuarantineRequest, _hull_service_pb2.SetQuarantineResponse]  # type: ignore[assignment]
+    """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
+    batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+    """
+    ListHeld: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]  # type: ignore[assignment]
+    """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
+    Batch.drops let them in and drop them.
     """
     Apply: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ApplyRequest, _hull_service_pb2.ApplyResponse]  # type: ignore[assignment]
     """Applies one batch."""
@@ -374,6 +390,26 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         """Moves the centre of a geographic hull, as a revision whose cause is CAUSE_RECENTER: the hull is built anew. Decisions
         that depend on nanometres may change. FAILED_PRECONDITION if the hull is a plane, if a point is beyond 85 degrees from
         the new centre, or if there is no point to choose it from; then nothing changes.
+        """
+
+    @_abc_1.abstractmethod
+    def SetQuarantine(
+        self,
+        request: _hull_service_pb2.SetQuarantineRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.SetQuarantineResponse, _abc.Awaitable[_hull_service_pb2.SetQuarantineResponse]]:
+        """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
+        batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+        """
+
+    @_abc_1.abstractmethod
+    def ListHeld(
+        self,
+        request: _hull_service_pb2.ListHeldRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.ListHeldResponse, _abc.Awaitable[_hull_service_pb2.ListHeldResponse]]:
+        """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
+        Batch.drops let them in and drop them.
         """
 
     @_abc_1.abstractmethod
