@@ -321,4 +321,4 @@ def test_held_rows_have_what_a_release_needs():
     assert np.isnan(found.speeds).all()
     assert found.growths.tolist() == [5.45]
     assert hull.state.quarantine.whole()
-    assert hull.state.quarantine.stored("e").keys == NONE
+    assert hull.state.quarantine.page("e", 10)[0].keys == NONE

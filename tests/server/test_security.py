@@ -56,6 +56,8 @@ EVERY_CALL = {
     "Ingest": lambda stub, name: stub.Ingest(iter([pb.IngestRequest(name=name)])),
     "Stream": lambda stub, name: list(stub.Stream(iter([pb.StreamRequest(name=name)]))),
     "Recenter": lambda stub, name: stub.Recenter(pb.RecenterRequest(name=name)),
+    "SetQuarantine": lambda stub, name: stub.SetQuarantine(pb.SetQuarantineRequest(name=name)),
+    "ListHeld": lambda stub, name: stub.ListHeld(pb.ListHeldRequest(name=name)),
     "GetProducer": lambda stub, name: stub.GetProducer(pb.GetProducerRequest(name=name, producer="p")),
     "Locate": lambda stub, name: stub.Locate(pb.LocateRequest(name=name)),
     "Count": lambda stub, name: stub.Count(pb.CountRequest(name=name)),
@@ -77,7 +79,17 @@ EVERY_CALL = {
     "Verify": lambda stub, name: stub.Verify(pb.VerifyRequest(name=name)),
     "Query": lambda stub, name: next(stub.Query(iter([pb.QueryRequest(reads=[{"verify": {"name": name}}])]))),
 }
-WRITES = {"CreateHull", "DeleteHull", "Apply", "ApplyTogether", "Ingest", "Stream", "Recenter", "GetProducer"}
+WRITES = {
+    "CreateHull",
+    "DeleteHull",
+    "Apply",
+    "ApplyTogether",
+    "Ingest",
+    "Stream",
+    "Recenter",
+    "SetQuarantine",
+    "GetProducer",
+}
 
 
 def test_every_call_is_tried() -> None:

@@ -84,6 +84,7 @@ from ._messages import (
     Window,
 )
 from ._pipeline import Pipeline
+from ._quarantine_messages import HeldPosition, Quarantine
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import FenceWatch, Watch
 from ._writer import Writer
@@ -120,6 +121,7 @@ __all__ = [
     "FenceNotFoundError",
     "FenceReplacedError",
     "FenceWatch",
+    "HeldPosition",
     "Hull",
     "HullClient",
     "HullCopy",
@@ -152,6 +154,7 @@ __all__ = [
     "Prefix",
     "ProducerInUseError",
     "Progress",
+    "Quarantine",
     "RevisionForgottenError",
     "Sampled",
     "Separation",

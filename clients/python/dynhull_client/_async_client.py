@@ -7,6 +7,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from . import _calls as calls
 from . import _fences as fences
 from . import _layers as peeling
+from . import _quarantine as quarantine
 from . import _uses as uses
 from ._async_ingest import AsyncIngest
 from ._async_pipeline import AsyncPipeline
@@ -17,6 +18,7 @@ from ._connection import AsyncConnection
 from ._fence_messages import Fence
 from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
+from ._quarantine_messages import HeldPosition
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -49,6 +51,9 @@ class AsyncHullClient(Client[AsyncConnection]):
     apply = _answering(calls.apply)
     put = _answering(calls.put)
     remove = _answering(calls.remove)
+    release = _answering(quarantine.release)
+    drop = _answering(quarantine.drop)
+    set_quarantine = _answering(quarantine.set_quarantine)
     transfer = _answering(calls.transfer)
     last_sequence = _answering(calls.last_sequence)
     locate = _answering(calls.locate)
@@ -87,6 +92,19 @@ class AsyncHullClient(Client[AsyncConnection]):
         while following is not None:
             hulls, token = await self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
             for each in hulls:
+                yield each
+            following = token or None
+
+    async def list_held(
+        self, name: str, *, min_revision: int = 0, timeout: float | None = None
+    ) -> AsyncIterator[HeldPosition]:
+        """The positions in quarantine of a keyed hull, in the order of their keys, fetched page by page."""
+        following: str | None = ""
+        while following is not None:
+            found, token = await self._connection.answer(
+                described(quarantine.held_page, name, following, min_revision=min_revision, timeout=timeout)
+            )
+            for each in found:
                 yield each
             following = token or None
 

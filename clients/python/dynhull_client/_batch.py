@@ -50,6 +50,8 @@ class Batch:
         only: as for `HullClient.put`.
         ttl: as for `HullClient.put`.
         expire_times: as for `HullClient.put`.
+        release: keys in quarantine to let in. Without keys to put and to remove, as `drop`.
+        drop: keys in quarantine whose held position is dropped.
         missing: for a key to remove or a point to delete that the hull does not hold, "raise" refuses the batch and
             "count" skips the row and counts it. By default "count" for keys and "raise" for points.
 
@@ -70,6 +72,8 @@ class Batch:
         only: Only | None = None,
         ttl: float | timedelta | None = None,
         expire_times: Any = None,
+        release: Any = None,
+        drop: Any = None,
         missing: Missing | None = None,
     ) -> None:
         self._message = batch_pb2.Batch()
@@ -78,7 +82,9 @@ class Batch:
             self._set_policy(missing)
         if (keys is None) != (points is None):
             raise ValueError("keys and points are given together: the position of each key")
-        if not (keys is None and remove is None) and not (insert is None and delete is None and move is None):
+        if not (keys is None and remove is None and release is None and drop is None) and not (
+            insert is None and delete is None and move is None
+        ):
             raise ValueError("a batch either puts and removes keys, or inserts, deletes and moves points")
         if insert is not None:
             inserted = as_points(insert, "insert")
@@ -93,10 +99,11 @@ class Batch:
             self._fill(self._message.deletes, as_points(delete, "delete"))
         if move is not None:
             self._move(as_points(move[0], "move[0]"), as_points(move[1], "move[1]"))
-        if remove is not None:
-            removed = checked_keys(remove, "remove")
-            self._message.removes.CopyFrom(encode_keys(removed))
-            self._rows += len(removed)
+        for argument, named in (("remove", remove), ("release", release), ("drop", drop)):
+            if named is not None:
+                checked = checked_keys(named, argument)
+                getattr(self._message, f"{argument}s").CopyFrom(encode_keys(checked))
+                self._rows += len(checked)
         if not (only is None and ttl is None and expire_times is None):
             self._set_conditions(only, ttl, expire_times)
 

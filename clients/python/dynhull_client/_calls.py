@@ -38,6 +38,7 @@ from ._messages import (
     Tangents,
     Verification,
 )
+from ._quarantine_messages import encode_quarantine
 from ._times import encode_duration
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from ._batch import Missing, Only
     from ._hull_copy import HullCopy
     from ._messages import Ahead, Clock, Ordering
+    from ._quarantine_messages import Quarantine
 
 Answer = TypeVar("Answer")
 
@@ -119,6 +121,7 @@ def create_hull(
     point_limit: int | None = None,
     geographic: bool = False,
     center: tuple[float, float] | None = None,
+    quarantine: Quarantine | None = None,
     exist_ok: bool = False,
     timeout: float | None = None,
 ) -> Call[HullInfo]:
@@ -144,6 +147,8 @@ def create_hull(
         geographic: whether points are places on the globe, rather than points of a plane.
         center: longitude and latitude of the centre of a geographic hull, whose points are all within 85 degrees of it;
             None for the mean direction of its first points.
+        quarantine: the rules that a keyed hull begins with, which hold bad positions out; None for none.
+            `set_quarantine` changes them; those of an existing hull are not compared.
         exist_ok: whether to return an existing hull of that name and kind, with its points. HullExistsError if it has
             other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
@@ -159,6 +164,8 @@ def create_hull(
         config.window.CopyFrom(_window(max_age, max_points, clock, max_skew, ahead))
     elif clock != "server" or max_skew is not None or ahead != "refuse":
         raise ValueError("clock, max_skew and ahead are settings of a window: give max_age or max_points, too")
+    if quarantine is not None:
+        config.quarantine.CopyFrom(encode_quarantine(quarantine))
     create: Call[HullInfo] = Call(
         "CreateHull",
         pb.CreateHullRequest(name=name, config=config),
@@ -337,7 +344,7 @@ def apply(  # noqa: D417  # unnamed takes nothing
             f"write apply({name!r}, insert=points) or apply({name!r}, delete=points)"
         )
     batch = Batch(insert=insert, delete=delete, move=move, times=times, missing=missing)
-    return _apply(name, batch, producer, sequence, may_skip, timeout)
+    return apply_batch(name, batch, producer, sequence, may_skip, timeout)
 
 
 def put(
@@ -376,7 +383,7 @@ def put(
         timeout: seconds, instead of the client's.
     """
     batch = Batch(keys=keys, points=points, times=times, remove=remove, only=only, ttl=ttl, expire_times=expire_times)
-    return _apply(name, batch, producer, sequence, may_skip, timeout)
+    return apply_batch(name, batch, producer, sequence, may_skip, timeout)
 
 
 def remove(
@@ -401,7 +408,7 @@ def remove(
         may_skip: as for `apply`.
         timeout: seconds, instead of the client's.
     """
-    return _apply(name, Batch(remove=keys, missing=missing), producer, sequence, may_skip, timeout)
+    return apply_batch(name, Batch(remove=keys, missing=missing), producer, sequence, may_skip, timeout)
 
 
 def transfer(
@@ -437,9 +444,10 @@ def transfer(
     return Call("ApplyTogether", request, decode, timeout, repeatable=sequence > 0)
 
 
-def _apply(
+def apply_batch(
     name: str, batch: Batch, producer: str, sequence: int, may_skip: bool, timeout: float | None
 ) -> Call[Applied]:
+    """The call that applies a batch."""
     request = pb.ApplyRequest(name=name, batch=batch.message, producer=producer, sequence=sequence, may_skip=may_skip)
     return Call(
         "Apply", request, lambda response: messages.decode_applied(response.result), timeout, repeatable=sequence > 0

@@ -7,6 +7,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 from . import _calls as calls
 from . import _fences as fences
 from . import _layers as peeling
+from . import _quarantine as quarantine
 from . import _uses as uses
 from ._calls import Call
 from ._connection import BlockingConnection
@@ -15,6 +16,7 @@ from ._ingest import Ingest
 from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
+from ._quarantine_messages import HeldPosition
 from ._watch import FenceWatch, Watch
 from ._writer import Writer
 
@@ -60,6 +62,9 @@ class HullClient(Client[BlockingConnection]):
     apply = _answering(calls.apply)
     put = _answering(calls.put)
     remove = _answering(calls.remove)
+    release = _answering(quarantine.release)
+    drop = _answering(quarantine.drop)
+    set_quarantine = _answering(quarantine.set_quarantine)
     transfer = _answering(calls.transfer)
     last_sequence = _answering(calls.last_sequence)
     locate = _answering(calls.locate)
@@ -98,6 +103,16 @@ class HullClient(Client[BlockingConnection]):
         while following is not None:
             hulls, token = self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
             yield from hulls
+            following = token or None
+
+    def list_held(self, name: str, *, min_revision: int = 0, timeout: float | None = None) -> Iterator[HeldPosition]:
+        """The positions in quarantine of a keyed hull, in the order of their keys, fetched page by page."""
+        following: str | None = ""
+        while following is not None:
+            found, token = self._connection.answer(
+                described(quarantine.held_page, name, following, min_revision=min_revision, timeout=timeout)
+            )
+            yield from found
             following = token or None
 
     def list_fences(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[Fence]:

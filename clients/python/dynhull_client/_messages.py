@@ -17,6 +17,7 @@ from dynhull.keys import Keys, KeyType
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 
 from ._keys import KeyTuple, decode_keys, decode_names, join_keys
+from ._quarantine_messages import Quarantine, decode_quarantine
 from ._times import Times, decode_time, decode_times
 
 Clock = Literal["server", "data"]
@@ -66,6 +67,8 @@ class HullInfo:
         clock: its clock, which decides what is too old; None if it has none so far.
         geographic: whether its points are longitudes and latitudes in degrees.
         center: longitude and latitude of the centre of a geographic hull; None if it has none so far.
+        quarantine: the rules of its quarantine; None for a hull that has never had any.
+        held: the number of keys in quarantine.
     """
 
     name: str
@@ -81,6 +84,8 @@ class HullInfo:
     clock: datetime | None = None
     geographic: bool = False
     center: tuple[float, float] | None = None
+    quarantine: Quarantine | None = None
+    held: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -160,6 +165,10 @@ class Applied:
         clamped: rows whose event time was too far ahead and was reduced.
         evicted: the oldest points, removed because the window has room for no more.
         clock: the hull's clock after it; None for a hull without one.
+        held: positions put into quarantine, because they break a rule of the hull.
+        held_rows: the rows of the batch that these are, ascending.
+        released: keys that left the quarantine and were let in: by request, or because their position was confirmed.
+        dropped: keys whose held position was dropped: by request, contradicted by one that was let in, or removed.
     """
 
     revision: int
@@ -176,6 +185,10 @@ class Applied:
     clamped: int = 0
     evicted: int = 0
     clock: datetime | None = None
+    held: int = 0
+    held_rows: tuple[int, ...] = ()
+    released: int = 0
+    dropped: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +212,9 @@ class Ingested:
     skipped: int = 0
     clamped: int = 0
     evicted: int = 0
+    held: int = 0
+    released: int = 0
+    dropped: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -502,6 +518,8 @@ def decode_info(message: hull_pb2.Hull) -> HullInfo:
         _clock(message),
         config.frame == hull_pb2.FRAME_GEOGRAPHIC,
         decode_center(message),
+        decode_quarantine(message.quarantine) if message.HasField("quarantine") else None,
+        message.held_count,
     )
 
 
@@ -544,6 +562,10 @@ def decode_applied(message: batch_pb2.BatchResult) -> Applied:
         message.clamped,
         message.evicted,
         _clock(message),
+        message.held,
+        tuple(message.held_rows),
+        message.released,
+        message.dropped,
     )
 
 
@@ -563,6 +585,9 @@ def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
         message.skipped,
         message.clamped,
         message.evicted,
+        message.held,
+        message.released,
+        message.dropped,
     )
 
 

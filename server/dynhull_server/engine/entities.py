@@ -12,13 +12,15 @@ from dynhull.arrays import Checked, Points
 from dynhull.keys import take_keys
 
 from ..state.batch import NO_POINTS
+from ..state.contents.deadlines import Key
 from ..state.contents.keyed import Found, Keyed
 from ..state.contents.live import layer_of
+from ..state.contents.quarantine import OFF, Quarantine
 from ..state.errors import HullEmptyError
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.numbers import rows_of
 from ..state.outline import Outline
-from ..state.records import Contents, Keys
+from ..state.records import Contents, HeldRows, Keys
 from ..state.sample import sample_rows
 from .live_hull import LiveHull
 from .steps import BLOCK, Run, in_blocks
@@ -57,6 +59,17 @@ async def positions(hull: LiveHull, keys: Keys, min_revision: int) -> tuple[Coun
 async def entities(hull: LiveHull, min_revision: int) -> tuple[Counts, Contents]:
     """All keys of a keyed hull in order, with their positions."""
     return await hull.read(lambda state: _keyed(state).stored(), hull.counts.points, min_revision)
+
+
+async def held(hull: LiveHull, after: Key | None, most: int, min_revision: int) -> tuple[Counts, HeldRows, bool]:
+    """At most that many positions in the quarantine of a keyed hull, after a key; and whether there are more."""
+
+    def read(state: HullState) -> tuple[HeldRows, bool]:
+        quarantine = state.quarantine or Quarantine(_keyed(state).hull.key_type, OFF)
+        return quarantine.page(after, most)
+
+    counts, (rows, more) = await hull.read(read, hull.counts.held, min_revision)
+    return counts, rows, more
 
 
 async def ask_of_keys(

@@ -15,6 +15,7 @@ from dynhull import DynamicHull
 from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
+from ..state.batch import NO_POINTS, KeyedBatch
 from ..state.contents.keyed import KINDS
 from ..state.core import SMALL
 from ..state.errors import (
@@ -25,13 +26,13 @@ from ..state.errors import (
     HullUnsuitableError,
     RevisionForgottenError,
 )
-from ..state.events import ReadHull, ReadTogether, Recenter
+from ..state.events import ReadHull, ReadTogether, Recenter, WriteBatch
 from ..state.fences.fence import Fence
 from ..state.fences.recomputing import Sides, sides_of
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.outline import GlobeOutline, Outline
-from ..state.records import Center, HullSettings, Keys
+from ..state.records import Center, Contents, HullSettings, Keys, QuarantineRules
 from ..state.sample import sample
 from .difference import Differences
 from .fence_verification import MOST_FAULTS, verify_events, verify_sides
@@ -283,12 +284,17 @@ class LiveHull:
             events: whether to compare the events of these fences, too.
         """
         run = self._engine.aside
-        counts, (points, vertices, stored, sides) = await self.read(
-            lambda state: (state.hull.points(), state.vertices(), state.entities(), self._sides(prefixes)),
-            self.counts.points + len(self.fences()),
-            min_revision,
-        )
+
+        def copied(state: HullState) -> tuple[Points, Points, Contents | None, bool, Sides | None]:
+            held = state.quarantine
+            whole = held is None or held.whole()
+            return state.hull.points(), state.vertices(), state.entities(), whole, self._sides(prefixes)
+
+        size = self.counts.points + self.counts.held + len(self.fences())
+        counts, (points, vertices, stored, whole, sides) = await self.read(copied, size, min_revision)
         outcome = await verify(points, vertices, run, stored, counts.center)
+        if not whole:
+            outcome = replace(outcome, keys_equal=False)
         if sides is None:
             return counts, outcome
         found = [await verify_sides(sides, run)]
@@ -334,6 +340,21 @@ class LiveHull:
             Recenter(Waiter(), self.name, center, rows=self.counts.points)
         )
         return result
+
+    async def set_quarantine(self, rules: QuarantineRules) -> Counts:
+        """Replace the rules of the quarantine of a keyed hull. Returns the counts after it.
+
+        Raises:
+            HullUnsuitableError: the hull has no keys.
+            NotStoredError: the storage has failed.
+        """
+        self.require_keys("quarantine")
+        kind, none = self.settings.identity, self.keys(None)
+        assert kind != "multiset"  # it has keys
+        batch = KeyedBatch(kind, none, NO_POINTS, none, rules=rules)
+        applied = await self._engine.apply(self.name, WriteBatch(0, lambda: batch), create=False)
+        counts, _ = await self.read(lambda _: None, min_revision=applied.revision)
+        return counts
 
     # Revisions
 

@@ -40,8 +40,8 @@ class Verification:
     """The result of Chan's algorithm; `difference` is None where the live hull has the same vertices.
 
     `seconds` is processor time. `keys_equal` is whether the positions of the keys are the points of the hull, each key
-    once; True for a hull without keys. `fences` is the number of fences that compare the hull, and `fence_faults` what
-    is wrong with them.
+    once, and its quarantine is as it was held; True for a hull without keys. `fences` is the number of fences that
+    compare the hull, and `fence_faults` what is wrong with them.
     """
 
     points: int

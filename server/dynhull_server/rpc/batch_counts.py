@@ -19,6 +19,7 @@ class BatchCounts:
         self._applied = self._duplicate = self._refused = 0
         self._inserted = self._deleted = self._missing = 0
         self._updates = dict.fromkeys(("move", "evict", "expire"), 0)
+        self._quarantined = dict.fromkeys(("held", "released", "dropped"), 0)
         self._rows = dict.fromkeys(("stale", "late", "skipped", "clamped"), 0)
 
     def applied(self, applied: Applied, seconds: float) -> None:
@@ -33,6 +34,10 @@ class BatchCounts:
         self._missing += applied.missing
         if applied.moved or applied.clock is not None or applied.stale or applied.skipped:
             self._count_entities(applied)
+        if applied.held or applied.released or applied.dropped:
+            self._quarantined["held"] += len(applied.held)
+            self._quarantined["released"] += applied.released
+            self._quarantined["dropped"] += applied.dropped
 
     def _count_entities(self, applied: Applied) -> None:
         """Count what only hulls with keys or times do."""
@@ -72,8 +77,15 @@ class BatchCounts:
         )
         for outcome, count in self._rows.items():
             rows.add_metric([outcome], count)
+        quarantined = CounterMetricFamily(
+            "dynhull_quarantine",
+            "Positions held in quarantine; keys that left it, as released or dropped.",
+            labels=["outcome"],
+        )
+        for outcome, count in self._quarantined.items():
+            quarantined.add_metric([outcome], count)
         durations = HistogramMetricFamily(
             "dynhull_batch_duration_seconds", "Seconds from the arrival of a batch until its acknowledgement is ready."
         )
         durations.add_metric([], self._took.buckets(), self._took.seconds)
-        return [batches, updates, rows, durations]
+        return [batches, updates, rows, quarantined, durations]

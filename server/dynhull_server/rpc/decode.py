@@ -13,6 +13,7 @@ from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 
 from ..engine.layers import MOST_LAYERS
+from ..state.contents.deadlines import Key
 from ..state.frames import off_globe
 from .readings import Reading
 
@@ -100,9 +101,23 @@ def decode_page(
         NAME.fullmatch(request.page_token) and request.page_token.startswith(request.prefix)
     ):
         raise InvalidFieldError("page_token", request.page_token, "not a page token of a call with this prefix")
-    if request.page_size < 0:
-        raise InvalidFieldError("page_size", request.page_size, "must not be negative")
-    return request.prefix, request.page_token, min(request.page_size or DEFAULT_PAGE, LARGEST_PAGE)
+    return request.prefix, request.page_token, _page_size(request.page_size)
+
+
+def decode_held_page(request: hull_service_pb2.ListHeldRequest, *, strings: bool) -> tuple[Key | None, int]:
+    """The key before the page, and the size of the page."""
+    size, token = _page_size(request.page_size), request.page_token
+    if strings or not token:
+        return token or None, size
+    if not (token.isascii() and token.isdecimal() and int(token) < 2**64):
+        raise InvalidFieldError("page_token", token, "not a page token of a call about this hull")
+    return int(token), size
+
+
+def _page_size(size: int) -> int:
+    if size < 0:
+        raise InvalidFieldError("page_size", size, "must not be negative")
+    return min(size or DEFAULT_PAGE, LARGEST_PAGE)
 
 
 def decode_points(points: points_pb2.Points, field: str) -> Points:

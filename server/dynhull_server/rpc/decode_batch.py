@@ -32,7 +32,7 @@ NO_STRINGS, NO_INTEGERS = PackedKeys(b"", b""), np.empty(0, np.uint64)
 def decode_batch(batch: batch_pb2.Batch) -> Batch | KeyedBatch:
     """A batch of keys, or one of points, whose moves have equally many origins and destinations."""
     has = batch.HasField
-    if has("puts") or has("removes"):
+    if has("puts") or has("removes") or has("releases") or has("drops"):
         keyed = _decode_keyed(batch)
         if keyed is not None:
             return keyed
@@ -83,28 +83,34 @@ def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
     condition = puts.condition
     if condition not in CONDITIONS:
         raise InvalidFieldError("batch.puts.condition", condition, "not a condition that this server supports")
-    removes = decode_keys(batch.removes, "batch.removes") if has("removes") else None
-    known = removes if keys is None else keys
-    if known is None:
+    parts = {"puts.keys": keys}
+    for part in ("removes", "releases", "drops"):
+        parts[part] = decode_keys(getattr(batch, part), f"batch.{part}") if has(part) else None
+    named = {part: found for part, found in parts.items() if found is not None}
+    if not named:
         return None
     if has("inserts") or has("deletes") or has("moves"):
         raise InvalidFieldError("batch", "points and keys", "a batch has points without keys, or keys")
     if has("insert_times"):
         raise InvalidFieldError("batch.insert_times", "present", "keys have their times in puts.times")
-    strings = not isinstance(known, np.ndarray)  # PackedKeys is an abstract Sequence, and slow to test for
-    if removes is not None and isinstance(removes, np.ndarray) == strings:
-        raise InvalidFieldError("batch.removes", "strings and integers", "all keys of a batch are of one kind")
+    first, *others = named
+    strings = not isinstance(named[first], np.ndarray)  # PackedKeys is an abstract Sequence, and slow to test for
+    for part in others:
+        if isinstance(named[part], np.ndarray) == strings:
+            raise InvalidFieldError(f"batch.{part}", "strings and integers", "all keys of a batch are of one kind")
     none: Keys = NO_STRINGS if strings else NO_INTEGERS
     return KeyedBatch(
         "str" if strings else "int",
         none if keys is None else keys,
         points,
-        none if removes is None else removes,
+        named.get("removes", none),
         times,
         CONDITIONS[condition],
         ttl,
         deadlines,
         missing_keys == batch_pb2.MISSING_KEY_POLICY_REFUSE,
+        named.get("releases"),
+        named.get("drops"),
     )
 
 

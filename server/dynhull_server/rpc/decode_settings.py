@@ -1,5 +1,7 @@
 """Conversion of the settings of a hull."""
 
+import math
+
 import numpy as np
 from google.protobuf.duration_pb2 import Duration
 
@@ -8,7 +10,7 @@ from dynhull_proto.v1 import hull_pb2
 
 from ..state.admission import GREATEST_TIME
 from ..state.frames import off_globe
-from ..state.records import Center, Clock, Frame, HullSettings, Identity, Window
+from ..state.records import Center, Clock, Frame, HullSettings, Identity, QuarantineRules, Window
 from .decode import LARGEST_INTEGER, InvalidFieldError
 
 IDENTITIES: dict[int, Identity] = {
@@ -29,6 +31,7 @@ FRAMES: dict[int, Frame] = {
 }
 MICROSECONDS = 1_000_000
 NANOSECONDS = 1_000  # in a microsecond
+MOST_CONFIRMATIONS = 1000
 
 
 def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
@@ -50,7 +53,30 @@ def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
     center = decode_center(config.center, "config.center") if config.HasField("center") else None
     if center is not None and frame == "plane":
         raise InvalidFieldError("config.center", center, "only a geographic hull has a centre")
-    return HullSettings(identity, config.max_points, window, by_event_time, frame, center)
+    quarantine = None
+    if config.HasField("quarantine"):
+        if identity == "multiset":
+            raise InvalidFieldError("config.quarantine", "present", "only a keyed hull has a quarantine")
+        quarantine = decode_quarantine(config.quarantine, "config.quarantine")
+    return HullSettings(identity, config.max_points, window, by_event_time, frame, center, quarantine)
+
+
+def decode_quarantine(message: hull_pb2.Quarantine, field: str) -> QuarantineRules:
+    """The rules of a quarantine."""
+    speed = message.max_speed if message.HasField("max_speed") else None
+    if speed is not None and not 0 < speed < math.inf:
+        raise InvalidFieldError(f"{field}.max_speed", speed, "must be positive and finite, or unset for no such rule")
+    growth = message.max_growth if message.HasField("max_growth") else None
+    if growth is not None and not 1 <= growth < math.inf:
+        raise InvalidFieldError(
+            f"{field}.max_growth", growth, "must be at least 1 and finite, or unset for no such rule"
+        )
+    if not message.HasField("confirmations"):
+        return QuarantineRules(speed, growth)
+    if message.confirmations > MOST_CONFIRMATIONS:
+        problem = f"must be at most {MOST_CONFIRMATIONS}"
+        raise InvalidFieldError(f"{field}.confirmations", message.confirmations, problem)
+    return QuarantineRules(speed, growth, message.confirmations)
 
 
 def decode_center(place: hull_pb2.LonLat, field: str) -> Center:

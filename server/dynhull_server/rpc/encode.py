@@ -20,7 +20,18 @@ from ..state.batch import NO_POINTS, Applied
 from ..state.contents.keyed import Found
 from ..state.fences.faults import FenceFault
 from ..state.hull_state import Cause, Counts, VertexKeys
-from ..state.records import NO_TIME, Center, Contents, Frame, HullSettings, Identity, Keys, Times
+from ..state.records import (
+    NO_TIME,
+    Center,
+    Contents,
+    Frame,
+    HeldRows,
+    HullSettings,
+    Identity,
+    Keys,
+    QuarantineRules,
+    Times,
+)
 
 IDENTITIES: dict[Identity, hull_pb2.Identity] = {
     "multiset": hull_pb2.IDENTITY_MULTISET,
@@ -78,6 +89,7 @@ def encode_settings(settings: HullSettings) -> hull_pb2.HullConfig:
         max_points=settings.max_points,
         frame=FRAMES[settings.frame],
         center=encode_center(settings.center),
+        quarantine=encode_quarantine(settings.quarantine),
     )
     if settings.identity != "multiset":
         by_time = settings.by_event_time
@@ -100,6 +112,15 @@ def encode_center(center: Center | None) -> hull_pb2.LonLat | None:
     return None if center is None else hull_pb2.LonLat(longitude=center[0], latitude=center[1])
 
 
+def encode_quarantine(rules: QuarantineRules | None) -> hull_pb2.Quarantine | None:
+    """The rules of a quarantine; None for a hull that has never had any."""
+    if rules is None:
+        return None
+    return hull_pb2.Quarantine(
+        max_speed=rules.max_speed, max_growth=rules.max_growth, confirmations=rules.confirmations
+    )
+
+
 def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     """A hull with its counts at one revision."""
     message = hull_pb2.Hull(
@@ -110,6 +131,8 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
         distinct_point_count=counts.distinct,
         uid=hull.uid,
         center=encode_center(counts.center),
+        quarantine=encode_quarantine(counts.rules),
+        held_count=counts.held,
     )
     message.create_time.FromDatetime(hull.created)
     if counts.clock is not None:
@@ -140,6 +163,25 @@ def encode_entities(
         keys=encode_keys(entities.keys[rows], encoding),
         positions=encode_points(entities.points[rows], encoding),
         times=times,
+    )
+
+
+def encode_held(
+    counts: Counts, held: HeldRows, token: str, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.ListHeldResponse:
+    """A page of the positions in quarantine; `token` is that of the next page."""
+    timed = bool((held.times != NO_TIME).any())
+    return hull_service_pb2.ListHeldResponse(
+        revision=counts.revision,
+        keys=encode_keys(held.keys, encoding),
+        positions=encode_points(held.points, encoding),
+        times=encode_times(held.times, encoding) if timed else None,
+        speeds=held.speeds.tolist(),
+        growths=held.growths.tolist(),
+        revisions=held.revisions.tolist(),
+        confirmations=held.confirmed.tolist(),
+        held_count=counts.held,
+        next_page_token=token,
     )
 
 
@@ -185,6 +227,13 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
         result.stale = applied.stale
     if applied.skipped:
         result.skipped = applied.skipped
+    if applied.held:
+        result.held = len(applied.held)
+        result.held_rows.extend(applied.held)
+    if applied.released:
+        result.released = applied.released
+    if applied.dropped:
+        result.dropped = applied.dropped
     if applied.clock is None:  # nothing is late, clamped or evicted without a clock
         return
     if applied.late:

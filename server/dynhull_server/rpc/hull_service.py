@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from dynhull.arrays import Checked
+from dynhull.keys import key_list
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
@@ -23,7 +24,7 @@ from ..state.frames import require_lines, require_reach
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
-from .decode_settings import decode_center, decode_settings
+from .decode_settings import decode_center, decode_quarantine, decode_settings
 from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
@@ -80,6 +81,11 @@ class HullService:
         center = decode_center(request.center, "center") if request.HasField("center") else None
         counts, hull_changed = await hull.recenter(center)
         return pb.RecenterResponse(hull=encode.encode_hull(hull, counts), hull_changed=hull_changed)
+
+    async def SetQuarantine(self, request: pb.SetQuarantineRequest, call: Call) -> pb.SetQuarantineResponse:
+        hull = self._engine.get(self._written(call, request.name))
+        counts = await hull.set_quarantine(decode_quarantine(request.quarantine, "quarantine"))
+        return pb.SetQuarantineResponse(hull=encode.encode_hull(hull, counts))
 
     # Writes
 
@@ -139,6 +145,9 @@ class HullService:
                     summary.skipped += applied.skipped
                     summary.clamped += applied.clamped
                     summary.evicted += applied.evicted
+                    summary.held += len(applied.held)
+                    summary.released += applied.released
+                    summary.dropped += applied.dropped
                     summary.revision, summary.point_count = applied.revision, applied.points
         summary.batches = call.batches - summary.duplicates
         return summary
@@ -205,6 +214,15 @@ class HullService:
             with call.cutoff():
                 part = await self._engine.aside(partial(encode.encode_entities, counts, contents, rows, encoding))
             await call.write_within(self._max_watch_lag, part)
+
+    async def ListHeld(self, request: pb.ListHeldRequest, call: Call) -> pb.ListHeldResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        hull.require_keys("name")
+        after, size = decode.decode_held_page(request, strings=hull.settings.identity == "str")
+        counts, held, more = await entities.held(hull, after, size, request.min_revision)
+        token = str(key_list(held.keys)[-1]) if more else ""
+        return encode.encode_held(counts, held, token, encoding)
 
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
         hull = self._read(call, request.name)

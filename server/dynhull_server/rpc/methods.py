@@ -34,6 +34,7 @@ FINISHED = {
     "CreateHull",
     "DeleteHull",
     "Recenter",
+    "SetQuarantine",
     "ListHulls",
     "Apply",
     "ApplyTogether",

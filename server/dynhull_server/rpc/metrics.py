@@ -166,6 +166,9 @@ class StateCollector(Collector):
             GaugeMetricFamily("dynhull_hulls", "Hulls.", value=len(hulls)),
             GaugeMetricFamily("dynhull_points", "Points of all hulls.", value=total),
             GaugeMetricFamily("dynhull_entities", "Points of all keyed hulls.", value=entities),
+            GaugeMetricFamily(
+                "dynhull_held_keys", "Keys in quarantine.", value=sum(hull.counts.held for hull in hulls)
+            ),
             GaugeMetricFamily("dynhull_clock_lag_seconds", behind, value=self._clock_lag(hulls)),
             *self._metrics.watch_families(),
             points,

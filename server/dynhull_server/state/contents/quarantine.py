@@ -7,6 +7,7 @@ rule, also as if the held one had been let in. If it breaks none there, it confi
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from heapq import nsmallest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -89,10 +90,15 @@ class Quarantine:
         """Whether there is any rule."""
         return self.rules.max_speed is not None or self.rules.max_growth is not None
 
-    def stored(self, after: Key | None = None, most: int | None = None) -> HeldRows:
-        """The positions in the order of their keys: at most that many after a key. O(m log m)."""
-        keys = sorted(self._held if after is None else (key for key in self._held if key > after))  # type: ignore[operator]
-        return self.of(keys[:most])
+    def stored(self) -> HeldRows:
+        """The positions in the order of their keys. O(m log m)."""
+        return self.page(None, len(self))[0]
+
+    def page(self, after: Key | None, most: int) -> tuple[HeldRows, bool]:
+        """At most `most` positions after a key, in the order of their keys, and whether more follow. O(m log m)."""
+        held: Iterable[Any] = self._held
+        first = nsmallest(most + 1, held if after is None else (key for key in held if key > after))
+        return self.of(first[:most]), len(first) > most
 
     def of(self, keys: Iterable[Key]) -> HeldRows:
         """The positions of some held keys."""
