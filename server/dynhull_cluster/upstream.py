@@ -26,11 +26,13 @@ class Upstream:
     """The call, with bytes for messages.
 
     gRPC forgets the status of a call that ends while a request is written (github.com/grpc/grpc/issues/36066), and
-    reports an internal error. So the first status that comes from the worker is kept.
+    reports an internal error, by `read` even before the responses that are there. So they are read by iteration, which
+    goes on to the last, because the status of the worker comes after it; and the first status from there is kept.
     """
 
     def __init__(self, call: "grpc.aio.StreamStreamCall[bytes, bytes]") -> None:
         self._call = call
+        self._responses = aiter(call)
         self._said: asyncio.Future[Status] = asyncio.get_running_loop().create_future()
         call.add_done_callback(self._note)
 
@@ -49,7 +51,7 @@ class Upstream:
     async def read(self) -> bytes | None:
         """The next response; None after the last. Raises RelayedError."""
         try:
-            response: Any = await self._call.read()
+            return await anext(self._responses, None)
         except grpc.aio.AioRpcError as error:
             if not self._said.done() and error.code() in BROKEN:
                 await asyncio.wait([self._said], timeout=LATE_SECONDS)
@@ -57,7 +59,6 @@ class Upstream:
             if status.code == grpc.StatusCode.OK.value[0]:
                 return None
             raise RelayedError(status) from None
-        return None if response is grpc.aio.EOF else response
 
     def cancel(self) -> None:
         """End the call."""

@@ -1,15 +1,16 @@
-"""A refusal that comes while a client still writes reaches its caller as it is.
+"""A refusal that comes while a client still writes reaches its caller as it is, once.
 
 gRPC's asyncio reports an internal error when a call ends during a write (github.com/grpc/grpc/issues/36066).
 """
 
 import asyncio
+import gc
 from contextlib import suppress
 
 import numpy as np
 import pytest
 
-from dynhull_client import AsyncHullClient, HullNotFoundError
+from dynhull_client import AsyncHullClient, HullNotFoundError, PointMissingError
 
 POINTS = np.random.default_rng(7).normal(size=(5000, 2))
 BATCHES, TIMES = 10, 10
@@ -36,3 +37,26 @@ def test_a_hull_that_is_deleted_meanwhile_is_said_to_be_missing(address: str, na
                     await write(client, f"{name}{i}")
 
     asyncio.run(run())
+
+
+def test_a_refused_batch_is_raised_and_not_logged_as_well(address: str, name: str) -> None:
+    """Nobody looks at the futures: `flush` says what was refused."""
+    complaints: list[object] = []
+
+    async def run() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+        async with AsyncHullClient(address) as client:
+            await client.create_hull(name)
+            async with client.writer(name, batch_points=1) as writer:
+                for i in range(20):
+                    await (writer.put(delete=[[-1, i]]) if i % 10 == 5 else writer.put(insert=[[i, i]]))
+                with pytest.raises(PointMissingError):
+                    await writer.flush()
+            await client.delete_hull(name)
+            writer = client.writer(name, batch_points=1)
+            with pytest.raises(HullNotFoundError):
+                await writer.put(insert=[[1, 1]])
+        gc.collect()
+
+    asyncio.run(run())
+    assert not complaints

@@ -167,6 +167,28 @@ def test_a_refusal_is_told_while_requests_are_sent(place: Place) -> None:
             assert (code, info.metadata["batch"]) == (grpc.StatusCode.FAILED_PRECONDITION, "0")
 
 
+def test_all_acknowledgements_come_before_a_refusal(place: Place, client: HullClient) -> None:
+    """The gateway has not read all of them when the call ends while it writes to it."""
+    rows = np.random.default_rng(1).normal(size=(3000, 2))
+    good = pb.StreamRequest(batch={"inserts": {"packed": rows.tobytes()}})
+    bad = pb.StreamRequest(batch={"deletes": {"coordinates": [77, 77]}})
+    with grpc.insecure_channel(place.address) as channel:
+        stub = HullServiceStub(channel)
+        for _ in range(30):
+            client.create_hull("north/acknowledged")
+            requests = [pb.StreamRequest(name="north/acknowledged"), *[good] * 10, bad, *[good] * 40]
+            acknowledged: list[int] = []
+
+            def take(requests: list[pb.StreamRequest] = requests, acknowledged: list[int] = acknowledged) -> None:
+                for response in stub.Stream(iter(requests), metadata=BEARER):
+                    acknowledged.append(response.result.revision)  # noqa: PERF401  # up to the error
+
+            code, info, _ = refusal(take)
+            assert (code, info.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "POINT_MISSING")
+            assert acknowledged == list(range(1, 11))
+            client.delete_hull("north/acknowledged")
+
+
 def test_health_of_each_worker_and_metrics_of_all(place: Place) -> None:
     with grpc.insecure_channel(place.address) as channel:
         health = health_pb2_grpc.HealthStub(channel)

@@ -151,7 +151,7 @@ class AsyncPipeline:
         except DynhullError as error:
             return error
         try:
-            while (response := await call.read()) is not grpc.aio.EOF:
+            async for response in call:  # `read` leaves out answers that are there when a write has failed
                 self._settle(self._questions.answer(response))
         except grpc.RpcError as failure:
             return error_of(failure)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ._connection import AsyncConnection
     from ._gathering import Part
     from ._messages import Applied
+    from ._window import Settled
 
 
 class AsyncWriter:
@@ -162,7 +163,7 @@ class AsyncWriter:
                 self._connections += 1
                 settled, pause = window.lost(lost, monotonic())
                 self._turn.notify_all()
-            settle(settled)
+            _settle(settled)
             if pause is None:
                 return
             await asyncio.sleep(pause)
@@ -175,11 +176,11 @@ class AsyncWriter:
         except DynhullError as error:
             return error
         try:
-            while (response := await call.read()) is not grpc.aio.EOF:
+            async for response in call:  # `read` leaves out acknowledgements that are there when a write has failed
                 async with self._turn:
                     settled = window.acknowledge(response)
                     self._turn.notify_all()
-                settle(settled)
+                _settle(settled)
                 if window.failure:
                     break
         except grpc.RpcError as failure:
@@ -206,3 +207,11 @@ class AsyncWriter:
                                 await self._turn.wait()
                 self._turn.notify_all()
             yield request
+
+
+def _settle(settled: Settled) -> None:
+    """Settle the futures. asyncio does not log their errors: `flush` and `close` raise the first."""
+    settle(settled)
+    for outcome, result in settled:
+        if isinstance(result, DynhullError) and not outcome.cancelled():
+            outcome.exception()
