@@ -55,13 +55,14 @@ async def _serve(settings: Settings) -> None:
         tls_context(settings)
         port = opened.enter_context(_reserved_port(settings.host, settings.port))
         workers, gateways = settings.workers or 1, settings.gateways or 1
-        if not settings.in_memory:
+        in_folder = not settings.in_memory and settings.journal is None
+        if in_folder:
             divide(settings.data, workers)
             opened.enter_context(_locked(settings.data))
             for number in range(workers):
                 with _locked(worker_folder(settings.data, number)):
                     pass
-        sockets = socket_folder(None if settings.in_memory else settings.data)
+        sockets = socket_folder(settings.data if in_folder else None)
         opened.callback(shutil.rmtree, sockets, ignore_errors=True)
         own = settings.model_copy(update={"port": port})
         begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets)}
@@ -77,7 +78,7 @@ async def _serve(settings: Settings) -> None:
             opened.callback(page.close)
         try:
             if await processes.start(stop):
-                if not settings.in_memory:
+                if in_folder:
                     write_manifest(settings.data, workers, complete=True)
                 print(f"dynhull serving on {processes.address}", flush=True)  # noqa: T201  # output of the command
                 if page is not None:

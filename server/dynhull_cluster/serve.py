@@ -1,5 +1,7 @@
 """The command `dynhull serve`."""
 
+from functools import partial
+
 from dynhull_server.flags import with_settings
 from dynhull_server.settings import Settings
 
@@ -17,8 +19,12 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
     if settings.workers is None:
-        from dynhull_server.process import run
+        from dynhull_server.process import run as run_one
+
+        from .journal import storage_of
+
+        run_one(settings, partial(storage_of, settings))
     else:
         from .process import run
 
-    run(settings)
+        run(settings)

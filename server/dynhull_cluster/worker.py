@@ -12,6 +12,7 @@ from dynhull_server.storage.worker_folders import worker_folder
 
 from .callers import authenticator
 from .frame_server import FrameServer
+from .journal import storage_of
 from .sockets import Sockets
 
 # Each gateway watches the health of each worker; all of them have one address.
@@ -31,7 +32,7 @@ def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
             "max_health_calls_per_caller": HEALTH_CALLS,
         }
     )
-    return Server(own, PrivateEntrance(number, sockets))
+    return Server(own, PrivateEntrance(number, sockets), storage_of(settings, number))
 
 
 class PrivateEntrance:

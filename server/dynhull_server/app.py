@@ -43,7 +43,7 @@ from .state.fences.faults import FenceFault
 from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
 from .storage.memory import MemoryStorage
-from .storage.port import Storage
+from .storage.port import Storage, StorageError
 from .storage.sqlite.storage import SQLiteStorage
 from .storage.worker_folders import require_one_process
 
@@ -61,6 +61,8 @@ LOGGED_FAULTS = 10
 # Seconds between syncs with `--durability interval`. With the duration of a sync this stays below the tenth of a second
 # after which an acknowledged batch survives a power failure.
 SYNC_SECONDS = 0.05
+# Seconds between looks whether the storage is still this server's.
+ENTITLED_SECONDS = 1.0
 
 log = logging.getLogger(__name__)
 
@@ -75,6 +77,7 @@ class Server:
     Args:
         settings: the settings.
         entrance: how callers reach it; by default, as the settings say.
+        storage: what keeps the hulls; by default, memory or a folder, as the settings say.
 
     Attributes:
         address: the host:port it listens on, once started.
@@ -82,7 +85,7 @@ class Server:
         registry: its metrics; other threads may read them once it has started.
     """
 
-    def __init__(self, settings: Settings, entrance: Entrance | None = None) -> None:
+    def __init__(self, settings: Settings, entrance: Entrance | None = None, storage: Storage | None = None) -> None:
         self._settings = settings
         self._entrance = PublicEntrance(settings) if entrance is None else entrance
         self._machine = machine = Machine()
@@ -101,13 +104,14 @@ class Server:
                 fence_history_bytes=settings.fence_history_bytes,
             ),
         )
-        self._engine = Engine(limits, _storage(settings), self._supervisor, machine)
+        self._storage = storage = _storage(settings) if storage is None else storage
+        self._engine = Engine(limits, storage, self._supervisor, machine)
         self._metrics = Metrics()
         self.registry = self._metrics.registry
         self._tokens = token_file(settings)
         authenticate = self._entrance.authenticator(self._tokens)
         streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
-        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams)
+        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams, storage.entitled)
         self._health = Health(
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )
@@ -163,6 +167,8 @@ class Server:
         if not self._settings.in_memory:
             interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
             self._engine.keep_house(self._settings.snapshot_points, interval)
+        if self._settings.journal is not None:
+            self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
         if self._settings.scrub_cpu:
             scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared, self._followed)
             self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
@@ -180,6 +186,10 @@ class Server:
         self._stop_metrics()
         await self._engine.close()
         log.info("stopped")
+
+    async def _look_at_lease(self) -> None:
+        if not self._storage.entitled():
+            raise StorageError("the lease on the database has ended; until it is renewed, calls get UNAVAILABLE")
 
     async def _scrub(self, scrub: Scrub) -> None:
         await scrub.round()

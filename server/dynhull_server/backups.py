@@ -5,12 +5,22 @@ from typing import Annotated
 
 import typer
 
+from .addresses import is_database
+from .failure import fail
+
 DATA = Path("dynhull-data")
 
 
+def _folder(path: Path | None) -> Path | None:
+    """What an argument names, unless that is a database: these commands are for folders."""
+    if path is not None and is_database(path):
+        fail("this command is for folders: copy a database with pg_dump; every start of a server examines it in full")
+    return path
+
+
 def backup(
-    target: Annotated[Path, typer.Argument(metavar="TARGET", help="The folder to create.")],
-    data: Annotated[Path, typer.Option(help="The data folder; a server may be using it.")] = DATA,
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="The folder to create.", callback=_folder)],
+    data: Annotated[Path, typer.Option(help="The data folder; a server may be using it.", callback=_folder)] = DATA,
 ) -> None:
     """Copy a data folder consistently, also while a server uses it.
 
@@ -24,9 +34,12 @@ def backup(
 
 def restore(
     backup: Annotated[
-        Path, typer.Argument(metavar="BACKUP", help="A backup, or any data folder.", exists=True, file_okay=False)
+        Path,
+        typer.Argument(
+            metavar="BACKUP", help="A backup, or any data folder.", exists=True, file_okay=False, callback=_folder
+        ),
     ],
-    data: Annotated[Path, typer.Option(help="The data folder to create.")] = DATA,
+    data: Annotated[Path, typer.Option(help="The data folder to create.", callback=_folder)] = DATA,
     accept_loss: Annotated[
         bool, typer.Option(help="If the log is missing or damaged, continue without the commits in it.")
     ] = False,
@@ -39,7 +52,8 @@ def restore(
 
 def check(
     data: Annotated[
-        Path, typer.Argument(metavar="DATA", help="A data folder or a backup; a server may be using it.")
+        Path,
+        typer.Argument(metavar="DATA", help="A data folder or a backup; a server may be using it.", callback=_folder),
     ] = DATA,
 ) -> None:
     """Examine a data folder or a backup, and report on each hull and fence. Nothing is changed.
@@ -62,7 +76,9 @@ def export(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)
     ],
-    data: Annotated[Path, typer.Option(help="The data folder or a backup; a server may be using it.")] = DATA,
+    data: Annotated[
+        Path, typer.Option(help="The data folder or a backup; a server may be using it.", callback=_folder)
+    ] = DATA,
 ) -> None:
     """Write the points of one hull, as of the last commit, to a file.
 

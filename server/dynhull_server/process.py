@@ -7,7 +7,7 @@ import os
 import resource
 import signal
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from dynhull import set_threads
@@ -18,21 +18,26 @@ from .failure import code_of, fail, text_of
 from .malloc import return_large_blocks
 from .progress import progress_bar
 from .settings import Settings
-from .storage.port import StorageError
+from .storage.port import Storage, StorageError
 
 log = logging.getLogger(__name__)
 
 SIGNALS = signal.SIGTERM, signal.SIGINT
 
 
-def run(settings: Settings) -> None:
-    """Serve, then return; an error of the settings, the storage or the operating system ends the process."""
+def run(settings: Settings, storage: Callable[[], Storage | None] = lambda: None) -> None:
+    """Serve, then return; an error of the settings, the storage or the operating system ends the process.
+
+    Args:
+        settings: the settings.
+        storage: returns what keeps the hulls, None for memory or a folder as the settings say.
+    """
     logs.configure(settings.log_level, settings.log_format)
     return_large_blocks()
     share_processors(settings)
     allow_connections(settings.max_connections)
     try:
-        event_loop.run(_serve(settings))
+        event_loop.run(_serve(settings, storage))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 
@@ -52,9 +57,9 @@ def allow_connections(most: int) -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
-async def _serve(settings: Settings) -> None:
+async def _serve(settings: Settings, storage: Callable[[], Storage | None]) -> None:
     with stop_signal() as stop:
-        server = Server(settings)
+        server = Server(settings, storage=storage())
         try:
             with progress_bar("hulls read") as progress:
                 await server.start(progress)

@@ -65,9 +65,11 @@ def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
 
 
 def _refuse_ignored(flags: Mapping[str, Any]) -> None:
-    for name in ("data", "durability"):
+    for name in ("data", "durability", "journal"):
         if flags.get("in_memory") and name in flags:
             raise SettingsError(f"--in-memory stores nothing, so --{name} has no effect: leave one of them out")
+    if "journal" in flags and "data" in flags:
+        raise SettingsError("--journal takes the place of the folder, so --data has no effect: leave one of them out")
 
 
 def _explained(error: "ErrorDetails", origins: Mapping[str, str], file: Path | None) -> str:

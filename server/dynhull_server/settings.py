@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from .addresses import is_database
 from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"  # of environment variables
@@ -19,6 +20,10 @@ class Settings(BaseModel):
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(50051, ge=0, le=65535, description="Port to listen on; 0 for a free one.")
     data: Path = Field(Path("dynhull-data"), description="Folder of the data.")
+    journal: str | None = Field(
+        None,
+        description="Address of a PostgreSQL database for the data, in place of a folder: postgresql://user@host/database.",
+    )
     in_memory: bool = Field(False, description="Store nothing: all hulls are lost when the server stops.")
     durability: Durability = Field(
         Durability.SYNC,
@@ -114,6 +119,8 @@ class Settings(BaseModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if is_database(self.data):
+            raise ValueError("--data is a folder: give the address of a database as --journal")
         if (self.tls_cert is None) != (self.tls_key is None):
             raise ValueError("--tls-cert and --tls-key must be given together")
         if self.tls_client_ca and not self.tls_cert:

@@ -2,6 +2,7 @@
 
 import typer
 
+from .addresses import without_password
 from .flags import as_toml, with_settings
 from .settings import Settings
 
@@ -12,6 +13,8 @@ def config(settings: Settings, origins: dict[str, str]) -> None:
     lines = {}
     for name in Settings.model_fields:
         value = getattr(settings, name)
+        if name == "journal" and value is not None:
+            value = without_password(value)
         lines[name] = f"# {name} =" if value is None else f"{name} = {as_toml(value)}"
     width = max(map(len, lines.values()))
     for name, line in lines.items():

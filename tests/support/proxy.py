@@ -7,7 +7,11 @@ from contextlib import contextmanager, suppress
 
 
 class Proxy:
-    """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once."""
+    """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once.
+
+    Args:
+        server: host and port, or the path of a Unix socket; "" to end new connections at once.
+    """
 
     def __init__(self, server: str) -> None:
         self.server = server
@@ -41,13 +45,21 @@ class Proxy:
                 self._start(self._connect, client)
 
     def _connect(self, client: socket.socket) -> None:
-        host, port = self.server.rsplit(":", 1)
-        with client, suppress(OSError), socket.create_connection((host, int(port))) as server:
+        with client, suppress(OSError), connected(self.server) as server:
             self._open |= {client, server}
             back = self._start(forward, server, client)
             forward(client, server)
             back.join()
             self._open -= {client, server}
+
+
+def connected(server: str) -> socket.socket:
+    if not server.startswith("/"):
+        host, _, port = server.rpartition(":")
+        return socket.create_connection((host, int(port or 0)))
+    connection = socket.socket(socket.AF_UNIX)
+    connection.connect(server)
+    return connection
 
 
 def forward(source: socket.socket, sink: socket.socket) -> None:

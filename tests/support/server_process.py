@@ -45,7 +45,7 @@ def server_process(
     of warnings and worse, unless the options say otherwise. With `torn`, the server before it was killed while it
     wrote: it may say that it dropped the commit that was under way.
     """
-    memory = [] if "--data" in options else ["--in-memory"]
+    memory = [] if {"--data", "--journal"} & set(options) else ["--in-memory"]
     command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *shape_options(), *memory, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,

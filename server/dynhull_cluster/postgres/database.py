@@ -1,5 +1,6 @@
 """Connections to a PostgreSQL database, and its errors as those of the storage."""
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -26,6 +27,9 @@ DEFAULTS = {
     "target_session_attrs": "read-write",  # of several hosts the one that is no standby
 }
 
+# It warns of what it ignores while it ends a lost connection, of which callers hear as an error.
+logging.getLogger("psycopg").setLevel(logging.ERROR)
+
 
 class Database:
     """A PostgreSQL database.
@@ -42,7 +46,9 @@ class Database:
             given: dict[str, Any] = {**DEFAULTS, **conninfo_to_dict(address)}
         except psycopg.ProgrammingError as error:
             raise ValueError(f"no address of a PostgreSQL database: {_words(error)}") from None
-        given["options"] = f"{given.get('options') or ''} -c search_path={SCHEMA}".strip()
+        # Whatever the database's own default is: an epoch that is lost would let two servers own the hulls.
+        settings = f"-c search_path={SCHEMA} -c synchronous_commit=on"
+        given["options"] = f"{given.get('options') or ''} {settings}".strip()
         self._address = make_conninfo(**given)
         where = f"{given.get('host') or 'localhost'}{':' + str(given['port']) if given.get('port') else ''}"
         self._words = f"the database {given.get('dbname') or given.get('user') or 'of the user'} on {where}"

@@ -109,6 +109,10 @@ class Call:
         """The size of the largest message."""
         return self._calls.max_message_bytes
 
+    def require_entitled(self) -> None:
+        """Raise StartingError while nothing may be read from memory: before each answer of a call that has several."""
+        self._calls.require_entitled()
+
     def note_refusal(self, method: str, status: Status) -> str:
         """Log a refused part of the call as a refused call would be. Returns the name of its code."""
         code: str = code_pb2.Code.Name(status.code)
@@ -173,6 +177,7 @@ class Calls:
         metrics: counts the calls.
         max_message_bytes: the size of the largest message sent.
         streams: limits the streaming calls.
+        entitled: whether calls may be answered: not while another server may have other hulls.
     """
 
     def __init__(
@@ -181,10 +186,12 @@ class Calls:
         metrics: Metrics,
         max_message_bytes: int,
         streams: Places,
+        entitled: Callable[[], bool] = lambda: True,
     ) -> None:
         self.max_message_bytes = max_message_bytes
         self.streams = streams
         self._authenticate = authenticate
+        self._entitled = entitled
         self._metrics = metrics
         self._starting = True
         self._draining = False
@@ -227,9 +234,15 @@ class Calls:
             raise StartingError
         if self._draining:
             raise DrainingError
+        self.require_entitled()
         call = Call(self, context, caller)
         self._open.add(call)
         return call
+
+    def require_entitled(self) -> None:
+        """Raise StartingError while calls may not be answered."""
+        if not self._entitled():
+            raise StartingError("the server waits for its database; another server may have the hulls meanwhile")
 
     def admit_anybody(self, context: Context) -> Call:
         """Begin a call that needs no token, at any time."""

@@ -108,6 +108,7 @@ class FenceService:
                         sent = await anext(responses, None)
                     if sent is None:
                         return
+                    call.require_entitled()
                     with self._metrics.sending(watcher, "fence"):
                         await call.write_within(self._max_watch_lag, encode_sent(sent, uid))
                     uid = ""

@@ -447,6 +447,7 @@ class HullService:
                 while True:
                     with call.cutoff():
                         event = await anext(events)
+                        call.require_entitled()
                         message = await encode.encode_watched(
                             event,
                             encoding,

@@ -59,6 +59,7 @@ class Answers:
 
     async def answer(self, reads: Sequence[pb.Read]) -> None:
         """Answer the reads of a message."""
+        self._call.require_entitled()
         index = 0
         while index < len(reads):
             read = reads[index]

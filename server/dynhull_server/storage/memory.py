@@ -79,6 +79,10 @@ class MemoryStorage:
             for change in changes:
                 self._carry_out(change)
 
+    def entitled(self) -> bool:
+        """True: nobody else has this memory."""
+        return True
+
     def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
         """Nothing: commits take no time."""
         return (), changes

@@ -103,6 +103,9 @@ class Storage(Protocol):
             Exception: any other error: the outcome is unknown until `settle` has returned.
         """
 
+    def entitled(self) -> bool:
+        """Whether reads may be answered from memory: not while another server may have committed something else."""
+
     def ahead(self, changes: Sequence["Change | Step"]) -> tuple[Sequence["Step"], Sequence["Change | Step"]]:
         """What can be committed ahead of large changes, and what is then left of them, so that other commits wait less.
 

@@ -184,6 +184,10 @@ class SQLiteStorage(RowStorage):
 
     # Reading
 
+    def entitled(self) -> bool:
+        """True: the folder is locked."""
+        return True
+
     @property
     def _place(self) -> str:
         return str(self._folder.database)
