@@ -3,6 +3,7 @@
 import asyncio
 import json
 import random
+import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -216,6 +217,7 @@ def test_mqtt(client: HullClient, address: str, name: str, version: str, share: 
             ingest.wait_for("reading")
             send(port, moves[:100])
             wait_until(lambda: known(client, name))
+            assert "after" not in ingest.said("reading")[0], "its messages have no numbers"
             ingest.process.kill()
         send(port, moves[100:150])
         process.terminate()  # saves its sessions
@@ -249,6 +251,35 @@ def send(port: int, moves: Sequence[tuple[str, Sequence[float]]]) -> None:
     publisher.loop_stop()
 
 
+@pytest.mark.parametrize("scheme", ["mqtt", "nats", "kafka"])
+def test_a_broker_that_is_away(address: str, scheme: str) -> None:
+    """Whichever it is: the log says so, and the ingest ends when its patience does."""
+    options = (f"{scheme}://127.0.0.1:1/t", "--hull", "h", "--key", "$.id", "--patience", "300ms")
+    with ingest_process(address, *options, code=3) as ingest:
+        ingest.process.wait(PATIENCE)
+        (*said, error, advice) = ingest.lines()
+    assert json.loads(said[0])["event"] == "the broker does not answer, trying again"
+    assert error.lower().startswith(f"error: no answer from the broker: {scheme}: ")
+    assert advice == f"Is it running, is {scheme}://127.0.0.1:1/t right?\n"
+
+
+def test_a_server_that_is_away(name: str, nats_port: int) -> None:
+    """The log says which, also where each message has a hull of its own; an interruption is no success."""
+    publish(nats_port, name, [(f"v{i}", {"lon": i, "lat": i}) for i in range(3)])
+    url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
+    options = ("127.0.0.1:1", url, "--hull", f"{name}/{{1}}", "--to-end")
+    with ingest_process(*options, "--patience", "300ms", code=3) as ingest:
+        ingest.process.wait(PATIENCE)
+        assert ingest.said("waiting for the server")[0]["server"] == "127.0.0.1:1"
+        assert ingest.lines()[-2].startswith("error: no answer from 127.0.0.1:1: ")
+    with ingest_process(*options, "--grace", "100ms", code=130) as ingest:
+        ingest.wait_for("waiting for the server")
+        ingest.process.send_signal(signal.SIGINT)
+        ingest.process.wait(PATIENCE)
+        assert ingest.said("stopping when what is under way is done")[0]["messages"] == 3
+        assert ingest.lines()[-1].startswith("error: interrupted before the end")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -257,12 +288,14 @@ def send(port: int, moves: Sequence[tuple[str, Sequence[float]]]) -> None:
         (["mqtt://b", "--hull", "h", "--key", "{1}"], "give mqtt://HOST/FILTER"),
         (["nats://b", "--hull", "h"], "give nats://HOST/STREAM"),
         (["kafka://b", "--hull", "h"], "give kafka://HOST:PORT/TOPIC"),
+        (["kafka://b/t?partition=first", "--hull", "h"], "partition is 'first', not a number from 0"),
         (["amqp://b/q", "--hull", "h"], "must be mqtt, mqtts, nats, tls or kafka"),
         (["nats://b/s", "--hull", "h", "--x", "$.a b"], "' b' at position 4 is no .name, [index] or ['name']"),
         (["nats://b/s", "--hull", "h", "--x", "lon"], "--x 'lon' is the same for all messages"),
         (["nats://b/s", "--hull", "h/{0}"], "--hull: {0} is not {topic}"),
         (["nats://b/s", "--hull", "h", "--each", "points"], "--each 'points' is no path"),
         (["nats://b/s", "--hull", "h", "--report", "soon"], "--report"),
+        (["nats://b/s", "--hull", "h", "--patience", "-1s"], "--patience '-1s' is not a time span"),
     ],
 )
 def test_odd_arguments(arguments: Sequence[str], words: str) -> None:

@@ -38,7 +38,7 @@ def test_every_event_arrives_in_order(tmp_path: Path) -> None:
                 relay.process.kill()
         port = server.address.rpartition(":")[2]
         with relay_process(server.address, tmp_path, *FENCES, *to) as relay:
-            relay.wait_for("no events from the server, trying again")
+            assert relay.wait_for("waiting for the server")["server"] == server.address
             endpoint.start()
             with server_process(*data, "--port", port) as again, HullClient(again.address) as client:
                 for name in FENCES:

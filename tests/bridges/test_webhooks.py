@@ -316,7 +316,13 @@ def test_a_name_that_leads_home_gets_nothing(
     assert endpoint.received == []
 
 
-def test_a_fence_that_does_not_exist(address: str, name: str, tmp_path: Path) -> None:
-    done = run("relay", name, "--consumer", "test", "--state", tmp_path, "--address", address, "--to", "-")
-    assert done.returncode == 1
-    assert "`dynhull fences list` shows the fences of the server" in done.stderr
+def test_a_fence_that_does_not_exist(client: HullClient, address: str, name: str, tmp_path: Path) -> None:
+    """All names are looked up first: the fence that exists gets no consumer, and who was gone stays so."""
+    gone = tmp_path / "gone.json"
+    gone.write_text("{}")
+    options = ("--consumer", "test", "--state", tmp_path, "--address", address, "--to", "-", "--enable")
+    done = run("relay", name, f"{name}-1", f"{name}-2", *options)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"there is no fence '{name}-1'\nthere is no fence '{name}-2'\n`dynhull fences list` shows" in done.stderr
+    assert client.get_fence(name).consumers == ()
+    assert gone.exists()

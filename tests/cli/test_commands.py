@@ -240,6 +240,33 @@ def cells(shown):
     return [[cell.strip() for cell in line.split("│")[1:-1]] for line in shown.splitlines() if "│" in line]
 
 
+def test_a_list_without_rows_says_so(served, name, tmp_path):
+    """On standard error, as JSON too: an empty output might be a failure."""
+    with HullClient(served) as client:
+        client.create_hull(name, keyed="str")
+        client.create_fence(name, area=[[0, 0], [1, 0], [0, 1]], subjects=name)
+    lists = {
+        "list nobody/": "no hulls with names that begin with 'nobody/'",
+        "fences list nobody/": "no fences with names that begin with 'nobody/'",
+        "top nobody/ --interval 0.01": "no hulls with names that begin with 'nobody/'",
+        f"fences inside {name}": f"nobody is inside {name}",
+        f"query {name} vertices": f"{name} has no vertices",
+        f"query {name} influence": f"{name} has no vertices",
+        f"query {name} vertices --layer 2": f"layer 2 of {name} has no vertices",
+        f"query {name} locate -": "no points were given",
+        f"query {name} positions -": "no keys were given",
+        f"phases {name}": f"{name} has no stable entries",
+        f"frontier {name}": f"{name} has no efficient points",
+        f"relay dead-letters list --state {tmp_path}": f"{tmp_path} has no dead letters",
+    }
+    for command, words in lists.items():
+        for json_too in ([], ["--json"]) if "inside" not in command else ([],):
+            done = dynhull(*command.split(), *json_too, input="")
+            assert (done.exit_code, done.stdout, done.stderr) == (0, "", f"{words}\n"), command
+    code, shown = on_a_terminal("list", "nobody/")
+    assert (code, shown) == (0, "no hulls with names that begin with 'nobody/'\r\n")
+
+
 def test_bench(served):
     done = dynhull("bench", "--seconds", 0.2, "--points", 1000, "--json")
     assert done.exit_code == 0, done.stderr

@@ -111,6 +111,7 @@ def test_the_help_of_each_command() -> None:
         assert (done.exit_code, f" dynhull {entry.name} " in done.stdout.replace(" root ", " dynhull ")) == (0, True)
         assert f"│ {entry.name} " in listed
         assert "<bool>" not in done.stdout, "a flag takes no value"
+    assert "─ More ─" not in listed, "each command has its group"
     assert "Another name for dynhull load." in dynhull("import", "-h").stdout
 
 

@@ -11,6 +11,7 @@ from dynhull_cli.durations import duration
 from dynhull_cli.exits import Exit
 from dynhull_cli.groups import beside, group
 from dynhull_cli.json_lines import json_line
+from dynhull_cli.listing import listed
 
 
 class LogForm(StrEnum):
@@ -60,7 +61,7 @@ def list_dead_letters(state: State = Path("dynhull-relay"), as_json: AsJson = Fa
         letters = StateFolder(state).dead_letters()
     except ValueError as error:
         fail(Exit.FAILED, str(error))
-    for each in letters:
+    for each in listed(letters, f"{state} has no dead letters"):
         time = datetime.fromtimestamp(each.time, UTC).isoformat(timespec="seconds")
         if as_json:
             typer.echo(
@@ -183,8 +184,6 @@ def relay(
     keys = [read_secret(each) for each in secret or ()]
     patience = Patience(attempts, _seconds(first_pause, "--first-pause"), _seconds(longest_pause, "--longest-pause"))
     folder = StateFolder(state)
-    if enable:
-        folder.enable()
     logs.configure(log_format.value)
 
     async def serve() -> bool:
@@ -197,18 +196,23 @@ def relay(
             allow_private=allow_private,
         )
         page = None if metrics_port is None else (metrics_host, metrics_port)
-        async with connect(AsyncHullClient) as client:
-            return await run(
-                client,
-                fences,
-                consumer,
-                target,
-                without_secrets(to),
-                patience,
-                folder,
-                metrics=page,
-                grace=_seconds(grace, "--grace"),
-            )
+        try:
+            async with connect(AsyncHullClient) as client:
+                return await run(
+                    client,
+                    connect.address,
+                    fences,
+                    consumer,
+                    target,
+                    without_secrets(to),
+                    patience,
+                    folder,
+                    enable=enable,
+                    metrics=page,
+                    grace=_seconds(grace, "--grace"),
+                )
+        finally:
+            await target.close()
 
     if not asyncio.run(serve()):
         fail(Exit.FAILED, "a receiver wants no more events: the server keeps them for the consumer")

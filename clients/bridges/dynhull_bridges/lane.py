@@ -1,11 +1,8 @@
 """One fence of a relay: its events go to the target one after the other, whatever happens to other fences."""
 
 import asyncio
-import random
-from collections.abc import Awaitable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeVar
 
 import structlog
 
@@ -22,13 +19,12 @@ from .dead_letters import StateFolder
 from .figures import Figures
 from .letters import Letter, letter
 from .target import GoneError, NotDeliveredError, RefusedError, Target
+from .waiting import growing_pauses, unless
 
 LONGEST_RETRY_AFTER = 86400.0  # seconds
 FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER = 0.1, 5.0
 SECONDS_BETWEEN_LOOKS = 5.0
 SECONDS_BETWEEN_ACKNOWLEDGEMENTS = 0.2
-
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,13 +111,13 @@ class Lane:
 
     async def _read(self) -> None:
         """Put the events into the queue, from the server that is there."""
-        pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+        pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
         while True:
             try:
                 async with self._client.watch_fence(self._fence, self._consumer) as watch:
                     async for event in watch:
                         self._begun = True
-                        pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+                        pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
                         if not self._is_known(event):
                             await self._arrived.put(event)
                             self._last = event
@@ -142,7 +138,7 @@ class Lane:
         """The next events, as many as are there and go into one delivery; none at the end."""
         if self._stop.is_set():
             return []
-        first = await self._unless_stopped(self._arrived.get())
+        first = await unless(self._stop, self._arrived.get())
         found = [] if first is None else [first]
         while found and len(found) < self._target.most and not self._arrived.empty():
             more = self._arrived.get_nowait()
@@ -155,7 +151,7 @@ class Lane:
     async def _deliver(self, events: list[FenceEvent]) -> None:
         """Deliver events, however long it takes."""
         letters = [letter(each) for each in events]
-        pauses = _pauses(self._patience.first_pause, self._patience.longest_pause)
+        pauses = growing_pauses(self._patience.first_pause, self._patience.longest_pause)
         refusals = 0
         while not self._stop.is_set():
             try:
@@ -175,7 +171,7 @@ class Lane:
                 self._log.warning(
                     "not delivered, trying again", id=letters[0].id, error=str(error), pause=round(pause, 3)
                 )
-                await self._unless_stopped(asyncio.sleep(pause))
+                await unless(self._stop, asyncio.sleep(pause))
             else:
                 self._figures.delivered.labels(self._fence).inc(len(letters))
                 break
@@ -193,13 +189,13 @@ class Lane:
 
     async def _acknowledge(self) -> None:
         """Acknowledge what is delivered, now and then: each acknowledgement is a commit of the server."""
-        pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+        pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
         while True:
             await self._news.wait()
             self._news.clear()
             try:
                 await self._acknowledge_now()
-                pauses = _pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+                pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
                 await asyncio.sleep(SECONDS_BETWEEN_ACKNOWLEDGEMENTS)
             except (UnavailableError, DeadlineError, OutcomeUnknownError) as error:
                 self._log.warning("not acknowledged, trying again", error=str(error))
@@ -225,22 +221,3 @@ class Lane:
                     if each.name == self._consumer:
                         self._figures.behind(self._fence, each)
             await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
-
-    async def _unless_stopped(self, awaited: Awaitable[Result]) -> Result | None:
-        """What is awaited; None if the relay is stopped before."""
-        task = asyncio.ensure_future(awaited)
-        stopping = asyncio.ensure_future(self._stop.wait())
-        try:
-            await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
-            return task.result() if task.done() else None
-        finally:
-            task.cancel()
-            stopping.cancel()
-
-
-def _pauses(first: float, longest: float) -> Iterator[float]:
-    """Seconds before each repetition: doubled each time, less a random part, so that many do not come back at once."""
-    pause = first
-    while True:
-        yield pause * random.uniform(0.5, 1)  # noqa: S311  # no secret
-        pause = min(2 * pause, longest)

@@ -17,6 +17,6 @@ def configure(form: str) -> None:
         processors=[structlog.processors.add_log_level, structlog.processors.TimeStamper(fmt="iso", utc=True), render],
         logger_factory=structlog.PrintLoggerFactory(sys.stderr),
     )
-    # The relay reports lost connections itself, once each.
-    logging.getLogger("nats").setLevel(logging.CRITICAL)
-    logging.getLogger("mqtt").setLevel(logging.CRITICAL)
+    # Relay and ingest report lost connections themselves, once each.
+    for client in ("nats", "mqtt", "aiokafka"):
+        logging.getLogger(client).setLevel(logging.CRITICAL)

@@ -9,12 +9,13 @@ from urllib.parse import urlsplit
 
 import structlog
 
-from dynhull_client import AsyncHullClient
+from dynhull_client import AsyncHullClient, DeadlineError, FenceNotFoundError, UnavailableError
 
 from .dead_letters import DeadLetter, StateFolder, gone_key
 from .figures import Figures
-from .lane import Lane, Patience
+from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, Lane, Patience
 from .target import GoneError, NotDeliveredError, ReaderGoneError, Target
+from .waiting import SERVER_AWAY, Absence, growing_pauses, unless
 
 log = structlog.get_logger("dynhull_relay")
 
@@ -56,6 +57,7 @@ def target_of(
 
 async def run(
     client: AsyncHullClient,
+    server: str,
     fences: Sequence[str],
     consumer: str,
     target: Target,
@@ -63,19 +65,22 @@ async def run(
     patience: Patience,
     folder: StateFolder,
     *,
+    enable: bool,
     metrics: tuple[str, int] | None,
     grace: float,
 ) -> bool:
     """Deliver the events of the fences until all are deleted, or a signal ends the relay.
 
+    Unless the server has all fences, nothing is changed: not one of them gets the consumer.
+
     Returns:
         Whether every receiver wanted its events; False if one is gone.
 
     Raises:
-        DynhullError: the server refuses to send the events.
+        DynhullError: the server refuses to send the events, or has not all of the fences.
         ValueError: the receivers of all fences were gone earlier, and have not been enabled since then.
     """
-    gone = folder.gone()
+    gone = {} if enable else folder.gone()
     wanted = [fence for fence in dict.fromkeys(fences) if gone_key(fence, to) not in gone]
     if not wanted:
         raise ValueError(f"{to} answered {gone[gone_key(fences[0], to)]}: --enable delivers to it again")
@@ -86,9 +91,15 @@ async def run(
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     figures = Figures()
-    lanes = [Lane(client, each, consumer, target, to, patience, folder, figures, stop) for each in wanted]
     port = {} if metrics is None else {"metrics_port": figures.serve(*metrics)}
-    log.info("relaying", fences=wanted, to=to, consumer=consumer, **port)
+    await unless(stop, _require_fences(client, server, wanted))
+    if stop.is_set():
+        log.info("stopped")
+        return True
+    if enable:
+        folder.enable()
+    lanes = [Lane(client, each, consumer, target, to, patience, folder, figures, stop) for each in wanted]
+    log.info("relaying", fences=wanted, to=to, consumer=consumer, server=server, **port)
     running = [asyncio.create_task(lane.run()) for lane in lanes]
     ending = asyncio.create_task(_end(stop, running, grace))
     try:
@@ -104,7 +115,6 @@ async def run(
         for each in running:
             each.cancel()
         await asyncio.gather(*running, return_exceptions=True)
-        await target.close()
     log.info("stopped")
     return len(wanted) == len(set(fences)) and not any(lane.disabled for lane in lanes)
 
@@ -126,6 +136,28 @@ async def send_again(letters: Sequence[DeadLetter], target: Target) -> tuple[int
     finally:
         await target.close()
     return sent, None
+
+
+async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence[str]) -> None:
+    """Ask the server, once it is there, for all fences; FenceNotFoundError names those that it does not have."""
+    away = Absence(SERVER_AWAY, server=server)
+    pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
+    while True:
+        missing = []
+        try:
+            for each in fences:
+                try:
+                    await client.get_fence(each)
+                except FenceNotFoundError as error:
+                    missing.append(error)
+        except (UnavailableError, DeadlineError) as error:
+            away.lasts(error)
+            await asyncio.sleep(next(pauses))
+            continue
+        if missing:
+            first = missing[0]
+            raise FenceNotFoundError("\n".join(map(str, missing)), first.code, first.reason, first.metadata)
+        return
 
 
 async def _end(stop: asyncio.Event, running: Sequence[asyncio.Task[None]], grace: float) -> None:

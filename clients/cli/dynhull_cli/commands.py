@@ -22,7 +22,18 @@ from .groups import Group
 
 GROUP = "dynhull.commands"
 PANELS = {
-    "Hulls and their points": ("list", "create", "recenter", "delete", "insert", "put", "remove", "load", "import"),
+    "Hulls and their points": (
+        "list",
+        "create",
+        "recenter",
+        "delete",
+        "insert",
+        "put",
+        "remove",
+        "load",
+        "import",
+        "ingest",
+    ),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Fences": ("fences", "relay"),
     "Server": ("serve", "config", "token", "gateway", "dashboard", "bench"),

@@ -4,26 +4,40 @@ import inspect
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 
 from .exits import Exit
 
 if TYPE_CHECKING:
+    from grpc import ChannelCredentials
+
     from dynhull_client import AsyncHullClient, HullClient
 
 Client = TypeVar("Client", "HullClient", "AsyncHullClient")
 
 
-class Connect(Protocol):
-    """Makes a client of the given class; `more` are further arguments of `Connection`."""
+@dataclass(frozen=True, slots=True)
+class Connect:
+    """Makes clients.
+
+    Attributes:
+        address: the server, as the user writes it.
+        token: the bearer token, or None.
+        encryption: the credentials of TLS, or None.
+    """
+
+    address: str
+    token: str | None
+    encryption: "ChannelCredentials | None"
 
     def __call__(self, kind: type[Client], /, **more: Any) -> Client:
-        """The client."""
-        ...
+        """A client of the given class; `more` are further arguments of `Connection`."""
+        return kind(self.address, token=self.token, tls=self.encryption, **more)
 
 
 def _option(variable: str, text: str, **more: Any) -> Any:
@@ -85,7 +99,7 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
 
         try:
             encryption = credentials(tls, tls_ca, client_cert, client_key)
-            command(lambda kind, **more: kind(address, token=token, tls=encryption, **more), **given)
+            command(Connect(address, token, encryption), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
             encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
             about_tls = "does it serve TLS" if encrypted else "does it require TLS (--tls)"

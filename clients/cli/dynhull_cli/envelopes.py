@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 from .connected import AsJson, connected
 from .json_lines import json_line
+from .listing import listed
 from .tab_lines import tab_line
 
 
@@ -36,10 +37,10 @@ def phases(
     from .rows import number_rows
 
     if not entries:
-        for entry in client.phase_diagram(name).stable.tolist():
+        for entry in listed(client.phase_diagram(name).stable.tolist(), f"{name} has no stable entries"):
             typer.echo(json_line(stable=entry) if as_json else tab_line(entry))
         return
-    for rows in number_rows(entries):
+    for rows in listed(number_rows(entries), "no entries were given"):
         found = client.phase_diagram(name, rows)
         for entry, above, both, shares in zip(rows, found.energies_above_hull, found.phases, found.shares, strict=True):
             if as_json:
@@ -74,9 +75,10 @@ def frontier(
 
     if not points and not rates:
         found = client.frontier(name)
-        for corner, rate in zip_longest(found.efficient, found.turning_rates, fillvalue=math.nan):
+        corners = zip_longest(found.efficient, found.turning_rates, fillvalue=math.nan)
+        for corner, rate in listed(corners, f"{name} has no efficient points"):
             typer.echo(json_line(efficient=corner, turning_rate=rate) if as_json else tab_line(corner, rate))
-    for rows in number_rows(points or []):
+    for rows in listed(number_rows(points), "no points were given") if points else ():
         for point, dominated in zip(rows, client.frontier(name, rows).dominated.tolist(), strict=True):
             if as_json:
                 typer.echo(json_line(asked=point, dominated=dominated))

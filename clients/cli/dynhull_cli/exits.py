@@ -10,3 +10,4 @@ class Exit(IntEnum):
     UNUSABLE = 2
     UNAVAILABLE = 3
     FORBIDDEN = 4
+    INTERRUPTED = 130

@@ -10,6 +10,7 @@ from .connected import AsJson, connected, fail
 from .durations import duration, shown
 from .exits import Exit
 from .json_lines import json_line
+from .listing import below, listed
 from .plural import plural
 
 if TYPE_CHECKING:
@@ -49,10 +50,11 @@ def list_hulls(
     """
     from rich.console import Console
 
-    hulls = client.list_hulls(prefix)
+    hulls = listed(client.list_hulls(prefix), below("hulls", prefix))
     console = Console(highlight=False)
     if console.is_terminal and not as_json:
-        console.print(_table(list(hulls)))
+        if rows := list(hulls):
+            console.print(_table(rows))
         return
     for info in hulls:
         if as_json:

@@ -7,6 +7,7 @@ import typer
 
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
+from .listing import listed
 from .tab_lines import tab_line
 
 if TYPE_CHECKING:
@@ -113,7 +114,8 @@ def query(
     if question in WITHOUT_POINTS:
         if points:
             raise ValueError(f"{question} takes no points, but {points[0]!r} was given")
-        for row in _shape(client, name, question, keys, layer):
+        what = f"layer {layer} of {name}" if layer and question is Question.VERTICES else name
+        for row in listed(_shape(client, name, question, keys, layer), f"{what} has no vertices"):
             typer.echo(json_line(**row) if as_json else tab_line(*row.values()))
     elif question is Question.POSITIONS or (keys and question in ABOUT_KEYS):
         _ask_about_keys(client, name, question, points, keys_of, layer or 1, as_json)
@@ -176,7 +178,7 @@ def _ask_about_keys(
     else:
         located = client.locate(name, keys=keys, keys_of=keys_of, layer=layer)
         answers = [SIDES[each] for each in located.sides.tolist()]
-    for key, answer in zip(keys, answers, strict=True):
+    for key, answer in listed(zip(keys, answers, strict=True), "no keys were given"):
         typer.echo(json_line(asked=key, answer=answer) if as_json else tab_line(key, answer))
 
 
@@ -191,7 +193,8 @@ def _ask_about_points(
 ) -> None:
     from .rows import given_or_read, number_rows
 
-    for rows in number_rows(given_or_read(arguments), 4 if question is Question.LINES else 2):
+    pieces = number_rows(given_or_read(arguments), 4 if question is Question.LINES else 2)
+    for rows in listed(pieces, "no points were given"):
         answers: list[Any]
         if named:
             found = client.support(name, rows, keys=True, layer=layer)

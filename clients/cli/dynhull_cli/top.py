@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 from .connected import AsJson, connected
 from .json_lines import json_line
+from .listing import below, listed
 from .tab_lines import tab_line
 
 
@@ -56,7 +57,7 @@ def top(
                 screen.update(_shown(table[:rows]), refresh=True)
         return
     for table in tables:
-        for row in table[:rows]:
+        for row in listed(table[:rows], below("hulls", prefix)):
             info = row.info
             if as_json:
                 members = {"revision": info.revision, "points": info.points, "distinct": info.distinct}

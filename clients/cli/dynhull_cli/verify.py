@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 from .connected import AsJson, connected
 from .exits import Exit
 from .json_lines import json_line
+from .listing import listed
 from .plural import plural
 
 
@@ -32,7 +33,7 @@ def verify(
     If a hull differs, its line shows the first difference and the exit code is 1.
     """
     different = 0
-    for name in names or [info.name for info in client.list_hulls()]:
+    for name in names or listed([info.name for info in client.list_hulls()], "no hulls"):
         found = client.verify(name, timeout=timeout)
         different += not found.whole
         typer.echo(json_line(name=name, **asdict(found)) if as_json else f"{name}: {_summary(found)}")

@@ -37,7 +37,8 @@ class BadMessages:
             self._file.write(json.dumps(_line(message, error), ensure_ascii=False) + "\n")
             self._file.flush()
         if self.count <= LOGGED:
-            log.warning("bad message", topic=message.topic, number=message.number, error=str(error))
+            place = {"number": message.number} if message.number else {}  # MQTT has no numbers
+            log.warning("bad message", topic=message.topic, **place, error=str(error))
         if self.count == LOGGED + 1:
             log.warning("more bad messages are counted, not logged")
         if self._most is not None and self.count > self._most:

@@ -1,7 +1,7 @@
 """`dynhull ingest`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -11,11 +11,6 @@ from dynhull_cli.exits import Exit
 from dynhull_cli.times import TimeUnit
 
 from ..command import LogForm
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .feed import Feed
 
 
 def _mapping(text: str, *names: str) -> Any:
@@ -67,6 +62,13 @@ def ingest(
         int | None, typer.Option(min=0, help="End if there are more bad messages than this. Default: never.")
     ] = None,
     to_end: Annotated[bool, typer.Option("--to-end", help="End when no message is left, rather than wait.")] = False,
+    patience: Annotated[
+        str | None,
+        typer.Option(
+            help="How long to wait for a broker or a server that does not answer, before ending with exit code 3. "
+            "Default: for ever."
+        ),
+    ] = None,
     grace: Annotated[str, typer.Option(help="How long what is under way may take after SIGTERM.")] = "10s",
     report: Annotated[str, typer.Option(help="Time between two lines about the progress in the log.")] = "10s",
     metrics_port: Annotated[
@@ -95,23 +97,33 @@ def ingest(
     from dynhull_client import AsyncHullClient
 
     from .. import logs
+    from ..target import without_secrets
     from .bad import BadMessages
+    from .feed import FeedError
     from .ingest import IngestError, feeds_of, run
     from .mapping import Mapping
     from .pump import Settings
 
     mapping = Mapping(hull, x, y, key, time, time_unit, each)
     on_globe = mapping.degrees if geographic is None else geographic
-    settings = Settings(mapping, {"geographic": on_globe} if create else None, to_end)
-    seconds = {option: duration(text, option) for option, text in (("--grace", grace), ("--report", report))}
+    given = (("--grace", grace), ("--report", report), ("--patience", patience))
+    seconds = {option: duration(text, option) for option, text in given}
+    limit = seconds["--patience"]
+    settings = Settings(
+        mapping,
+        {"geographic": on_globe} if create else None,
+        to_end,
+        None if limit is None else limit.total_seconds(),
+    )
     logs.configure(log_format.value)
 
-    async def serve() -> None:
-        feeds: Sequence[Feed] = await feeds_of(source, hull, producer, keyed=key is not None)
+    async def serve() -> bool:
+        find = feeds_of(source, hull, producer, keyed=key is not None)
         async with connect(AsyncHullClient) as client:
-            await run(
+            return await run(
                 client,
-                feeds,
+                connect.address,
+                find,
                 settings,
                 BadMessages(bad, max_bad),
                 metrics=None if metrics_port is None else (metrics_host, metrics_port),
@@ -120,6 +132,12 @@ def ingest(
             )
 
     try:
-        asyncio.run(serve())
+        ended = asyncio.run(serve())
+    except FeedError as error:
+        fail(
+            Exit.UNAVAILABLE, f"no answer from the broker: {error}\nIs it running, is {without_secrets(source)} right?"
+        )
     except IngestError as error:
         fail(Exit.FAILED, str(error))
+    if to_end and not ended:
+        fail(Exit.INTERRUPTED, "interrupted before the end: the next ingest goes on from here")

@@ -14,6 +14,12 @@ class FeedError(Exception):
     """The broker cannot be reached for now, or has lost the connection: the feed begins again."""
 
 
+def feed_error(broker: str, error: BaseException) -> FeedError:
+    """The error of a broker's client as one of the feed, with its class, which some clients put in the text."""
+    name, text = type(error).__name__, str(error) or ("no answer in time" if isinstance(error, TimeoutError) else "")
+    return FeedError(f"{broker}: {text if text.startswith(name) else f'{name}: {text}'.removesuffix(': ')}")
+
+
 @dataclass(slots=True, eq=False)
 class Message:
     """One message of a broker.

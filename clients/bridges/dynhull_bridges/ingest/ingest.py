@@ -2,7 +2,7 @@
 
 import asyncio
 import signal
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from time import monotonic
 from urllib.parse import urlsplit
 
@@ -10,25 +10,26 @@ import structlog
 
 from dynhull_client import AsyncHullClient
 
+from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
 from .feed import Feed, FeedError
 from .figures import Figures
 from .lane import NotCreatedError
-from .pump import Pump, Settings
+from .pump import BROKER_AWAY, FIRST_PAUSE, LONGEST_PAUSE, Pump, Settings
 
 log = structlog.get_logger("dynhull_ingest")
+Find = Callable[[], Awaitable[Sequence[Feed]]]
 
 
 class IngestError(Exception):
     """The ingest cannot go on; the message says why."""
 
 
-async def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool) -> Sequence[Feed]:
-    """The feeds that a URL stands for.
+def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool) -> Find:
+    """Finds the feeds that a URL stands for; it raises FeedError if the broker, which has to be asked, does not answer.
 
     Raises:
         ValueError: there are none, or an option does not suit them.
-        IngestError: the broker does not answer.
     """
     match urlsplit(url).scheme:
         case "mqtt" | "mqtts":
@@ -41,42 +42,48 @@ async def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool) ->
                 )
             if producer is not None:
                 raise ValueError("--producer is for NATS and Kafka, which number their messages")
-            return [Mqtt(url, hull)]
+            return _known([Mqtt(url, hull)])
         case "nats" | "tls":
             from .jetstream import JetStream
 
             stream = JetStream(url)
             stream.producer = producer or stream.producer
-            return [stream]
+            return _known([stream])
         case "kafka":
-            from .kafka import partitions_of
+            from .kafka import Topic
 
-            try:
-                partitions = await partitions_of(url)
-            except FeedError as error:
-                raise IngestError(str(error)) from None
-            for each in partitions:
-                each.producer = f"{producer}/{each.number}" if producer else each.producer
-            return partitions
+            return Topic(url, producer).partitions
         case scheme:
             raise ValueError(f"the URL begins with {scheme!r}: must be mqtt, mqtts, nats, tls or kafka")
 
 
+def _known(feeds: Sequence[Feed]) -> Find:
+    async def found() -> Sequence[Feed]:
+        return feeds
+
+    return found
+
+
 async def run(
     client: AsyncHullClient,
-    feeds: Sequence[Feed],
+    server: str,
+    find: Find,
     settings: Settings,
     bad: BadMessages,
     *,
     metrics: tuple[str, int] | None,
     grace: float,
     report: float,
-) -> None:
-    """Move the messages of all feeds until a signal, or the end if that is asked for.
+) -> bool:
+    """Move the messages of all feeds that `find` returns until a signal, or the end if that is asked for.
+
+    Returns:
+        Whether the end was reached.
 
     Raises:
-        DynhullError: the server refuses to take points.
-        IngestError: they cannot be sent, or there are too many bad messages.
+        DynhullError: the server refuses to take points, or has been away for too long.
+        FeedError: the broker has been away for too long.
+        IngestError: points cannot be sent, or there are too many bad messages.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -85,9 +92,11 @@ async def run(
     figures = Figures()
     if metrics is not None:
         log.info("metrics", port=figures.serve(*metrics))
-    pumps = [Pump(client, each, settings, bad, figures) for each in feeds]
+    feeds = await unless(stop, _found(find, settings.patience)) or ()
+    away = Absence(SERVER_AWAY, settings.patience, server=server)
+    pumps = [Pump(client, away, each, settings, bad, figures) for each in feeds]
     running = asyncio.gather(*(each.run(stop) for each in pumps))
-    ending = asyncio.create_task(_end(stop, running, grace))
+    ending = asyncio.create_task(_end(stop, running, pumps, grace))
     reporting = asyncio.create_task(_report(pumps, bad, settings, report))
     try:
         await running
@@ -105,13 +114,29 @@ async def run(
         reporting.cancel()
         bad.close()
     points = sum(each.points for each in pumps)
-    seconds = max(each.ended for each in pumps) - min(each.begun for each in pumps)
+    ended, begun = [each.ended for each in pumps], [each.begun for each in pumps]
+    seconds = max(ended, default=0.0) - min(begun, default=0.0)
     log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count)
+    return bool(pumps) and all(each.at_end for each in pumps)
 
 
-async def _end(stop: asyncio.Event, running: "asyncio.Future[list[None]]", grace: float) -> None:
+async def _found(find: Find, patience: float | None) -> Sequence[Feed]:
+    """The feeds, once the broker says which there are."""
+    away, pauses = Absence(BROKER_AWAY, patience), growing_pauses(FIRST_PAUSE, LONGEST_PAUSE)
+    while True:
+        away.begins()
+        try:
+            return await find()
+        except FeedError as error:
+            away.lasts(error)
+        await asyncio.sleep(away.pause(next(pauses)))
+
+
+async def _end(stop: asyncio.Event, running: "asyncio.Future[list[None]]", pumps: Sequence[Pump], grace: float) -> None:
     """After a signal, let what is under way finish, within the grace period."""
     await stop.wait()
+    if under_way := sum(each.under_way for each in pumps):
+        log.info("stopping when what is under way is done", messages=under_way, grace=grace)
     await asyncio.sleep(grace)
     running.cancel()
 

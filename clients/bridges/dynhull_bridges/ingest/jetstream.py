@@ -17,7 +17,7 @@ from nats.js.errors import BucketNotFoundError, KeyNotFoundError, NotFoundError
 from nats.js.kv import KeyValue
 
 from ..target import without_secrets
-from .feed import FeedError, Message, producer_name
+from .feed import FeedError, Message, feed_error, producer_name
 from .topics import captures_of
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class JetStream:
         except NotFoundError:
             raise ValueError(f"NATS has no stream {self._stream!r}") from None
         except (Error, OSError, TimeoutError) as error:
-            raise FeedError(f"NATS: {type(error).__name__}: {error}") from None
+            raise feed_error("NATS", error) from None
 
     async def _begin(self, known: int | None) -> int:
         self._client = await nats.connect(
@@ -159,7 +159,7 @@ class JetStream:
         try:
             await self._client.publish(self._pull, json.dumps(request).encode(), reply=self._inbox)
         except (Error, OSError) as error:
-            raise FeedError(f"NATS: {type(error).__name__}: {error}") from None
+            raise feed_error("NATS", error) from None
         self._asked += PULLED
 
     async def keep(self, messages: Sequence[Message]) -> None:
@@ -171,7 +171,7 @@ class JetStream:
             bucket = await self._positions()
             await bucket.put(self._key, str(number).encode())
         except (Error, OSError, TimeoutError) as error:
-            raise FeedError(f"NATS: {type(error).__name__}: {error}") from None
+            raise feed_error("NATS", error) from None
 
     async def _kept(self) -> int:
         try:

@@ -5,10 +5,10 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from aiokafka import AIOKafkaConsumer, TopicPartition
 from aiokafka.admin import AIOKafkaAdminClient
-from aiokafka.errors import KafkaError
+from aiokafka.errors import KafkaConnectionError, KafkaError
 
 from ..target import without_secrets
-from .feed import FeedError, Message, producer_name
+from .feed import FeedError, Message, feed_error, producer_name
 
 WAIT = 1000  # milliseconds that a read waits for messages
 MOST = 4096  # messages of one read
@@ -48,7 +48,7 @@ class Kafka:
             oldest = (await consumer.beginning_offsets([partition]))[partition]
             end = (await consumer.end_offsets([partition]))[partition]
         except (KafkaError, OSError) as error:
-            raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+            raise feed_error("Kafka", error) from None
         if after > end:
             raise ValueError(
                 f"{self.name} ends at offset {end}, but {after} offsets of it have been taken: the topic was created "
@@ -63,7 +63,7 @@ class Kafka:
         try:
             found = await self._connected.getmany(self._partition, timeout_ms=WAIT, max_records=MOST)
         except (KafkaError, OSError) as error:
-            raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+            raise feed_error("Kafka", error) from None
         records = found.get(self._partition, ())
         if records:
             self._next = records[-1].offset + 1
@@ -76,7 +76,7 @@ class Kafka:
         try:
             await self._connected.commit({self._partition: messages[-1].number})
         except (KafkaError, OSError) as error:
-            raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
+            raise feed_error("Kafka", error) from None
 
     async def lag(self) -> int | None:
         """The number of messages that are not read yet."""
@@ -96,29 +96,52 @@ class Kafka:
         return self._consumer
 
 
-async def partitions_of(url: str) -> list[Kafka]:
-    """The partitions that kafka://HOST[:PORT]/TOPIC[?partition=N&partition=M] stands for; all of them by default.
+class Topic:
+    """The topic that kafka://HOST[:PORT][,HOST...]/TOPIC[?partition=N&partition=M] stands for.
+
+    Args:
+        url: the URL; without partitions it is about all of them.
+        producer: the name under which hulls count the offsets, followed by the partition; None for one of the topic.
 
     Raises:
-        ValueError: the URL names no topic, or one that does not exist.
-        FeedError: no broker answers.
+        ValueError: the URL names no topic, or a partition that is no number.
     """
-    parts = urlsplit(url)
-    topic = unquote(parts.path).strip("/")
-    if not parts.netloc or not topic or "/" in topic:
-        raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
-    admin = AIOKafkaAdminClient(bootstrap_servers=parts.netloc)
-    try:
-        await admin.start()
-        (described,) = await admin.describe_topics([topic])
-    except (KafkaError, OSError) as error:
-        raise FeedError(f"Kafka: {type(error).__name__}: {error}") from None
-    finally:
-        await admin.close()
-    there = [each["partition"] for each in described["partitions"]]
-    if not there:
-        raise ValueError(f"Kafka has no topic {topic!r}")
-    asked = [int(each) for each in parse_qs(parts.query).get("partition", ()) if each.isdecimal()] or sorted(there)
-    if missing := sorted(set(asked) - set(there)):
-        raise ValueError(f"the topic {topic!r} has no partition {missing[0]}: it has 0 to {max(there)}")
-    return [Kafka(parts.netloc, topic, each) for each in asked]
+
+    def __init__(self, url: str, producer: str | None) -> None:
+        parts = urlsplit(url)
+        self._servers = parts.netloc
+        self._name = unquote(parts.path).strip("/")
+        self._producer = producer
+        if not self._servers or not self._name or "/" in self._name:
+            raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
+        asked = parse_qs(parts.query).get("partition", [])
+        if wrong := [each for each in asked if not each.isdecimal()]:
+            raise ValueError(f"{without_secrets(url)}: partition is {wrong[0]!r}, not a number from 0")
+        self._asked = [int(each) for each in asked]
+
+    async def partitions(self) -> list[Kafka]:
+        """The partitions.
+
+        Raises:
+            ValueError: there is no such topic, or it has no such partition.
+            FeedError: no broker answers.
+        """
+        admin = AIOKafkaAdminClient(bootstrap_servers=self._servers)
+        try:
+            await admin.start()
+            (described,) = await admin.describe_topics([self._name])
+        except KafkaConnectionError:
+            raise FeedError(f"Kafka: no broker answers at {self._servers}") from None
+        except (KafkaError, OSError) as error:
+            raise feed_error("Kafka", error) from None
+        finally:
+            await admin.close()
+        there = sorted(each["partition"] for each in described["partitions"])
+        if not there:
+            raise ValueError(f"Kafka has no topic {self._name!r}")
+        if missing := sorted(set(self._asked) - set(there)):
+            raise ValueError(f"the topic {self._name!r} has no partition {missing[0]}: it has 0 to {max(there)}")
+        found = [Kafka(self._servers, self._name, each) for each in self._asked or there]
+        for each in found:
+            each.producer = f"{self._producer}/{each.number}" if self._producer else each.producer
+        return found

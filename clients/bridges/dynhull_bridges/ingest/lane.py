@@ -21,6 +21,7 @@ from dynhull_client import (
     UnavailableError,
 )
 
+from ..waiting import Absence
 from .chunk import Chunk
 from .feed import Message
 
@@ -31,6 +32,7 @@ log = structlog.get_logger("dynhull_ingest")
 IN_FLIGHT = 32  # batches that are not acknowledged
 WAITING = 4  # chunks beyond these, before the feed is read on
 PATIENCE = 10.0  # seconds without a server, after which the log says so
+ANSWER = 10.0  # seconds for an answer of the server
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 
 
@@ -58,6 +60,7 @@ class Lane:
         create: settings of the hull if there is none; None to create none.
         bad: called with each message that is refused, and why.
         settled: called when a chunk is settled, with the number of its rows that were applied.
+        away: notes that the server does not answer; all lanes share it.
     """
 
     def __init__(
@@ -70,6 +73,7 @@ class Lane:
         create: dict[str, Any] | None,
         bad: Callable[[Message, Exception], None],
         settled: Callable[[int], None],
+        away: Absence,
     ) -> None:
         self._client = client
         self._hull = hull
@@ -78,6 +82,7 @@ class Lane:
         self._create = create
         self._bad = bad
         self._settled = settled
+        self._away = away
         self._kind: str | None = None
         self._waiting: deque[Chunk] = deque()  # not given to the writer
         self._flying: deque[Chunk] = deque()  # given to it, and not settled
@@ -97,7 +102,7 @@ class Lane:
         """Send chunks until cancelled.
 
         Raises:
-            DynhullError: the server refuses the writer itself, for example its token.
+            DynhullError: the server refuses the writer itself, for example its token, or has been away for too long.
             NotCreatedError: there is no hull that can take the points.
             OSError, TooManyBadError: bad messages cannot be kept aside.
         """
@@ -113,10 +118,12 @@ class Lane:
                 log.warning("another ingest of the same log writes to the hull", hull=self._hull, error=str(error))
             except HullNotFoundError:
                 log.warning("the hull was deleted", hull=self._hull)
-            except (UnavailableError, DeadlineError, LimitExceededError) as error:
-                log.warning("waiting for the server", hull=self._hull, error=str(error))
+            except LimitExceededError as error:
+                log.warning("a limit of the server is reached, trying again", hull=self._hull, error=str(error))
+            except (UnavailableError, DeadlineError) as error:
+                self._away.lasts(error)
             pause = FIRST_PAUSE if self._progress() != before else min(2 * pause, LONGEST_PAUSE)
-            await asyncio.sleep(pause)
+            await asyncio.sleep(self._away.pause(pause))
 
     def _progress(self) -> int:
         return len(self._flying) + len(self._waiting)
@@ -135,7 +142,7 @@ class Lane:
             linger=0,
             in_flight=IN_FLIGHT,
             stop_on_error=True,
-            patience=PATIENCE,
+            patience=self._away.pause(PATIENCE),
         )
         async with writer:
             known = writer.sequence if self._producer is not None else -1
@@ -153,6 +160,7 @@ class Lane:
         self._room.set()
         rest = chunk.after(known)
         if rest is None:
+            self._away.ends()
             self._settled(0)
             return
         self._flying.append(rest)
@@ -181,6 +189,7 @@ class Lane:
             return
         error = outcome.exception()
         if error is None and self._flying[0] is chunk:
+            self._away.ends()
             self._flying.popleft()
             chunk.settle()
             self._settled(len(chunk.points))
@@ -230,7 +239,7 @@ class Lane:
     async def _require_hull(self) -> None:
         """Create the hull if there is none, and learn the type of its keys."""
         try:
-            info = (await self._client.get_hull(self._hull)).info
+            info = (await self._client.get_hull(self._hull, timeout=ANSWER)).info
         except HullNotFoundError as error:
             if self._create is None:
                 raise NotCreatedError(f"{error}; `dynhull create` adds one, or leave out --no-create") from None

@@ -17,7 +17,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from ..target import without_secrets
-from .feed import FeedError, Message
+from .feed import FeedError, Message, feed_error
 from .topics import captures_of
 
 PORT, TLS_PORT = 1883, 8883
@@ -100,7 +100,7 @@ class Mqtt:
             async with asyncio.timeout(TIMEOUT):
                 await self._ready
         except (OSError, TimeoutError) as error:
-            raise FeedError(f"MQTT: {type(error).__name__}: {error}") from None
+            raise feed_error("MQTT", error) from None
         return 0
 
     async def read(self) -> Sequence[Message]:

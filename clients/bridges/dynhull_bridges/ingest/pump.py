@@ -11,17 +11,19 @@ import structlog
 
 from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
 
+from ..waiting import Absence, unless
 from .bad import BadMessages
 from .chunk import Taken, chunks_of
 from .feed import Feed, FeedError, Message
 from .figures import Figures
-from .lane import Lane
+from .lane import ANSWER, Lane
 from .mapping import Mapping, Row
 
 log = structlog.get_logger("dynhull_ingest")
 UNDER_WAY = 64  # reads that are not settled
 KEEP_EVERY = 1.0  # seconds between notes of the place in a log
 FIRST_PAUSE, LONGEST_PAUSE = 0.2, 30.0
+BROKER_AWAY = "the broker does not answer, trying again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +34,13 @@ class Settings:
         mapping: reads rows from them.
         create: settings of hulls that do not exist; None to create none.
         to_end: whether to end once no message is left.
+        patience: the seconds after which a broker that does not answer is given up; None for never.
     """
 
     mapping: Mapping
     create: dict[str, Any] | None
     to_end: bool
+    patience: float | None
 
 
 class Pump:
@@ -47,16 +51,25 @@ class Pump:
     """
 
     def __init__(
-        self, client: AsyncHullClient, feed: Feed, settings: Settings, bad: BadMessages, figures: Figures
+        self,
+        client: AsyncHullClient,
+        server_away: Absence,
+        feed: Feed,
+        settings: Settings,
+        bad: BadMessages,
+        figures: Figures,
     ) -> None:
         self.reached = 0  # the number of the last message read
         self.points = 0  # acknowledged
+        self.at_end = False  # whether no message was left, and all were taken
         self.begun = self.ended = monotonic()  # when the first message was read, and the last point acknowledged
         self._client = client
         self._feed = feed
         self._settings = settings
         self._figures = figures
         self._bad = bad
+        self._server_away = server_away
+        self._broker_away = Absence(BROKER_AWAY, settings.patience, feed=feed.name)
         self._lanes: dict[str, Lane] = {}
         self._sending: list[asyncio.Task[None]] = []
         self._under_way: deque[Taken] = deque()
@@ -64,6 +77,11 @@ class Pump:
         self._room = asyncio.Event()
         self._noting = asyncio.Lock()
         figures.add(feed.name)
+
+    @property
+    def under_way(self) -> int:
+        """The number of messages that are read and not settled."""
+        return sum(len(each.messages) for each in self._under_way)
 
     async def run(self, stop: asyncio.Event) -> None:
         """Read until `stop`, or until no message is left if that is asked for; then wait for what is under way.
@@ -90,30 +108,32 @@ class Pump:
             try:
                 await self._connection(stop)
             except FeedError as error:
+                away = self._broker_away
                 self._figures.restarts.labels(self._feed.name).inc()
-                log.warning("the broker does not answer, trying again", feed=self._feed.name, error=str(error))
+                away.lasts(error)
             except (UnavailableError, DeadlineError) as error:
-                log.warning("waiting for the server", feed=self._feed.name, error=str(error))
+                away = self._server_away
+                away.lasts(error)
             else:
                 return
             await self._feed.close()
             pause = FIRST_PAUSE if self.reached > reached else min(2 * pause, LONGEST_PAUSE)
-            try:
-                async with asyncio.timeout(pause):
-                    await stop.wait()
-            except TimeoutError:
-                continue
+            await unless(stop, asyncio.sleep(away.pause(pause)))
 
     async def _connection(self, stop: asyncio.Event) -> None:
         feed = self._feed
-        begun = await feed.begin(self.reached or await self._known())
+        begun = await unless(stop, self._begin())
+        if begun is None:
+            return
         self.reached = max(self.reached, begun)
-        log.info("reading", feed=feed.name, after=begun)
+        log.info("reading", feed=feed.name, **({} if feed.producer is None else {"after": begun}))
+        at_end = False
         while not stop.is_set():
             messages = await feed.read()
             if messages:
                 await self._take(messages)
             elif self._settings.to_end and await feed.lag() == 0:
+                at_end = True
                 break
             while len(self._under_way) >= UNDER_WAY:
                 self._room.clear()
@@ -122,16 +142,27 @@ class Pump:
             self._room.clear()
             await self._room.wait()
         await self._keep()
+        self.at_end = at_end
+
+    async def _begin(self) -> int:
+        known = self.reached or await self._known()
+        self._broker_away.begins()
+        begun = await self._feed.begin(known)
+        self._broker_away.ends()
+        return begun
 
     async def _known(self) -> int | None:
         """The number of the last message that the hull has, if all messages are for one hull."""
         hull = self._settings.mapping.hull
         if hull is None or self._feed.producer is None:
             return None
+        self._server_away.begins()
         try:
-            return await self._client.last_sequence(hull, self._feed.producer)
+            known = await self._client.last_sequence(hull, self._feed.producer, timeout=ANSWER)
         except HullNotFoundError:
-            return 0
+            known = 0
+        self._server_away.ends()
+        return known
 
     async def _take(self, messages: Sequence[Message]) -> None:
         """Hand the rows of some messages to the lanes of their hulls."""
@@ -174,6 +205,7 @@ class Pump:
             create=settings.create,
             bad=self._set_aside,
             settled=self._settled,
+            away=self._server_away,
         )
         self._sending.append(self._group.create_task(lane.run(), name=f"ingest into {hull}"))
         return lane
@@ -207,8 +239,7 @@ class Pump:
                 log.debug("the place in the log was not kept", feed=self._feed.name, error=str(error))
                 return
             if lag is not None:
-                lag += sum(len(each.messages) for each in self._under_way)
-                self._figures.lag.labels(self._feed.name).set(lag)
+                self._figures.lag.labels(self._feed.name).set(lag + self.under_way)
 
 
 def _require_keys_once(rows: Sequence[Row]) -> None:

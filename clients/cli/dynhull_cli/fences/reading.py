@@ -8,6 +8,7 @@ import typer
 from ..connected import AsJson, connected, fail
 from ..exits import Exit
 from ..json_lines import json_line
+from ..listing import below, listed
 from ..plural import plural
 from .settings import FenceName
 
@@ -33,10 +34,11 @@ def list_fences(
 
     from .shown import area_text, fence_members, subjects_text
 
-    fences = client.list_fences(prefix)
+    fences = listed(client.list_fences(prefix), below("fences", prefix))
     console = Console(highlight=False)
     if console.is_terminal and not as_json:
-        console.print(_table(list(fences)))
+        if rows := list(fences):
+            console.print(_table(rows))
         return
     for fence in fences:
         if as_json:
@@ -87,9 +89,9 @@ def inside(client: "HullClient", name: FenceName, as_json: AsJson = False) -> No
     if as_json:
         typer.echo(json_line(sequence=found.sequence, subjects=[inside_members(each) for each in found.subjects]))
         return
-    for each in found.subjects:
-        for key in each.keys:
-            typer.echo(f"{each.hull}\t{key}")
+    subjects = ((each.hull, key) for each in found.subjects for key in each.keys)
+    for hull, key in listed(subjects, f"nobody is inside {name}"):
+        typer.echo(f"{hull}\t{key}")
 
 
 @connected
