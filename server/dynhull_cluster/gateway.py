@@ -122,15 +122,17 @@ class Gateway:
 
     async def drain(self) -> None:
         """Refuse new calls, end waiting ones, and give the others the configured grace period to finish."""
-        log.info("draining")
+        served, self._serving = self._serving, False
+        if served:  # one that could not start has its error to say, and nothing else
+            log.info("draining")
         self._health.stop()
-        self._serving = False
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_STATUSES)
         await self._supervisor.stop()
         for link in self._links:
             await link.close()
-        log.info("stopped")
+        if served:
+            log.info("stopped")
 
     def _handlers(self, service: ServiceDescriptor) -> grpc.GenericRpcHandler:
         handlers = {}

@@ -176,16 +176,18 @@ class Server:
 
     async def drain(self) -> None:
         """Refuse new calls, end waiting ones, and give the others the configured grace period to finish."""
-        log.info("draining")
+        served, self._serving = self._serving, False
+        if served:  # one that could not start has its error to say, and nothing else
+            log.info("draining")
         self._health.stop()
-        self._serving = False
         await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_STATUSES)
         await self._entrance.close()
         self._stop_metrics()
         await self._engine.close()
-        log.info("stopped")
+        if served:
+            log.info("stopped")
 
     async def _look_at_lease(self) -> None:
         if not self._storage.entitled():

@@ -76,19 +76,29 @@ def test_removing_and_coalescing_keys(gateway: Gateway, keyed: str) -> None:
     assert gateway.post(f"{at}?delete=true", b"key\nk1\n", CSV).json["deleted"] == 1
 
 
+FEATURES = (
+    b'{"type": "FeatureCollection", "features": ['
+    b'{"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": [[0, 0], [1, 1]]}, "properties": null},'
+    b'{"type": "Feature", "geometry": {"type": "Point", "coordinates": [null, 1]}, "properties": null}]}'
+)
 BAD = [
-    (NDJSON, b'[1, 2]\n\n{"x": 1, "y": "2"}\n', 400, 1, "y", "'2'"),
+    (NDJSON, b'[1, 2]\n\n{"x": 1, "y": "2"}\n', 400, 1, "y", '"2"'),
+    (NDJSON, b'[1, 2]\n[1, "2"]\n', 400, 1, "y", '"2"'),
+    (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n{"key": 1, "x": 1, "y": 2}\n', 400, 1, "key", None),
+    (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n', 409, 0, "key", None),
     (NDJSON, b"[1, 2]\n[1, 2, 3]\n", 400, 1, None, None),
     (NDJSON, b"[1, 2]\n[1, 2\n", 400, 1, None, None),
     (NDJSON, b"[1, NaN]\n", 400, 0, None, None),
     (NDJSON, b"[1, 2]\n\xff\xfe\n", 400, 1, None, None),
     (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n[1, 2]\n', 400, 1, "key", None),
     (NDJSON, b"[" + b"1" * 2**21, 400, 0, None, None),
-    (CSV, b"x,y\n1,2\n1,inf\n", 400, 1, "y", "'inf'"),
-    (CSV, b"x,y\n1,2\n1\n", 400, 1, None, "['1']"),
+    (CSV, b"x,y\n1,2\n1,inf\n", 400, 1, "y", "inf"),
+    (CSV, b"x,y\n1,2\n1\n", 400, 1, None, "1"),
     (CSV, b"a,b\n1,2\n", 400, 0, "header", None),
     (CSV, b'x,y\n1,"2\n', 400, 1, None, None),
     (GEOJSON, b'{"type": "Polygon", "coordinates": []}', 400, 0, None, None),
+    (GEOJSON, b'{"type": "Point", "coordinates": [1, "2"]}', 400, 0, "/coordinates/1", '"2"'),
+    (GEOJSON, FEATURES, 400, 2, "/features/1/geometry/coordinates/0", "null"),
     (SEQUENCE, b'\x1e{"type": "Point", "coordinates": [1, 2]}\n\x1e{"type": "Poi', 400, 1, None, None),
     ("text/csv; charset=utf-16", "x,y\n1,2\n".encode("utf-16"), 415, None, "Content-Type", None),
     ("application/pdf", b"%PDF", 415, None, "Content-Type", "application/pdf"),
@@ -105,6 +115,21 @@ def test_bad_bodies_name_the_row_and_change_nothing(
     assert field is None or said["field"] == field
     assert value is None or said["value"] == value
     assert gateway.get(f"/hulls/{plane}").json["info"]["revision"] == 0
+
+
+def test_rows_that_a_keyed_hull_refuses_are_numbered(gateway: Gateway, keyed: str) -> None:
+    at = f"/hulls/{keyed}/rows"
+    refused = gateway.post(at, b"[1, 2]\n[3, 4]\n", NDJSON).json
+    assert (refused["status"], refused["row"], refused["reason"]) == (409, 0, "HULL_UNSUITABLE")
+    assert "has keys, which are strings" in refused["detail"]
+    assert '{"key": KEY, "x": X, "y": Y}' in refused["detail"]
+
+
+def test_rows_keep_their_numbers_when_a_key_comes_again(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str", "geographic": True})
+    rows = b"".join(b'{"key": "%s", "lon": 0, "lat": %d}\n' % row for row in ((b"a", 0), (b"a", 1), (b"b", 91)))
+    refused = gateway.post(f"/hulls/{name}/rows?coalesce=true", rows, NDJSON).json
+    assert (refused["status"], refused["row"], refused["value"]) == (400, 2, "[0.0, 91.0]"), refused
 
 
 def test_compressed_bodies_are_refused(gateway: Gateway, plane: str) -> None:

@@ -112,11 +112,21 @@ def test_lists_have_pages(gateway: Gateway, name: str) -> None:
 
 
 BAD = [
-    ("/points", {"insert": [[0, 0], [1, "2"]]}, ("insert", 1, "'2'", "/insert/1/1")),
+    ("/points", {"insert": [[0, 0], [1, "2"]]}, ("insert", 1, '"2"', "/insert/1/1")),
     ("/points", {"insert": [[0, 0], [1]]}, ("insert", 1, None, "/insert/1")),
-    ("/points", [[0, 0], [True, 1]], ("1", 1, "True", "/1/0")),
+    ("/points", [[0, 0], [True, 1]], ("1", 1, "true", "/1/0")),
     ("/points", {"inserts": []}, ("inserts", None, "[]", "/inserts")),
-    ("/locate", {"points": [[0, 0], [1, None]]}, ("points", 1, "None", "/points/1/1")),
+    ("/points", {"keys": ["a", 1.5], "points": [[0, 0], [1, 1]]}, ("keys", 1, "1.5", "/keys/1")),
+    ("/points", {"keys": ["a", 1], "points": [[0, 0], [1, 1]]}, ("keys", 1, "1", "/keys/1")),
+    ("/points", {"keys": ["a", "b"], "points": [[0, 0]]}, ("points", None, None, "/points")),
+    ("/points", {"move": {"origins": [[0, 0]], "destinations": []}}, ("move", None, None, "/move/destinations")),
+    ("/points", {"insert": [[0, 0]], "times": []}, ("times", None, None, "/times")),
+    ("/points", {"insert": [[0, 0]], "remove": ["a"]}, ("insert", None, None, "/insert")),
+    ("/points", {"keys": ["a"]}, ("keys", None, None, "/keys")),
+    ("/locate", {"points": [[0, 0], [1, None]]}, ("points", 1, "null", "/points/1/1")),
+    ("/intersect-lines", {"origins": [[0, 0]], "targets": []}, ("targets", None, "[]", "/targets")),
+    ("/support", {"directions": [[0, 1], [0, 0]]}, ("directions", 1, "[0, 0]", "/directions/1")),
+    ("/locate", [], ("body", None, "[]", "")),
 ]
 
 
@@ -128,9 +138,71 @@ def test_errors_name_field_row_and_value(
     assert (refused.status, refused.headers["Content-Type"]) == (400, "application/problem+json")
     said = refused.json
     field, row, value, pointer = cause
-    assert (said["field"], said.get("row"), said["errors"][0]["pointer"]) == (field, row, pointer)
+    assert (said["field"], said.get("row"), said["errors"][0]["pointer"]) == (field, row, pointer), said
     assert value is None or said["value"] == value
     assert gateway.get(f"/hulls/{square}").json["info"]["revision"] == 1
+
+
+def test_the_server_s_errors_have_the_names_of_the_request(gateway: Gateway, name: str) -> None:
+    """JSON pointers into the body, whatever the messages of the server are made of; names may have slashes."""
+    keyed, globe = f"{name}/keyed", f"{name}/globe"
+    gateway.post("/hulls", {"name": keyed, "keyed": "str"})
+    gateway.post("/hulls", {"name": globe, "geographic": True})
+    at, other = (f"/hulls/{each.replace('/', '%2F')}/points" for each in (keyed, globe))
+    put, far = {"keys": ["a"], "points": [[0, 0]]}, {"insert": [[0, 0], [0, 91]]}
+    ring = {"exterior": [[0, 0], [1, 1], [1, 0], [0, 1]]}
+    cases = [
+        (gateway.post(at, [[1, 2]]), 409, "/0"),
+        (gateway.post(at, {"insert": [[1, 2]]}), 409, "/insert/0"),
+        (gateway.post(at, {"keys": ["a", "a"], "points": [[0, 0], [1, 1]]}), 400, "/keys/1"),
+        (gateway.post(at, {"remove": ["b"], "missing": "raise"}), 409, "/remove/0"),
+        (gateway.post(other, far), 400, "/insert/1"),
+        (gateway.post(other, far, Idempotency_Key="far:1"), 400, "/insert/1"),
+        (gateway.post(other, far["insert"]), 400, "/1"),
+        (
+            gateway.post("/transfers", {"batches": {keyed: put, globe: far}}),
+            400,
+            f"/batches/{globe.replace('/', '~1')}/insert/1",
+        ),
+        (gateway.post("/fences", {"name": name, "area": [ring], "subjects": keyed}), 400, "/area/0/exterior"),
+        (gateway.post("/fences", {"name": name, "area": {"center": [0, 0]}, "subjects": keyed}), 400, "/area/radius"),
+        (gateway.post("/hulls", {"name": "x", "center": [0, 0]}), 400, "/center"),
+    ]
+    for answer, status, pointer in cases:
+        said = answer.json
+        assert (answer.status, said["errors"][0]["pointer"]) == (status, pointer), said
+        assert not any(word in said["detail"] for word in ("batch.", "config.", "puts.", "inserts.", "True", "None")), (
+            said
+        )
+    assert '"keys": [KEY' in cases[0][0].json["detail"]
+
+
+def test_the_type_of_a_body_is_named(gateway: Gateway, square: str) -> None:
+    """curl -d sends a form unless it is told otherwise."""
+    form = "application/x-www-form-urlencoded"
+    for path in ("/hulls", f"/hulls/{square}/points", f"/hulls/{square}/locate", "/fences"):
+        refused = gateway.post(path, b"{}", form)
+        assert (refused.status, refused.json["value"]) == (415, form)
+        assert "curl sends with -H 'Content-Type: application/json'" in refused.json["detail"]
+    assert gateway.call("POST", "/hulls").json["detail"] == "body: is required"
+
+
+ENCODINGS = [
+    (b'\xef\xbb\xbf{"points": [[0, 0]]}', None),
+    ('{"points": [[0, 0]]}'.encode("utf-16"), "not JSON"),
+    (b'{"points": [[0, 0]], "\xe9": 0}', "not JSON"),
+    (b'{"points": [[NaN, 0]]}', "/points/0/0: must be a finite number"),
+    (b'{"points": [[1%s, 0]]}' % (b"0" * 400), "/points/0/0: must be a valid number"),
+    (b'{"points": [[1%s, 0]]}' % (b"0" * 9000), "not JSON"),
+    (b'{"points": %s' % (b"[" * 100_000), "not JSON"),
+]
+
+
+@pytest.mark.parametrize(("body", "problem"), ENCODINGS)
+def test_encodings_and_numbers(gateway: Gateway, square: str, body: bytes, problem: str | None) -> None:
+    answer = gateway.post(f"/hulls/{square}/count", body, "application/json")
+    assert answer.status == (200 if problem is None else 400)
+    assert problem is None or problem in answer.json["detail"]
 
 
 def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gateway: Gateway, square: str) -> None:
@@ -148,13 +220,23 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
         (gateway.post(f"{at}/points", b"x", "text/plain"), 415, "MEDIA_TYPE"),
         (gateway.post(f"{at}/locate", b" " * 2**20 + b"{}", "application/json"), 413, "BODY_TOO_LARGE"),
         (gateway.get("/hulls/bad%20name"), 400, "INVALID_FIELD"),
-        (gateway.get("/nowhere"), 404, ""),
+        (gateway.get("/nowhere"), 404, "PATH_NOT_FOUND"),
+        (gateway.get(f"{at}/row"), 404, "PATH_NOT_FOUND"),
+        (gateway.call("PUT", f"{at}/rows"), 405, "METHOD_NOT_ALLOWED"),
     ]
     for answer, status, reason in cases:
         assert (answer.status, answer.json["status"], answer.json["reason"]) == (status, status, reason), answer.json
     assert cases[2][0].json["row"] == 1
     refused = gateway.call("PATCH", at)
     assert (refused.status, refused.headers["Allow"]) == (405, "DELETE, GET")
+    assert f"{at} takes DELETE and GET, not PATCH" in refused.json["detail"]
+    assert f"{at}/rows" in next(
+        answer.json["detail"] for answer, _, _ in cases if answer.json.get("value") == f"{at}/row"
+    )
+    assert "must be a name: 1 to 200 letters" in gateway.get("/hulls/bad%20name").json["detail"]
+    assert (
+        "must be PRODUCER:SEQUENCE" in gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number").json["detail"]
+    )
 
 
 def test_a_numbered_batch_is_applied_once(gateway: Gateway, square: str) -> None:
@@ -221,6 +303,29 @@ def test_other_origins_only_if_allowed(gateway: Gateway, address: str) -> None:
         assert allowed.headers["Access-Control-Allow-Origin"] == "https://pages.example"
         asked["Origin"] = "https://others.example"
         assert "Access-Control-Allow-Origin" not in open_gateway.call("OPTIONS", "/hulls", **asked).headers
+
+
+def test_json_ends_with_a_newline(gateway: Gateway, square: str) -> None:
+    for path in (
+        "/",
+        "/livez",
+        "/hulls",
+        f"/hulls/{square}",
+        f"/hulls/{square}?f=geojson",
+        "/nowhere",
+        "/openapi.json",
+    ):
+        assert gateway.get(path).body.endswith(b"}\n"), path
+    for body in ([[1, 1]], [[1, "1"]], {"insert": [[1, 1]]}):
+        assert gateway.post(f"/hulls/{square}/points", body).body.endswith(b"}\n")
+
+
+def test_a_port_in_use_is_said_in_words(gateway: Gateway) -> None:
+    refused = dynhull("gateway", "--port", gateway.place.rpartition(":")[2])
+    assert refused.exit_code == 2
+    assert f"cannot listen on {gateway.place}: another program uses this port: stop it" in " ".join(
+        refused.stderr.split()
+    )
 
 
 @pytest.mark.parametrize("text", ["nonsense", "127.0.0.1:8000", "https://pages.example/", "https://pages.example:x"])

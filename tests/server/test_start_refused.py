@@ -68,7 +68,7 @@ def test_a_port_in_use_is_called_that() -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         for option in ("--port", "--metrics-port"):
-            refused = run(*SERVE, option, str(port))
+            refused = run(*SERVE, "--log-level", "info", option, str(port))
             assert refused.returncode == 2
             (line,) = refused.stderr.splitlines()
             assert f"cannot listen on 127.0.0.1:{port}" in line

@@ -1,16 +1,18 @@
 """The gateway as an application: what it answers to, and in which order."""
 
+import json
+from collections.abc import Callable, Coroutine
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
 from fastapi.middleware.cors import CORSMiddleware
 from pydantic import BaseModel
 
 import dynhull_client
 from dynhull_client import AsyncHullClient
 
-from . import fences, health, hulls, points, problems, questions, uploads
-from .bodies import LimitedBodies
+from . import fences, handlers, health, hulls, points, questions, uploads
+from .bodies import JSON, LimitedBodies
 from .events import routes as events
 from .events.feeds import Feeds
 from .figures import Figures, Measured
@@ -41,6 +43,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         title="dynhull gateway",
         version=dynhull_client.__version__,
         description=DESCRIPTION,
+        openapi_url=None,  # below, with a newline at its end
         docs_url=None,  # their pages load scripts from elsewhere
         redoc_url=None,
         responses=RESPONSES,
@@ -58,8 +61,8 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     for router in routers:
         app.include_router(router)
     app.state.routes = [route for router in routers for route in router.routes]
-    app.openapi = lambda: description(app)  # type: ignore[method-assign]
-    problems.install(app)
+    app.add_route("/openapi.json", _description_of(app), include_in_schema=False)
+    handlers.install(app)
     app.add_middleware(SmallChanges, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
     if settings.origins:
@@ -75,6 +78,15 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.add_middleware(Measured, figures=app.state.figures)
     app.add_middleware(PathsAsSent, root_path=settings.root_path)
     return app
+
+
+def _description_of(app: FastAPI) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+    async def openapi(request: Request) -> Response:
+        root = request.scope.get("root_path")
+        servers = {"servers": [{"url": root}]} if root else {}
+        return Response(f"{json.dumps(description(app) | servers)}\n", media_type=JSON)
+
+    return openapi
 
 
 def description(app: FastAPI) -> dict[str, Any]:

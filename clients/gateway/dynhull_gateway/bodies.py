@@ -1,19 +1,30 @@
-"""Limits on the bodies of requests: how large they may be, and how slowly they may arrive."""
+"""Bodies of requests: of which type they are, how large they may be, and how slowly they may arrive."""
 
 import asyncio
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Coroutine
 from email.message import Message
 from functools import lru_cache
 from http import HTTPStatus
+from typing import Any
 
+from fastapi.routing import APIRoute
+from pydantic_core import from_json
 from starlette.requests import Request
+from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.types import Message as Event
 
-from .problems import ProblemError, problem
+from .problems import FieldError, ProblemError, problem
 from .settings import Settings
+from .texts import BYTE_ORDER_MARK
 
-WHOLE = (b"", b"application/json", b"application/geo+json")
+JSON = "application/json"
+GEOJSON = "application/geo+json"
+ANSWERS = (JSON, GEOJSON)
+NEWLINE = b"\n"
+FORM = "application/x-www-form-urlencoded"
+WHOLE = (b"", JSON.encode(), GEOJSON.encode())
+SENT = "dynhull.body"
 
 
 def require_type(request: Request, types: Collection[str]) -> str:
@@ -26,6 +37,8 @@ def require_type(request: Request, types: Collection[str]) -> str:
         detail = f"the body is {charset}: it must be UTF-8"
     else:
         detail = f"the body is {given or 'of no type'}: Content-Type must be {' or '.join(types)}"
+        if kind == FORM:
+            detail += f", which curl sends with -H 'Content-Type: {next(iter(types))}'"
     raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, detail, "MEDIA_TYPE", field="Content-Type", value=given)
 
 
@@ -35,6 +48,61 @@ def _media_type(given: str) -> tuple[str, str]:
     message = Message()
     message["content-type"] = given
     return message.get_content_type() if given.strip() else "", message.get_content_charset("utf-8")
+
+
+def read_json(body: bytes) -> Any:
+    """A body as JSON; FieldError if it is none."""
+    try:
+        return from_json(body.removeprefix(BYTE_ORDER_MARK))
+    except ValueError as error:
+        raise FieldError((), f"not JSON: {error}") from None
+
+
+def keep(request: Request, body: Any) -> None:
+    """Keep the body of a request, as bytes or as JSON, for what errors say about it."""
+    request.scope[SENT] = body
+
+
+def body_of(request: Request) -> Any:
+    """The kept body of a request, as JSON; None if there is none, or it is no JSON."""
+    body = request.scope.get(SENT)
+    try:
+        return read_json(body) if isinstance(body, bytes) else body
+    except FieldError:
+        return None
+
+
+class JsonRoute(APIRoute):
+    """A route that takes its body, if it has one, as JSON and as nothing else; its JSON ends with a newline."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler of the framework, between what is common to all routes."""
+        handle = super().get_route_handler()
+
+        async def of_json(request: Request) -> Response:
+            if self.body_field is not None and _has_body(request):
+                require_type(request, (JSON,))
+            response = await handle(_JsonRequest(request.scope, request.receive))
+            if response.media_type in ANSWERS and not bytes(response.body).endswith(NEWLINE):
+                response.body = bytes(response.body) + NEWLINE
+                response.headers["content-length"] = str(len(response.body))
+            return response
+
+        return of_json
+
+
+def _has_body(request: Request) -> bool:
+    return request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers
+
+
+class _JsonRequest(Request):
+    """A request whose body is read as everywhere in the gateway."""
+
+    async def json(self) -> Any:
+        """The body."""
+        value = read_json(await self.body())
+        keep(self, value)
+        return value
 
 
 class LimitedBodies:

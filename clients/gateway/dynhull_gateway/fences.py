@@ -8,11 +8,12 @@ from fastapi import APIRouter, Query, status
 from dynhull_client import Circle, Fence, Polygon, Prefix
 
 from . import schemas
+from .bodies import JsonRoute
 from .callers import Caller
 from .pages import page
 from .schemas import After, ConsumerPath, FencePath, Limit
 
-router = APIRouter(tags=["fences"])
+router = APIRouter(tags=["fences"], route_class=JsonRoute)
 NamePrefix = Annotated[str, Query(max_length=200, description="Only names that begin with this.")]
 
 

@@ -8,8 +8,9 @@ from fastapi import APIRouter, Request, Response
 from dynhull_client import DynhullError, PermissionDeniedError, UnauthenticatedError
 
 from . import schemas
+from .bodies import JsonRoute
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], route_class=JsonRoute)
 SECONDS = 2.0
 
 

@@ -7,12 +7,12 @@ from fastapi import APIRouter, Query, Response, status
 from dynhull_client import Hull
 
 from . import schemas
+from .bodies import GEOJSON, JsonRoute
 from .callers import Caller
 from .pages import page
 from .schemas import After, HullPath, Limit, MinRevision, Prefix, ProducerPath
 
-router = APIRouter(tags=["hulls"])
-GEOJSON = "application/geo+json"
+router = APIRouter(tags=["hulls"], route_class=JsonRoute)
 Format = Annotated[Literal["json", "geojson"], Query(description="json, or a GeoJSON Feature.")]
 
 

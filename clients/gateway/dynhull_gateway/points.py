@@ -8,13 +8,13 @@ from pydantic import TypeAdapter
 from dynhull_client import Batch as ClientBatch
 
 from . import schemas
-from .bodies import require_type
+from .bodies import JSON, JsonRoute, keep, require_type
 from .callers import Caller, client_of, described, token_of
-from .changes import apply, encoded
+from .changes import apply, check, encoded
 from .schemas import Batch, HullPath, IdempotencyKey, MaySkip, Points, Transfer
+from .texts import BYTE_ORDER_MARK
 
-router = APIRouter(tags=["changes"])
-JSON = "application/json"
+router = APIRouter(tags=["changes"], route_class=JsonRoute)
 POINTS = TypeAdapter(Points)
 FIRST_OF_LIST = b"["
 
@@ -39,7 +39,9 @@ async def change_points(
     Small batches of many requests without an Idempotency-Key may be applied together.
     """
     require_type(request, (JSON,))
-    batch = read_batch(await request.body())
+    body = await request.body()
+    keep(request, body)
+    batch = read_batch(body)
     client = client_of(request)
     if idempotency_key is None:
         return Response(await request.app.state.gatherer.apply(client, token_of(request), name, batch), media_type=JSON)
@@ -54,6 +56,8 @@ async def transfer(
 ) -> schemas.Transferred:
     """Apply a batch to each of several hulls: all of them or none."""
     producer, sequence = numbered(idempotency_key)
+    for name, batch in batches.batches.items():
+        check(batch, "batches", name)
     made = {name: ClientBatch(**_arguments(batch)) for name, batch in batches.batches.items()}
     results = await client.transfer(made, producer=producer, sequence=sequence, may_skip=may_skip)
     return schemas.Transferred(results={name: schemas.Applied.model_validate(each) for name, each in results.items()})
@@ -67,10 +71,13 @@ def _arguments(batch: Batch) -> dict[str, Any]:
 
 
 def read_batch(body: bytes) -> Batch:
-    """The batch in a body of JSON; pydantic's ValidationError names the value at fault."""
+    """The batch in a body of JSON; pydantic's ValidationError or FieldError names the value at fault."""
+    body = body.removeprefix(BYTE_ORDER_MARK)
     if body.lstrip()[:1] == FIRST_OF_LIST:
         return Batch.model_construct({"insert"}, insert=POINTS.validate_json(body))
-    return Batch.model_validate_json(body)
+    batch = Batch.model_validate_json(body)
+    check(batch)
+    return batch
 
 
 def numbered(key: str | None) -> tuple[str, int]:

@@ -5,10 +5,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 
 from . import schemas
+from .bodies import JsonRoute
 from .callers import Caller
 from .schemas import HullPath, MinRevision, Name
 
-router = APIRouter(prefix="/hulls/{name}", tags=["questions"])
+router = APIRouter(prefix="/hulls/{name}", tags=["questions"], route_class=JsonRoute)
 Other = Annotated[Name, Query(description="The other hull.")]
 Layer = Annotated[
     int,

@@ -6,13 +6,16 @@ from datetime import datetime
 from typing import Annotated, Any, Literal, NamedTuple, NotRequired
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic_core import from_json
 from typing_extensions import TypedDict
 
-from .problems import shown
+from .invalid import detail, path_in
+from .problems import cut, pointer, shown
 from .schemas import Key, Number, Point, Time
 
 FORBID = ConfigDict(extra="forbid")
 KEY_AND_TIME = "key", "time"
+COLUMNS = "x", "y"
 
 
 class Row(NamedTuple):
@@ -129,7 +132,7 @@ class Csv:
                 found = {name: row[column] for name, column in columns.items()}
             except IndexError:
                 raise RowError(
-                    len(rows), f"has {len(row)} columns, fewer than the first line", None, shown(row)
+                    len(rows), f"has {len(row)} columns, fewer than the first line", None, cut(",".join(row))
                 ) from None
             rows.append(_typed(found, len(rows)))
         return rows
@@ -141,7 +144,10 @@ class Csv:
             columns |= {"x": header.index(pair[0]), "y": header.index(pair[1])}
         elif not (self._delete and "key" in columns):
             raise RowError(
-                0, "the first line must name the columns: x,y or lon,lat, and key, time", "header", shown(header)
+                0,
+                "the first line must name the columns: x,y or lon,lat, and key, time",
+                "header",
+                cut(",".join(header)),
             )
         return columns
 
@@ -196,8 +202,7 @@ def geojson(texts: Sequence[bytes]) -> list[Row]:
         try:
             rows += _of_geojson(GEOJSON.validate_json(text))
         except ValidationError as error:
-            found = next((part for part in error.errors()[0]["loc"] if isinstance(part, int)), 0)
-            raise _row_error(len(rows) + found, error) from None
+            raise _geojson_error(len(rows), text, error) from None
     return rows
 
 
@@ -239,9 +244,9 @@ def _cells(lines: Sequence[bytes]) -> Iterator[list[str]]:
             yield from csv.reader([line.decode()], strict=True)
             number += 1
     except UnicodeDecodeError as error:
-        raise RowError(number, f"not UTF-8: {error.reason}", None, shown(error.object)) from None
+        raise RowError(number, f"not UTF-8: {error.reason}", None, _text(error.object)) from None
     except csv.Error as error:
-        raise RowError(number, f"not CSV: {error}", None, shown(lines[number])) from None
+        raise RowError(number, f"not CSV: {error}", None, _text(lines[number])) from None
 
 
 def _typed(found: dict[str, str], row: int) -> Row:
@@ -252,7 +257,7 @@ def _typed(found: dict[str, str], row: int) -> Row:
     try:
         when = None if time is None else TIME.validate_python(time)
     except ValidationError as error:
-        raise RowError(row, error.errors()[0]["msg"], "time", shown(time)) from None
+        raise RowError(row, detail(error.errors()[0]), "time", cut(time or "")) from None
     return Row(found.get("key"), point, when)
 
 
@@ -260,7 +265,7 @@ def _coordinate(text: str, field: str, row: int) -> float:
     try:
         return COORDINATE.validate_python(text)
     except ValidationError as error:
-        raise RowError(row, error.errors()[0]["msg"], field, shown(text)) from None
+        raise RowError(row, detail(error.errors()[0]), field, cut(text)) from None
 
 
 COORDINATE: TypeAdapter[float] = TypeAdapter(Annotated[float, Field(allow_inf_nan=False)])
@@ -268,9 +273,44 @@ TIME: TypeAdapter[datetime] = TypeAdapter(Time)
 
 
 def _row_error(row: int, error: ValidationError) -> RowError:
+    """The first error of a line of JSON, with the name of the column."""
     first = error.errors()[0]
-    field = "/".join(str(part) for part in first["loc"] if not isinstance(part, str) or part.isidentifier()) or None
     if first["type"] == "json_invalid":
-        return RowError(row, f"not JSON: {first.get('ctx', {}).get('error', '')}", None, shown(first["input"]))
-    value: Any = None if first["type"] == "missing" else shown(first["input"])
-    return RowError(row, first["msg"].removeprefix("Value error, "), field, value)
+        return RowError(row, detail(first), None, _text(first["input"]))
+    place = next(iter(first["loc"]), None)
+    field = COLUMNS[place] if isinstance(place, int) and place < len(COLUMNS) else place
+    value = None if first["type"] == "missing" else shown(first["input"])
+    return RowError(row, detail(first), None if field is None else str(field), value)
+
+
+def _geojson_error(row: int, text: bytes, error: ValidationError) -> RowError:
+    """The first error of a text of GeoJSON, with a JSON pointer to it; `row`: the number of the text's first row."""
+    first = error.errors()[0]
+    if first["type"] == "json_invalid":
+        return RowError(row, detail(first), None, _text(text))
+    body = from_json(text)
+    path = path_in(body, first["loc"], absent=first["type"] == "missing")
+    value = None if first["type"] == "missing" else shown(first["input"])
+    return RowError(row + _rows_before(body, path), detail(first), pointer(path) or None, value)
+
+
+def _rows_before(body: Any, path: Sequence[str | int]) -> int:
+    """The rows of GeoJSON before the place that a path leads to: a multipoint has several."""
+    match path:
+        case ["features", int(number), *rest]:
+            return sum(map(_size, body["features"][:number])) + _rows_before(body["features"][number], rest)
+        case ["geometry", *rest]:
+            return _rows_before(body["geometry"], rest)
+        case ["coordinates", int(number), *_] if body.get("type") == "MultiPoint":
+            return number
+    return 0
+
+
+def _size(feature: Any) -> int:
+    """The rows of a feature that can be read."""
+    geometry = feature["geometry"]
+    return len(geometry["coordinates"]) if geometry["type"] == "MultiPoint" else 1
+
+
+def _text(line: Any) -> str:
+    return cut(line.decode(errors="replace") if isinstance(line, bytes) else str(line))

@@ -14,10 +14,14 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     StrictBool,
     StrictStr,
     StringConstraints,
+    Tag,
+    ValidationInfo,
+    field_validator,
     model_validator,
 )
 
@@ -98,6 +102,11 @@ Prefix = Annotated[str, Query(max_length=200, description="Only names that begin
 After = Annotated[str, Query(max_length=200, description="Only names after this one: the last of the page before.")]
 Limit = Annotated[int, Query(ge=1, le=1000, description="The most that are returned.")]
 IDEMPOTENCY_KEY = r'^"?[A-Za-z0-9._/-]{1,200}:[1-9][0-9]{0,18}"?$'
+# What patterns say, for those who do not match them.
+PATTERNS = {
+    NAME: f"must be a name: {NAMES}",
+    IDEMPOTENCY_KEY: f"must be PRODUCER:SEQUENCE, such as sensor-7:1: {NAMES.partition(';')[0]}, and an integer from 1",
+}
 IdempotencyKey = Annotated[
     str | None,
     Header(
@@ -153,6 +162,13 @@ class NewHull(Request):
     geographic: StrictBool = Field(False, description="Whether points are longitudes and latitudes in degrees.")
     center: Point | None = Field(None, description="Longitude and latitude of the centre of a geographic hull.")
     exist_ok: StrictBool = Field(False, description="Return an existing hull with these settings.")
+
+    @field_validator("center")
+    @classmethod
+    def _of_the_globe(cls, center: list[float] | None, info: ValidationInfo) -> list[float] | None:
+        if center is not None and not info.data.get("geographic", True):
+            raise ValueError('is a setting of hulls on the globe: give "geographic": true, too')
+        return center
 
 
 class Window(Response):
@@ -562,10 +578,27 @@ class PolygonArea(Request):
     holes: list[Points] = []
 
 
+def _form_of_area(area: Any) -> str:
+    """The form of an area, by the fields that it has."""
+    if isinstance(area, list):
+        return "polygons"
+    fields = area if isinstance(area, dict) else type(area).model_fields if isinstance(area, BaseModel) else ()
+    return "hull" if "hull" in fields else "circle" if {"center", "radius"} & set(fields) else "polygon"
+
+
+Area = Annotated[
+    Annotated[HullArea, Tag("hull")]
+    | Annotated[CircleArea, Tag("circle")]
+    | Annotated[PolygonArea, Tag("polygon")]
+    | Annotated[list[PolygonArea], Tag("polygons")],
+    Discriminator(_form_of_area),
+]
+
+
 class FenceSettings(Request):
     """What a fence compares, and when it makes events."""
 
-    area: HullArea | CircleArea | PolygonArea | list[PolygonArea]
+    area: Area
     subjects: Name | None = Field(None, description="The keyed hull whose keys are compared,")
     subject_prefix: Annotated[str, Field(strict=True, max_length=200)] | None = Field(
         None, description="or a prefix of the names of several,"
@@ -631,7 +664,7 @@ class Fence(Response):
 
     name: str
     uid: str
-    area: HullArea | CircleArea | PolygonArea | list[PolygonArea]
+    area: Area
     subjects: str | None
     subject_prefix: str | None
     other_hull: str | None

@@ -1,6 +1,8 @@
 """The gateway as a process: listen, serve, and end in order."""
 
 import asyncio
+import errno
+import os
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -51,7 +53,8 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
             h11_max_incomplete_event_size=LONGEST_HEAD,
         )
         if settings.metrics is not None:
-            app.state.figures.serve(*settings.metrics)
+            with explained(*settings.metrics):
+                app.state.figures.serve(*settings.metrics)
         server = Server(config)
 
         def stop() -> None:
@@ -68,8 +71,24 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
 
 
 def listener(host: str, port: int) -> socket.socket:
-    """A listening socket; OSError if the port is in use."""
+    """A listening socket; OSError in words if the port is in use."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.create_server((host, port), family=family, backlog=BACKLOG)
+    with explained(host, port):
+        listening = socket.create_server((host, port), family=family, backlog=BACKLOG)
     listening.setblocking(False)
     return listening
+
+
+@contextmanager
+def explained(host: str, port: int) -> Iterator[None]:
+    """Raise an OSError about listening with the reason in words."""
+    try:
+        yield
+    except OSError as error:
+        number = error.errno or 0
+        if number == errno.EADDRINUSE:
+            why = "another program uses this port: stop it, or choose another port"
+        else:
+            why = os.strerror(number) if number in errno.errorcode else error.strerror or str(error)
+        place = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        raise OSError(f"cannot serve: cannot listen on {place}: {why}") from None

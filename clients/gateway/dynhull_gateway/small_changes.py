@@ -5,7 +5,6 @@ take goes on to that route, which describes it: everything that is larger, numbe
 """
 
 import re
-from http import HTTPStatus
 
 from pydantic import ValidationError
 from starlette.responses import Response
@@ -13,9 +12,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dynhull_client import DynhullError
 
+from .bodies import JSON, read_json
 from .figures import SHORT
-from .points import JSON, read_batch
-from .problems import ProblemError, of_refusal, problem
+from .points import read_batch
+from .problems import FieldError, ProblemError, problem
+from .refusals import of_refusal, of_value_error
 from .schemas import Batch
 
 PATH = re.compile(r"/hulls/([A-Za-z0-9._-]{1,200})/points")
@@ -47,11 +48,11 @@ class SmallChanges:
                 return
             response = Response(await state.gatherer.apply(state.client, None, name, batch), media_type=JSON)
         except DynhullError as error:
-            response = of_refusal(error)
+            response = of_refusal(error, read_json(message["body"]))
         except ProblemError as error:
             response = problem(error.status_code, error.detail, reason=error.reason, **error.more)
         except (ValueError, TypeError) as error:
-            response = problem(HTTPStatus.BAD_REQUEST, str(error), reason="INVALID_FIELD")
+            response = of_value_error(error, read_json(message["body"]))
         await response(scope, receive, send)
 
     def _hull(self, scope: Scope) -> str | None:
@@ -76,7 +77,7 @@ def _batch(message: Message) -> Batch | None:
         return None
     try:
         return read_batch(message["body"])
-    except ValidationError:
+    except (ValidationError, FieldError):
         return None
 
 

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ import numpy as np
 from dynhull_client import Applied, AsyncHullClient, DynhullError
 
 from .problems import ProblemError
-from .rows import Row, RowError
+from .rows import KEY_AND_TIME, Row, RowError
 from .schemas import Uploaded
 
 BATCH_ROWS = 8192
 
+KINDS = {type(None): "absent", str: "a string", int: "an integer", datetime: "there"}
 SUMS = ("inserted", "deleted", "missing", "moved", "stale", "late", "skipped", "clamped", "evicted")
 
 
@@ -54,7 +56,7 @@ class Upload:
         self._keep_last = keep_last
         self._waiting: list[Row] = []
         self._read = 0
-        self._shape: tuple[bool, bool] | None = None
+        self._shape: tuple[type, type] | None = None
         self._sending: asyncio.Task[Applied] | None = None
         self._sent_rows = 0
         self._last: Applied | None = None
@@ -115,19 +117,20 @@ class Upload:
     async def close(self) -> None:
         """Wait for the batch that is on its way, whatever becomes of it."""
         if self._sending is not None:
-            with suppress(DynhullError):
+            with suppress(DynhullError, ValueError):
                 await self.settle()
 
     def _check(self, rows: Sequence[Row]) -> None:
         """Raise RowError if the rows are not all alike."""
         for number, row in enumerate(rows):
-            shape = row.key is not None, row.time is not None
+            shape = type(row.key), type(row.time)
             if self._shape is None:
                 self._shape = shape
             if shape != self._shape:
-                what = "key" if shape[0] != self._shape[0] else "time"
-                has, first = ("has a", "has none") if shape[what == "time"] else ("has no", "has one")
-                raise RowError(number, f"{has} {what}, and the first row {first}: all rows are alike", what)
+                column = 0 if shape[0] is not self._shape[0] else 1
+                here, first = KINDS[shape[column]], KINDS[self._shape[column]]
+                detail = f"is {here}, and {first} in the first row: all rows are alike"
+                raise RowError(number, detail, KEY_AND_TIME[column])
 
     def _cut(self) -> list[Row]:
         """The next batch: up to its length, or to a key that comes again."""
@@ -150,8 +153,17 @@ class Upload:
 
     async def _apply(self, rows: list[Row], numbered: dict[str, Any]) -> Applied:
         keyed = rows[0].key is not None
-        if keyed and self._keep_last:
-            rows = list({row.key: row for row in rows}.values())
+        if not (keyed and self._keep_last):
+            return await self._send_rows(rows, numbered)
+        last = list({row.key: number for number, row in enumerate(rows)}.values())
+        try:
+            return await self._send_rows([rows[number] for number in last], numbered)
+        except DynhullError as error:
+            error.row = None if error.row is None else last[error.row]
+            raise
+
+    async def _send_rows(self, rows: list[Row], numbered: dict[str, Any]) -> Applied:
+        keyed = rows[0].key is not None
         keys = [row.key for row in rows] if keyed else None
         if self._delete and keyed:
             return await self._client.remove(self._name, keys, **numbered)

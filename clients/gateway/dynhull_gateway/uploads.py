@@ -10,16 +10,17 @@ from starlette.requests import ClientDisconnect
 from dynhull_client import DynhullError
 
 from . import rows, schemas
-from .bodies import require_type
+from .bodies import JsonRoute, require_type
 from .callers import Caller
 from .points import numbered
-from .problems import ProblemError, of_refusal, problem
+from .problems import ProblemError, problem
+from .refusals import of_refused_rows
 from .rows import Reader, RowError
 from .schemas import HullPath, IdempotencyKey, MaySkip
 from .texts import LINE, RECORD, texts
 from .upload import Upload, numbering
 
-router = APIRouter(tags=["changes"])
+router = APIRouter(tags=["changes"], route_class=JsonRoute)
 
 TYPES: dict[str, bytes | None] = {
     "application/x-ndjson": LINE,
@@ -109,9 +110,9 @@ async def _uploaded(request: Request, upload: Upload, read: Reader, mark: bytes 
     except ProblemError as error:
         await upload.close()
         return problem(error.status_code, error.detail, reason=error.reason, applied=upload.settled, **error.more)
-    except DynhullError as error:
-        row = None if error.row is None else upload.settled + error.row
-        return of_refusal(error, row=row, applied=upload.settled)
+    except (DynhullError, ValueError) as error:  # a ValueError is the SDK's, about a row
+        await upload.close()
+        return of_refused_rows(error, upload.settled)
     finally:
         await upload.close()
 

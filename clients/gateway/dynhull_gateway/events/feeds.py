@@ -19,7 +19,7 @@ import grpc
 from dynhull_client import AsyncHullClient, Deleted, DynhullError, Event, HullCopy, Measures, Progress, Sketch, Snapshot
 
 from ..figures import Figures
-from ..problems import of_refusal
+from ..refusals import of_refusal
 from .messages import COMMENT, message
 
 log = logging.getLogger(__name__)

@@ -47,10 +47,14 @@ class Box:
     @classmethod
     def read(cls, text: str) -> Self:
         """Of four numbers, or of six, two of which are heights."""
+        if not re.fullmatch(BBOX, text):
+            raise ValueError("must be four numbers of degrees with commas between: WEST,SOUTH,EAST,NORTH")
         numbers = [float(each) for each in text.split(",")]
         west, south, east, north = numbers if len(numbers) == 4 else (*numbers[:2], *numbers[3:5])
         if south > north:
-            raise ValueError(f"the southern edge {south:g} is north of the northern edge {north:g}")
+            raise ValueError(
+                f"must be WEST,SOUTH,EAST,NORTH: the southern edge {south:g} is north of the northern edge {north:g}"
+            )
         return cls(west, south, east, north)
 
     def holds(self, lonlat: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
@@ -84,7 +88,7 @@ class Interval:
         """Of an instant, or of two with a slash between, one of which may be open: .. or nothing."""
         ends = text.split("/")
         if len(ends) > 2 or all(each in OPEN for each in ends):
-            raise ValueError("must be an instant, or an interval with a begin or an end")
+            raise ValueError("must be a time, or an interval BEGIN/END, of which one may be open: ..")
         begin, end = (_instant(each) for each in (ends if len(ends) == 2 else ends * 2))
         if begin is not None and end is not None and begin > end:
             raise ValueError("begins after its end")
@@ -113,8 +117,10 @@ class Page(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    bbox: Annotated[str, Field(pattern=BBOX), _readable(Box)] | None = Field(
-        default=None, description="West, south, east, north in degrees; with heights, six numbers."
+    bbox: Annotated[str, Field(json_schema_extra={"pattern": BBOX}), _readable(Box)] | None = Field(
+        default=None,
+        description="West, south, east, north in degrees; with heights, six numbers.",
+        examples=["8,53,11,54"],
     )
     datetime: Annotated[str, Field(max_length=100), _readable(Interval)] | None = Field(
         default=None, description="An instant, or an interval such as 2026-01-01T00:00:00Z/.."

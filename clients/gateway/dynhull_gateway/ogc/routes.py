@@ -17,8 +17,8 @@ from starlette.responses import Response
 
 from dynhull_client import AsyncHullClient, HullInfo, HullNotFoundError
 
+from ..bodies import GEOJSON, JsonRoute
 from ..callers import Caller, token_of
-from ..hulls import GEOJSON
 from ..hulls import feature as hull_feature
 from ..problems import ProblemError
 from ..schemas import Feature, unquoted
@@ -39,7 +39,7 @@ from .documents import (
 from .entities import Snapshots, feature
 from .filters import Found, Page
 
-router = APIRouter(tags=["maps"])
+router = APIRouter(tags=["maps"], route_class=JsonRoute)
 
 HULLS = "hulls"
 ENTITIES = "entities:"

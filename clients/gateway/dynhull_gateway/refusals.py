@@ -1,0 +1,213 @@
+"""Refusals of the server, in the names of the request that the caller has sent."""
+
+import re
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any
+
+import grpc
+from starlette.responses import Response
+
+from dynhull_client import DeadlineError, DynhullError
+
+from .problems import Cause, named, pointer, problem, said, shown
+
+STATUS_OF_CODE: Mapping[grpc.StatusCode, int] = {
+    grpc.StatusCode.CANCELLED: 503,
+    grpc.StatusCode.UNKNOWN: 502,
+    grpc.StatusCode.INVALID_ARGUMENT: 400,
+    grpc.StatusCode.DEADLINE_EXCEEDED: 504,
+    grpc.StatusCode.NOT_FOUND: 404,
+    grpc.StatusCode.ALREADY_EXISTS: 409,
+    grpc.StatusCode.PERMISSION_DENIED: 403,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: 429,
+    grpc.StatusCode.FAILED_PRECONDITION: 409,
+    grpc.StatusCode.ABORTED: 409,
+    grpc.StatusCode.OUT_OF_RANGE: 410,
+    grpc.StatusCode.UNIMPLEMENTED: 501,
+    grpc.StatusCode.INTERNAL: 502,
+    grpc.StatusCode.UNAVAILABLE: 503,
+    grpc.StatusCode.DATA_LOSS: 502,
+    grpc.StatusCode.UNAUTHENTICATED: 401,
+}
+# Where HTTP distinguishes what gRPC does not.
+STATUS_OF_REASON: Mapping[str, int] = {"DISK_FULL": 507, "SEQUENCE_AHEAD": 409}
+
+IN_BATCH = {
+    "inserts": ("insert",),
+    "insert_times": ("times",),
+    "deletes": ("delete",),
+    "moves.origins": ("move", "origins"),
+    "moves.destinations": ("move", "destinations"),
+    "puts.keys": ("keys",),
+    "puts.points": ("points",),
+    "puts.times": ("times",),
+    "puts.expire_times": ("expire_times",),
+    "puts.ttl": ("ttl",),
+    "puts.condition": ("only",),
+    "removes": ("remove",),
+    "missing_points": ("missing",),
+    "missing_keys": ("missing",),
+}
+IN_SETTINGS = {
+    "identity": ("keyed",),
+    "max_points": ("point_limit",),
+    "frame": ("geographic",),
+    "window": (),
+    "subject_hull": ("subjects",),
+    "near_distance": ("near",),
+    "hull_area.layer": ("layer",),
+    "hull_area.hull": ("area", "hull"),
+    "circle_area.radius": ("area", "radius"),
+}
+PARAMETERS = {
+    "include_keys": "keys",
+    "layer_count": "count",
+    "sample_size": "size",
+    "sequence": "Idempotency-Key",
+    "producer": "Idempotency-Key",
+}
+BATCH = re.compile(r"(?:batches\[(\d+)\]\.)?batch(?:\.(.*))?")
+POLYGON = re.compile(r"polygon_area\.polygons\[(\d+)\](?:\.(exterior|holes)(?:\[(\d+)\])?)?")
+SDK = re.compile(r"(\w+)(?: row (\d+))? is .*?: (.*)", re.DOTALL)
+KEYED = re.compile(r"(?:batches\[\d+\]\.)?batch\.(inserts|deletes|puts\.keys|removes)")
+COLUMNS = {"puts.keys": "key", "removes": "key", "puts.times": "time", "insert_times": "time"}
+HINT_OF_ROWS = (
+    'a row with a key is {"key": KEY, "x": X, "y": Y}, and one without [X, Y]; ?keys=none, str or int leaves keys out '
+    "or converts them"
+)
+HINT_OF_BATCH = (
+    'a batch with keys is {"keys": [KEY, ...], "points": [[X, Y], ...]}, and one without is {"insert": [[X, Y], ...]}'
+)
+
+
+def of_refusal(error: DynhullError, body: Any = None, *, waited: bool = False, **more: Any) -> Response:
+    """The response for an error of the server.
+
+    Args:
+        error: the error.
+        body: the body of the request; None for a request without.
+        waited: whether the request asked for a revision to wait for.
+        more: further fields of the problem, in place of those of the error.
+    """
+    if waited and isinstance(error, DeadlineError):
+        detail = "the hull has not reached min_revision within the time limit of the gateway"
+        return problem(HTTPStatus.CONFLICT, detail, reason="REVISION_NOT_REACHED", field="min_revision", **more)
+    fields: dict[str, Any] = {"row": error.row, "value": error.value, "expected": error.expected}
+    detail = str(error)
+    cause = _cause(error, body)
+    if cause is not None:
+        detail = said(cause)
+        fields |= {name: each for name, each in named(cause).items() if each is not None}
+    elif error.field is not None:
+        fields["field"] = PARAMETERS.get(error.field, error.field)
+    return problem(status_of(error), detail, reason=error.reason or error.code.name, **(fields | more))
+
+
+def of_value_error(error: ValueError | TypeError, body: Any = None) -> Response:
+    """The response for an argument that the SDK does not take; nothing was sent."""
+    found = SDK.fullmatch(str(error))
+    if found is None or not isinstance(body, dict) or found[1] not in body:
+        return problem(HTTPStatus.BAD_REQUEST, str(error), reason="INVALID_FIELD")
+    path = [found[1], *([] if found[2] is None else [int(found[2])])]
+    value = shown(_at(body, path))
+    cause = Cause(detail=found[3], pointer=pointer(path), value=value)
+    return problem(HTTPStatus.BAD_REQUEST, said(cause), reason="INVALID_FIELD", **named(cause))
+
+
+def of_refused_rows(error: DynhullError | ValueError, applied: int) -> Response:
+    """The response for rows of a body that the server or the SDK does not take. `applied`: the rows before them."""
+    if not isinstance(error, DynhullError):
+        found = SDK.fullmatch(str(error))
+        row = applied + int((found and found[2]) or 0)
+        detail = f"row {row}: {error}"
+        return problem(HTTPStatus.BAD_REQUEST, detail, reason="INVALID_FIELD", row=row, applied=applied)
+    batch = None if error.field is None else BATCH.fullmatch(error.field)
+    if batch is None:
+        return of_refusal(error, applied=applied)
+    row = applied + (error.row or 0)
+    column = COLUMNS.get(batch[2])
+    value = None if error.row is None or error.value is None else _as_json(error.value)
+    place = f"row {row}, {column}" if column else f"row {row}"
+    detail = f"{place}: {problem_of(error)}"
+    if error.reason == "KEY_REPEATED":
+        first = applied + int(error.metadata["first_row"])
+        detail = f"{place}: a batch names a key once, and row {first} has the same"
+    if error.reason == "HULL_UNSUITABLE":
+        detail = f"{detail}; {HINT_OF_ROWS}"
+    fields = {"field": column, "row": row, "value": value, "applied": applied}
+    return problem(status_of(error), detail, reason=error.reason or error.code.name, **fields)
+
+
+def status_of(error: DynhullError) -> int:
+    """The HTTP status for an error of the server."""
+    return STATUS_OF_REASON.get(error.reason) or STATUS_OF_CODE.get(error.code, HTTPStatus.BAD_GATEWAY)
+
+
+def problem_of(error: DynhullError) -> str:
+    """What the server finds wrong, without the field, the row and the value before it."""
+    text = str(error)
+    if error.field is None:
+        return text
+    place = error.field if error.row is None else f"{error.field}[{error.row}]"
+    for value in (error.value, repr(error.value)):
+        text = text.removeprefix(f"{place} is {value}: ")
+    return text
+
+
+def _cause(error: DynhullError, body: Any) -> Cause | None:
+    """What is wrong with the body; None if it is nothing in the body."""
+    path = None if error.field is None else _path(error.field, body)
+    if path is None:
+        return None
+    detail = problem_of(error)
+    if error.reason == "KEY_REPEATED":
+        first = _path(error.metadata["first_field"], body) or []
+        detail = f"a batch names a key once, and {pointer([*first, error.metadata['first_row']])} is the same"
+    row = error.row
+    if error.reason == "HULL_UNSUITABLE" and KEYED.fullmatch(error.field or ""):
+        detail, row = f"{detail}; {HINT_OF_BATCH}", 0  # the first of rows that are all alike
+    if row is not None:
+        path.append(row)
+    value = _at(body, path)
+    return Cause(detail=detail, pointer=pointer(path), value=None if value is None else shown(value))
+
+
+def _path(field: str, body: Any) -> list[str | int] | None:
+    """The way through the body to a field that the server names; None if the body does not have it."""
+    if batch := BATCH.fullmatch(field):
+        within: list[str | int] = []
+        if batch[1] is not None:
+            within = ["batches", list(body["batches"])[int(batch[1])]]
+        if isinstance(body, list):
+            return []
+        return [*within, *IN_BATCH.get(batch[2] or "", ())]
+    if field.startswith("config."):
+        return _in_settings(field.removeprefix("config.").removeprefix("window."), body)
+    return [field] if isinstance(body, dict) and field in body else None
+
+
+def _in_settings(field: str, body: Any) -> list[str | int]:
+    if polygon := POLYGON.fullmatch(field):
+        area = isinstance(body, dict) and body.get("area")
+        index = [int(polygon[1])] if isinstance(area, list) else []
+        hole = [] if polygon[3] is None else [int(polygon[3])]
+        return ["area", *index, *([] if polygon[2] is None else [polygon[2]]), *hole]
+    if field.startswith("circle_area.center"):
+        return ["area", "center"]
+    return list(IN_SETTINGS.get(field, field.split(".")))
+
+
+def _at(body: Any, path: list[str | int]) -> Any:
+    """What the body has there; None for nothing."""
+    for part in path:
+        try:
+            body = body[part]
+        except (LookupError, TypeError):
+            return None
+    return body
+
+
+def _as_json(value: str) -> str:
+    """A value as the server shows it; a point as JSON has it."""
+    return f"[{value[1:-1]}]" if value.startswith("(") and value.endswith(")") else value
