@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 import pytest
-from gateway_process import Gateway
+from gateway_process import Gateway, gateway_process
 from peers import program
 
 from dynhull_client import HullClient
@@ -79,12 +79,46 @@ def test_boxes_and_times(gateway: Gateway, fleet: str) -> None:
     assert fleet not in [each["id"] for each in items(gateway, "hulls", "?bbox=-40,40,-20,60&limit=1000")["features"]]
 
 
+def test_a_page_of_a_revision_that_is_gone_is_refused(gateway: Gateway, address: str, name: str) -> None:
+    """Pages of several revisions could have a key at two places, or one that left and another that came."""
+    collection = f"entities:{name}"
+    gateway.post("/hulls", {"name": name, "keyed": "str", "geographic": True})
+    gateway.post(f"/hulls/{name}/points", {"keys": ["a", "b", "c"], "points": [[0, 0], [1, 0], [1, 1]]})
+    page = items(gateway, collection, "?limit=1&bbox=-1,-1,2,2")
+    assert link(page, "self").endswith("/items?bbox=-1%2C-1%2C2%2C2&limit=1")
+    following = urlsplit(link(page, "next"))
+    again = f"{following.path}?{following.query}"
+    gateway.post(f"/hulls/{name}/points", {"remove": ["b"]})
+    assert [each["id"] for each in gateway.get(again).json["features"]] == ["b"]
+    with gateway_process(address) as other:  # which has not read that revision
+        gone = other.get(again)
+        assert (gone.status, gone.json["field"]) == (410, "revision")
+        first = urlsplit(link(items(other, collection, "?limit=1"), "next"))
+        assert gateway.get(f"{first.path}?{first.query}").json["features"][0]["id"] == "c"  # of the present revision
+    gateway.call("DELETE", f"/hulls/{name}")
+    gateway.post("/hulls", {"name": name, "keyed": "str", "geographic": True})
+    for _ in range(2):
+        gateway.post(f"/hulls/{name}/points", {"keys": ["x", "y"], "points": [[0, 0], [1, 0]]})
+    assert gateway.get(f"{first.path}?{first.query}").status == 410  # the same number, of another hull
+
+
 @pytest.mark.parametrize(
-    "query", ["bbox=1,2,3", "bbox=1,9,2,3", "bbox=a,b,c,d", "datetime=now", "datetime=../..", "limit=0", "unknown=1"]
+    "query",
+    [
+        "bbox=1,2,3",
+        "bbox=1,9,2,3",
+        "bbox=a,b,c,d",
+        "datetime=now",
+        "datetime=../..",
+        "limit=0",
+        "unknown=1",
+        "revision=aa:1",
+    ],
 )
 def test_bad_parameters(gateway: Gateway, fleet: str, query: str) -> None:
     refused = gateway.get(f"/collections/hulls/items?{query}")
     assert (refused.status, refused.json["field"]) == (400, query.partition("=")[0]), fleet
+    assert "^" not in refused.json["detail"]  # words, no regular expression
 
 
 def test_hulls_of_a_plane_are_no_collections(gateway: Gateway, name: str) -> None:
@@ -93,6 +127,29 @@ def test_hulls_of_a_plane_are_no_collections(gateway: Gateway, name: str) -> Non
     assert (refused["status"], refused["reason"]) == (404, "NOT_GEOGRAPHIC")
     assert f"/hulls/{name}" in refused["detail"]
     assert name not in [each["id"] for each in items(gateway, "hulls")["features"]]
+
+
+def test_hulls_without_keys_have_no_entities(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "geographic": True})
+    collection = f"/collections/{quote(f'entities:{name}', safe='')}"
+    for path in ("", "/items", "/items/a", "/schema"):
+        refused = gateway.get(collection + path).json
+        assert (refused["status"], refused["reason"]) == (404, "NOT_KEYED")
+    assert f"entities:{name}" not in [each["id"] for each in gateway.get("/collections").json["collections"]]
+
+
+def test_gdal_knows_times_that_the_first_features_lack(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str", "geographic": True})
+    gateway.post(f"/hulls/{name}/points", {"keys": ["a"], "points": [[1, 1]]})
+    gateway.post(f"/hulls/{name}/points", {"keys": ["b"], "points": [[1, 2]], "times": DAYS[:1]})
+    read = [program("ogrinfo"), "-al", f"OAPIF:{gateway.url}", f"entities:{name}"]
+    shown = subprocess.run(read, capture_output=True, text=True, check=True, timeout=60).stdout
+    assert "time (DateTime) = 2026/01/01 00:00:00+00" in shown
+    described = gateway.get(f"/collections/{quote(f'entities:{name}', safe='')}").json
+    schema = gateway.get(urlsplit(link(described, "describedby")).path)
+    assert schema.headers["Content-Type"] == "application/schema+json"
+    assert schema.json["properties"]["properties"]["properties"]["time"]["format"] == "date-time"
+    assert "time" not in items(gateway, f"entities:{name}")["features"][0]["properties"]
 
 
 def test_gdal_reads_a_live_hull(gateway: Gateway, address: str, fleet: str, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from .texts import BYTE_ORDER_MARK
 
 JSON = "application/json"
 GEOJSON = "application/geo+json"
-ANSWERS = (JSON, GEOJSON)
+ANSWERS = (JSON, GEOJSON, "application/schema+json")
 NEWLINE = b"\n"
 FORM = "application/x-www-form-urlencoded"
 WHOLE = (b"", JSON.encode(), GEOJSON.encode())

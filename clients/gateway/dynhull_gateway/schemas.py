@@ -102,8 +102,10 @@ Prefix = Annotated[str, Query(max_length=200, description="Only names that begin
 After = Annotated[str, Query(max_length=200, description="Only names after this one: the last of the page before.")]
 Limit = Annotated[int, Query(ge=1, le=1000, description="The most that are returned.")]
 IDEMPOTENCY_KEY = r'^"?[A-Za-z0-9._/-]{1,200}:[1-9][0-9]{0,18}"?$'
+PLACE = r"^[0-9a-f]{1,32}:[0-9]{1,20}$"
 # What patterns say, for those who do not match them.
 PATTERNS = {
+    PLACE: 'must be as the link "next" has it, UID:REVISION',
     NAME: f"must be a name: {NAMES}",
     IDEMPOTENCY_KEY: f"must be PRODUCER:SEQUENCE, such as sensor-7:1: {NAMES.partition(';')[0]}, and an integer from 1",
 }

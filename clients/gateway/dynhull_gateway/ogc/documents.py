@@ -1,6 +1,6 @@
 """What the documents of the standard look like."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.alias_generators import to_camel
@@ -14,6 +14,7 @@ CONFORMANCE = [
 ]
 JSON = "application/json"
 OPENAPI = "application/vnd.oai.openapi+json;version=3.1"
+SCHEMA = "application/schema+json"
 
 
 class Document(BaseModel):
@@ -92,3 +93,26 @@ class FeatureCollection(Document):
     time_stamp: str
     number_returned: int
     number_matched: int | None = None
+
+
+def schema_of_entities(url: str, name: str, keyed: str) -> dict[str, Any]:
+    """The JSON schema of the keys of a hull as features: tells maps the types of properties that some features lack.
+
+    GDAL takes an integer for one of 32 bits, and reads the type from the features where the schema has none. So integer
+    keys have none.
+    """
+    key = {"key": {"type": "string"}} if keyed == "str" else {}
+    time = {"type": "string", "format": "date-time", "description": "Event time; absent where there is none."}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": url,
+        "title": f"Entities of {name}",
+        "type": "object",
+        "required": ["type", "id", "geometry", "properties"],
+        "properties": {
+            "type": {"const": "Feature"},
+            "id": {"type": "string" if keyed == "str" else "integer"},
+            "geometry": {"$ref": "https://geojson.org/schema/Point.json"},
+            "properties": {"type": "object", "required": ["key"], "properties": {**key, "time": time}},
+        },
+    }

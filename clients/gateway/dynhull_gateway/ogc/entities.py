@@ -3,16 +3,19 @@
 import bisect
 from collections import OrderedDict
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from dynhull_client import AsyncHullClient, Entities
+from dynhull_client import AsyncHullClient, Entities, HullInfo
 
+from ..problems import ProblemError
 from .filters import Found, Page
 
-KEPT = 4
+KEPT = 16
+KEPT_KEYS = 1_000_000  # of all that are kept, beside the latest: about 200 bytes each
 NO_TIME = np.datetime64(0, "us")  # of a key without event time
 
 Key = str | int
@@ -22,21 +25,21 @@ Key = str | int
 class Snapshot:
     """All keys of a hull at one revision, ascending."""
 
-    revision: int
+    place: str  # UID:REVISION
     keys: list[Key]
     order: list[bytes] | list[int]
     points: npt.NDArray[np.float64]
     times: npt.NDArray[np.datetime64] | None
 
     @classmethod
-    def of(cls, found: Entities) -> "Snapshot":
+    def of(cls, uid: str, found: Entities) -> "Snapshot":
         """The SDK's answer."""
         keys: list[Key] = [key if isinstance(key, str) else int(key) for key in found.keys]
         numbers = [key for key in keys if isinstance(key, int)]
         order: list[int] | list[bytes] = [str(key).encode() for key in keys]
         if numbers:
             order = numbers
-        return cls(found.revision, keys, order, found.points, found.times)
+        return cls(f"{uid}:{found.revision}", keys, order, found.points, found.times)
 
     def page(self, page: Page) -> Found:
         """The features of a page."""
@@ -65,29 +68,39 @@ class Snapshot:
 
 
 class Snapshots:
-    """The last snapshots that pages were made of: those after the first one are of the same revision, if it is here."""
+    """Snapshots that have further pages, so that all of them are of one revision."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[str | None, str, int], Snapshot] = OrderedDict()
+        self._kept: OrderedDict[tuple[str | None, str, str], Snapshot] = OrderedDict()
+        self._keys = 0
 
-    async def of(self, client: AsyncHullClient, token: str | None, name: str, revision: int | None) -> Snapshot:
-        """The snapshot of a revision, or of now."""
-        kept = None if revision is None else self._kept.get((token, name, revision))
+    async def of(self, client: AsyncHullClient, token: str | None, hull: HullInfo, place: str | None) -> Snapshot:
+        """The snapshot at a place, UID:REVISION, or of now; ProblemError if that revision is gone."""
+        kept = None if place is None else self._kept.get((token, hull.name, place))
         if kept is not None:
             return kept
-        found = Snapshot.of(await client.entities(name))
-        self._kept[token, name, found.revision] = found
-        while len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
-        return found
+        found = Snapshot.of(hull.uid, await client.entities(hull.name))
+        if place in (None, found.place):
+            return found
+        detail = f"the gateway no longer has revision {place}: begin again, without after and revision"
+        raise ProblemError(HTTPStatus.GONE, detail, "PAGE_GONE", field="revision", value=place)
+
+    def keep(self, token: str | None, name: str, snapshot: Snapshot) -> None:
+        """Keep a snapshot for its further pages, in place of the oldest."""
+        known = self._kept.pop((token, name, snapshot.place), None)
+        self._keys += len(snapshot.keys) - (0 if known is None else len(known.keys))
+        self._kept[token, name, snapshot.place] = snapshot
+        while len(self._kept) > 1 and (len(self._kept) > KEPT or self._keys > KEPT_KEYS):
+            _, oldest = self._kept.popitem(last=False)
+            self._keys -= len(oldest.keys)
 
 
 def feature(key: Key, lonlat: list[float], time: np.datetime64 | None) -> dict[str, Any]:
     """A key as a GeoJSON Feature."""
-    when = None if time is None or time == NO_TIME else f"{np.datetime_as_string(time)}Z"
+    when = {} if time is None or time == NO_TIME else {"time": f"{np.datetime_as_string(time)}Z"}
     return {
         "type": "Feature",
         "id": key,
         "geometry": {"type": "Point", "coordinates": lonlat},
-        "properties": {"key": key, "time": when},
+        "properties": {"key": key, **when},
     }

@@ -11,6 +11,8 @@ import numpy.typing as npt
 import shapely
 from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from ..schemas import PLACE
+
 MOST = 10_000
 FEW = 100
 NUMBER = r"-?[0-9]{1,20}(\.[0-9]{1,20})?([eE]-?[0-9]{1,2})?"
@@ -127,8 +129,8 @@ class Page(BaseModel):
     )
     limit: int = Field(default=FEW, ge=1, description=f"The most features of a page; more than {MOST} means {MOST}.")
     after: str | None = Field(default=None, max_length=300, description="The feature before the first one of the page.")
-    revision: int | None = Field(
-        default=None, ge=0, description="The revision of the page before, which is used again while it is at hand."
+    revision: Annotated[str, Field(pattern=PLACE)] | None = Field(
+        default=None, description='Of the page before: the link "next" has it, so that all pages are of one revision.'
     )
 
     @property

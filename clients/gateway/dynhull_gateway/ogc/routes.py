@@ -4,6 +4,7 @@ The standard demands longitudes and latitudes (CRS84), so hulls of a plane are n
 be drawn somewhere on the globe.
 """
 
+import json
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from http import HTTPStatus
@@ -26,6 +27,7 @@ from .documents import (
     CONFORMANCE,
     JSON,
     OPENAPI,
+    SCHEMA,
     Collection,
     Collections,
     Conformance,
@@ -35,6 +37,7 @@ from .documents import (
     Landing,
     Link,
     Spatial,
+    schema_of_entities,
 )
 from .entities import Snapshots, feature
 from .filters import Found, Page
@@ -103,12 +106,34 @@ async def describe_collection(request: Request, client: Caller, collection: Coll
     name = _hull_of(collection)
     if name is None:
         return _hulls(request)
-    await _info(client, name)
+    await _info(client, name, keyed=True)
     described = _entities(request, name)
     bounds = _bounds(hull_feature(await client.get_hull(name))["geometry"])
     if bounds is not None:
         described.extent = Extent(spatial=Spatial(bbox=[bounds]))
     return described
+
+
+class JsonSchema(Response):
+    """A response of a JSON schema."""
+
+    media_type = SCHEMA
+
+
+@router.get(
+    "/collections/{collection}/schema",
+    response_class=JsonSchema,
+    responses={200: {"description": "A JSON schema.", "content": {SCHEMA: {"schema": {"type": "object"}}}}},
+    dependencies=PLAIN,
+)
+async def schema(request: Request, client: Caller, collection: CollectionId) -> Response:
+    """The JSON schema of the features of a collection of entities."""
+    name = _hull_of(collection)
+    if name is None:
+        raise _missing(f"the collection {HULLS!r} has no schema: its features all have the same properties", HULLS)
+    info = await _info(client, name, keyed=True)
+    url = _url(request, f"collections/{quote(collection, safe='')}/schema")
+    return JsonSchema(json.dumps(schema_of_entities(url, name, str(info.keyed))))
 
 
 @router.get("/collections/{collection}/items", response_class=GeoJson, responses=geojson(FeatureCollection))
@@ -117,16 +142,20 @@ async def items(request: Request, client: Caller, collection: CollectionId, page
     name = _hull_of(collection)
     more: dict[str, Any] = {}
     if name is None:
+        if page.revision is not None:
+            raise ProblemError(HTTPStatus.BAD_REQUEST, "revision: is for entities", "INVALID_FIELD", field="revision")
         found = await _hull_features(client, page)
     else:
-        await _info(client, name)
-        kept: Snapshots = request.app.state.snapshots
-        snapshot = await kept.of(client, token_of(request), name, page.revision)
+        info = await _info(client, name, keyed=True)
+        snapshots: Snapshots = request.app.state.snapshots
+        snapshot = await snapshots.of(client, token_of(request), info, page.revision)
         found = snapshot.page(page)
-        more = {"revision": snapshot.revision}
+        if found.following is not None:
+            snapshots.keep(token_of(request), name, snapshot)
+        more = {"revision": snapshot.place}
     path = f"collections/{quote(collection, safe='')}/items"
     links = [
-        _link(request, path, "self", GEOJSON, "This page", page.model_dump(exclude_none=True, exclude_defaults=True)),
+        _link(request, path, "self", GEOJSON, "This page", page.model_dump(exclude_unset=True)),
         _link(request, path.removesuffix("/items"), "collection", JSON, "The collection"),
     ]
     if found.following is not None:
@@ -156,7 +185,7 @@ async def item(request: Request, client: Caller, collection: CollectionId, featu
         await _info(client, feature_id)
         found = hull_feature(await client.get_hull(feature_id))
     else:
-        info = await _info(client, name)
+        info = await _info(client, name, keyed=True)
         found = await _entity(client, info, feature_id)
     path = f"collections/{quote(collection, safe='')}"
     links = [
@@ -175,8 +204,8 @@ def _hull_of(collection: str) -> str | None:
     return collection.removeprefix(ENTITIES)
 
 
-async def _info(client: AsyncHullClient, name: str) -> HullInfo:
-    """A geographic hull; ProblemError if there is none of that name."""
+async def _info(client: AsyncHullClient, name: str, *, keyed: bool = False) -> HullInfo:
+    """A geographic hull, with keys if that is asked for; ProblemError if there is none of that name."""
     async for info in client.list_hulls(name) if name.isascii() else _none():
         if info.name != name:
             break
@@ -186,6 +215,9 @@ async def _info(client: AsyncHullClient, name: str) -> HullInfo:
                 f"/hulls/{quote(name, safe='')} has its coordinates"
             )
             raise _missing(detail, name, "NOT_GEOGRAPHIC")
+        if keyed and info.keyed is None:
+            detail = f"the hull {name!r} has points without keys, so there are no entities: see /collections/hulls"
+            raise _missing(detail, name, "NOT_KEYED")
         return info
     raise _missing(f"there is no hull {name!r}", name)
 
@@ -252,7 +284,10 @@ def _hulls(request: Request) -> Collection:
 
 
 def _entities(request: Request, name: str) -> Collection:
-    return _collection(request, f"{ENTITIES}{name}", f"Entities of {name}", f"The position of each key of {name}.")
+    made = _collection(request, f"{ENTITIES}{name}", f"Entities of {name}", f"The position of each key of {name}.")
+    path = f"collections/{quote(made.id, safe='')}/schema"
+    made.links.append(_link(request, path, "describedby", SCHEMA, f"{made.title}: types of properties"))
+    return made
 
 
 def _collection(request: Request, ident: str, title: str, description: str) -> Collection:
@@ -265,8 +300,12 @@ def _collection(request: Request, ident: str, title: str, description: str) -> C
 
 
 def _link(request: Request, path: str, rel: str, kind: str, title: str, query: dict[str, Any] | None = None) -> Link:
-    href = f"{request.base_url}{path}" + (f"?{urlencode(query)}" if query else "")
+    href = _url(request, path) + (f"?{urlencode(query)}" if query else "")
     return Link(href=href, rel=rel, type=kind, title=title)
+
+
+def _url(request: Request, path: str) -> str:
+    return f"{request.base_url}{path}"
 
 
 def _missing(detail: str, value: str, reason: str = "NOT_FOUND") -> ProblemError:
