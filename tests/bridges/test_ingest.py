@@ -284,6 +284,7 @@ def test_a_server_that_is_away(name: str, nats_port: int) -> None:
     ("arguments", "words"),
     [
         (["mqtt://b/t", "--hull", "h"], "Give --key"),
+        (["mqtt://b/t", "--hull", "h", "--key", "{1}", "--to-end"], "a subscription of MQTT has no end"),
         (["mqtt://b/t?version=4", "--hull", "h", "--key", "{1}"], "version is '4', not 3.1.1 or 5"),
         (["mqtt://b", "--hull", "h", "--key", "{1}"], "give mqtt://HOST/FILTER"),
         (["nats://b", "--hull", "h"], "give nats://HOST/STREAM"),

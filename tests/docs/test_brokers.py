@@ -31,5 +31,9 @@ def test_positions_from_an_empty_folder(
         subprocess.run([sys.executable, program], check=True)
         ingest = dynhull(*shlex.split(INGEST.replace("4222", str(port)))[1:])
         assert ingest.exit_code == 0, ingest.stderr
-        corners = dynhull(*shlex.split(QUERY)[1:]).stdout.splitlines()
-    assert {line.split("\t")[2] for line in corners} == {"truck-0", "truck-1", "truck-2"}
+        assert "points=300" in ingest.stderr
+        corners = dynhull(*shlex.split(QUERY)[1:]).stdout
+        subprocess.run([sys.executable, take_program("how-to/alarms", "stream.py")], check=True)
+    assert corners.count("\n") == 3
+    shown = " ".join(text.split())
+    assert all(" ".join(line.split()) in shown for line in corners.splitlines()), "the page shows them"

@@ -15,7 +15,7 @@ LOGGED = 10
 
 
 class BadMessages:
-    """Keeps bad messages aside, each as a line of JSON with its topic, number, error and payload.
+    """Keeps bad messages aside, each as a line of JSON with its topic, number (if it has one), error and payload.
 
     Args:
         path: the file to append to; None to count them only.
@@ -37,8 +37,7 @@ class BadMessages:
             self._file.write(json.dumps(_line(message, error), ensure_ascii=False) + "\n")
             self._file.flush()
         if self.count <= LOGGED:
-            place = {"number": message.number} if message.number else {}  # MQTT has no numbers
-            log.warning("bad message", topic=message.topic, **place, error=str(error))
+            log.warning("bad message", **_place(message), error=str(error))
         if self.count == LOGGED + 1:
             log.warning("more bad messages are counted, not logged")
         if self._most is not None and self.count > self._most:
@@ -54,8 +53,13 @@ class TooManyBadError(Exception):
     """There are more bad messages than `--max-bad` allows."""
 
 
+def _place(message: Message) -> dict[str, Any]:
+    """Where a message stands: its topic, and its number where the broker has a log."""
+    return {"topic": message.topic, **({"number": message.number} if message.number else {})}
+
+
 def _line(message: Message, error: Exception) -> dict[str, Any]:
-    line: dict[str, Any] = {"topic": message.topic, "number": message.number, "error": str(error)}
+    line = {**_place(message), "error": str(error)}
     payload = message.payload or b""
     try:
         line["payload"] = payload.decode()

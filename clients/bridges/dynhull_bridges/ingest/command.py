@@ -61,7 +61,7 @@ def ingest(
     max_bad: Annotated[
         int | None, typer.Option(min=0, help="End if there are more bad messages than this. Default: never.")
     ] = None,
-    to_end: Annotated[bool, typer.Option("--to-end", help="End when no message is left, rather than wait.")] = False,
+    to_end: Annotated[bool, typer.Option("--to-end", help="NATS, Kafka: end when no message is left, rather than wait.")] = False,
     patience: Annotated[
         str | None,
         typer.Option(
@@ -118,7 +118,7 @@ def ingest(
     logs.configure(log_format.value)
 
     async def serve() -> bool:
-        find = feeds_of(source, hull, producer, keyed=key is not None)
+        find = feeds_of(source, hull, producer, keyed=key is not None, to_end=to_end)
         async with connect(AsyncHullClient) as client:
             return await run(
                 client,

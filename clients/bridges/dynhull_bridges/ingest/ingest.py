@@ -25,7 +25,7 @@ class IngestError(Exception):
     """The ingest cannot go on; the message says why."""
 
 
-def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool) -> Find:
+def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool, to_end: bool) -> Find:
     """Finds the feeds that a URL stands for; it raises FeedError if the broker, which has to be asked, does not answer.
 
     Raises:
@@ -42,6 +42,8 @@ def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool) -> Find:
                 )
             if producer is not None:
                 raise ValueError("--producer is for NATS and Kafka, which number their messages")
+            if to_end:
+                raise ValueError("--to-end is for NATS and Kafka: a subscription of MQTT has no end")
             return _known([Mqtt(url, hull)])
         case "nats" | "tls":
             from .jetstream import JetStream
