@@ -1,7 +1,7 @@
 # One word for each thing people do here. Everything runs in .venv, made on first use from uv.lock.
 PYTHON ?= python3
 BIN := .venv/bin
-KERNEL := $(shell find dynhull/kernel -type f)
+KERNEL := $(shell find dynhull/kernel server/dynhull_server/native -type f)
 COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command -v "$$each"; done; true))
 # Certificates of the system: behind a proxy that inspects TLS, pip and uv trust the same.
 export UV_SYSTEM_CERTS ?= 1
@@ -75,8 +75,10 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp tests/kernel/*.hpp)
 	$(BIN)/mypy
-	$(STUB) -o build/_kernel.pyi
-	diff build/_kernel.pyi dynhull/_kernel.pyi || (echo 'run `make stub`'; exit 1)
+	$(STUB) dynhull._kernel -o build/_kernel.pyi
+	$(STUB) dynhull_server._native -o build/_native.pyi
+	diff build/_kernel.pyi dynhull/_kernel.pyi && diff build/_native.pyi server/dynhull_server/_native.pyi \
+	|| (echo 'run `make stub`'; exit 1)
 	$(BIN)/stubtest dynhull._kernel --allowlist dynhull/kernel/python/stubtest.txt
 	$(BIN)/lint-imports
 	$(BIN)/buf lint
@@ -95,10 +97,11 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
 
-STUB = mkdir -p build && $(BIN)/python -m nanobind.stubgen -q -m dynhull._kernel
+STUB = mkdir -p build && $(BIN)/python -m nanobind.stubgen -q -m
 
-stub: .venv/.check  ## regenerate dynhull/_kernel.pyi, the types of the kernel
-	$(STUB) -o dynhull/_kernel.pyi
+stub: .venv/.check  ## regenerate the types of what is in C++: dynhull/_kernel.pyi, server/dynhull_server/_native.pyi
+	$(STUB) dynhull._kernel -o dynhull/_kernel.pyi
+	$(STUB) dynhull_server._native -o server/dynhull_server/_native.pyi
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py

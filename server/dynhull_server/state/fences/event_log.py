@@ -6,8 +6,9 @@ import numpy as np
 
 from dynhull import Crossings
 
+from ...compiled import native
 from .event_block import EventBlock, Integers, joined
-from .numbering import Crossed, Swap, Told, numbered
+from .numbering import Crossed, Swap, Told, numbered, numbered_natively
 from .records import FenceEvent
 from .subjects import Subjects
 from .tallies import Column, Tallies
@@ -49,9 +50,12 @@ class EventLog:
         """Give the events their numbers. O(n log n) for n events."""
         if self._waiting:
             waiting, self._waiting = self._waiting, []
-            block, told = numbered(waiting, self._before)
+            if native is not None and self.told is None:
+                block, self.told = numbered_natively(native, waiting, self._tallies)
+            else:
+                block, told = numbered(waiting, self._before)
+                self._tell(told)
             self._blocks.append(block)
-            self._tell(told)
 
     def block(self) -> EventBlock | None:
         """All events; None if there are none. To be called after `settle`."""

@@ -1,26 +1,25 @@
 """Crossings become events: they get their numbers and times, those of each fence after its last one."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynhull import Crossings
 
+from ...compiled import Native
 from ..records import NO_TIME, Times
-from .event_block import COUNT, EVENT, RUN, Bytes, EventBlock, Integers, key_columns, run_array
+from .event_block import EVENT, RUN, Bytes, EventBlock, Integers, key_columns
 from .records import Cause, EventType
 from .subjects import Subjects
+from .tallies import Column, Tallies
 
 # A cause as the index knows it, and what it is here.
 Swap = tuple[Cause, Cause]
 # The type of an event by its change of side, -1 for the last one.
-TYPES = EventType.CROSS.value, EventType.ENTER.value, EventType.EXIT.value
-TYPE_COLUMN = np.array(TYPES, np.uint8)
-# So few events take less time one by one: numpy begins slowly.
-FEW = 64
+TYPES = bytes((EventType.CROSS, EventType.ENTER, EventType.EXIT))
+TYPE_COLUMN = np.frombuffer(TYPES, np.uint8)
+NO_SWAP = 0, 0
 
 
 class Told(NamedTuple):
@@ -84,66 +83,6 @@ def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> 
         waiting: the crossings, in the order in which they came.
         before: what was known of some fences, by ascending numbers.
     """
-    few = sum(len(each.crossings) for each in waiting) <= FEW
-    return _few(waiting, before) if few else _many(waiting, before)
-
-
-def _few(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> tuple[EventBlock, Told]:
-    fences = [each.crossings.fences.tolist() for each in waiting]
-    numbers = sorted(set().union(*fences))
-    places = {number: place for place, number in enumerate(numbers)}
-    told = before(np.array(numbers))
-    lasts, times, made, changes = (column.tolist() for column in told[2:])
-    names: dict[str, int] = {}
-    keys, rows = [], []
-    runs: list[list[int]] = []
-    for each, of_rows in zip(waiting, fences, strict=True):
-        crossings, swap, now = each.crossings, each.swap, each.now
-        kind, lengths, data = key_columns(crossings.keys)
-        keys.append(data)
-        moment = names.setdefault(each.subjects.hull.name, len(names)), kind, each.revision
-        number = None
-        columns = zip(
-            of_rows,
-            crossings.changes.tolist(),
-            crossings.causes.tolist(),
-            lengths,
-            crossings.points.tolist(),
-            crossings.previous.tolist(),
-            crossings.distances.tolist(),
-            repeat(NO_TIME) if each.event_times is None else each.event_times.tolist(),
-            strict=False,
-        )
-        for fence, change, causes, length, (x, y), (before_x, before_y), distance, event_time in columns:
-            place = places[fence]
-            lasts[place] += 1
-            made[place] += 1
-            changes[place] += change
-            if fence != number:
-                number = fence
-                times[place] = max(times[place], now)
-                runs.append([fence, lasts[place], 0, *moment, each.area_revision(fence), times[place]])
-            runs[-1][COUNT] += 1
-            rows.append(
-                (
-                    TYPES[change],
-                    caused(causes, swap),
-                    length,
-                    x,
-                    y,
-                    before_x,
-                    before_y,
-                    distance if x == x else math.nan,
-                    event_time,
-                    NO_TIME,
-                )
-            )
-    columns_told = (np.array(column) for column in (lasts, times, made, changes))
-    block = EventBlock(run_array(runs), np.array(rows, EVENT), b"".join(keys), tuple(names))
-    return block, Told(told.fences, told.places, *columns_told)
-
-
-def _many(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> tuple[EventBlock, Told]:
     counts = [len(each.crossings) for each in waiting]
     fences, changes = _column(waiting, "fences"), _column(waiting, "changes")
     points, previous = _column(waiting, "points"), _column(waiting, "previous")
@@ -199,6 +138,43 @@ def _many(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> tup
             [np.full(count, NO_TIME) if each is None else each for count, each in zip(counts, columns, strict=True)]
         )
     return EventBlock(runs, rows, b"".join([data for _, _, data in keys]), names), told
+
+
+def numbered_natively(native: Native, waiting: Sequence[Crossed], tallies: Tallies) -> tuple[EventBlock, Told]:
+    """As `numbered`, after what is counted of the fences. O(n + runs log n)."""
+    names: dict[str, int] = {}
+    columns, keys = [], []
+    for each in waiting:
+        crossings, (meant, stands_for) = each.crossings, each.swap or NO_SWAP
+        kind, lengths, data = key_columns(crossings.keys)
+        keys.append(data)
+        areas = None
+        if each.area_revisions:
+            numbers = crossings.fences[first_rows(crossings.fences)].tolist()
+            areas = {number: each.area_revision(number) for number in numbers}
+        columns.append(
+            (
+                crossings.fences,
+                crossings.changes,
+                crossings.causes,
+                lengths,
+                crossings.points,
+                crossings.previous,
+                crossings.distances,
+                each.event_times,
+                int(meant),
+                int(stands_for),
+                each.now,
+                names.setdefault(each.subjects.hull.name, len(names)),
+                kind,
+                each.revision,
+                areas,
+            )
+        )
+    counted = tallies.columns
+    runs, rows, told = native.numbered(columns, TYPES, tallies.at, counted[Column.LAST], counted[Column.TIME])
+    block = EventBlock(np.frombuffer(runs, RUN), np.frombuffer(rows, EVENT), b"".join(keys), tuple(names))
+    return block, Told(*np.frombuffer(told, np.int64).reshape(len(Told._fields), -1))
 
 
 def _column(waiting: Sequence[Crossed], name: str) -> Any:

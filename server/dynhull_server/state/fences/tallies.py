@@ -26,13 +26,14 @@ class Table:
 
     Attributes:
         columns: (columns, places) the integers.
+        at: the place of each fence, by its number.
     """
 
-    __slots__ = ("_free", "_places", "columns")
+    __slots__ = ("_free", "at", "columns")
 
     def __init__(self, columns: int, room: int = ROOM) -> None:
         self.columns: Integers = np.zeros((columns, room), np.int64)
-        self._places: dict[int, int] = {}
+        self.at: dict[int, int] = {}
         self._free: list[int] = []
 
     def add(self, number: int) -> int:
@@ -40,22 +41,22 @@ class Table:
         if self._free:
             place = self._free.pop()
         else:
-            place = len(self._places)
+            place = len(self.at)
             self._make_room(place)
         self.columns[:, place] = 0
-        self._places[number] = place
+        self.at[number] = place
         return place
 
     def remove(self, number: int) -> int:
         """Give the place of a fence away, and return it. O(1)."""
-        place = self._places.pop(number)
+        place = self.at.pop(number)
         self._free.append(place)
         return place
 
     def places(self, numbers: npt.NDArray[np.integer[Any]]) -> Integers:
         """The places of some fences; KeyError if one is not there. O(1) for each."""
-        places = self._places
-        return np.array([places[number] for number in numbers.tolist()], np.int64)
+        at = self.at
+        return np.array([at[number] for number in numbers.tolist()], np.int64)
 
     def _make_room(self, place: int) -> None:
         room = self.columns.shape[1]

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ...compiled import native
 from ...state.fences.event_block import EVENT, RUN, EventBlock, Integers, block_of
 from ...state.fences.records import Origin
 from ...state.records import NO_TIME
@@ -53,15 +54,35 @@ class Runs(NamedTuple):
 
 def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
     """A block as bytes. `own` says of which runs the hull is the one whose keys the fence compares: it is left out."""
-    if len(block) == 1:
+    more = HAS_INSIDE * bool(block.inside) | HAS_ORIGINS * bool(block.origins)
+    if len(block) == 1 and (more or native is None):
         return encode_lone(int(block.fences[0]), block.events(0)[0], own=bool(own[0]))
+    if native is None:
+        out = _encoded(block, own, more)
+    else:
+        out = bytearray(native.encoded(block.runs, block.rows, block.keys, own, block.names, more))
+    if block.inside:
+        put_unsigned(out, len(block.inside))
+        for row, members in block.inside.items():
+            put_unsigned(out, row)
+            put_members(out, members)
+    if block.origins:
+        put_unsigned(out, len(block.origins))
+        for row, origin in block.origins.items():
+            put_unsigned(out, row)
+            put_text(out, origin.hull)
+            put_unsigned(out, origin.revision)
+    return bytes(out)
+
+
+def _encoded(block: EventBlock, own: npt.NDArray[np.bool_], more: int) -> bytearray:
+    """What comes before members and origins, whose flags are `more`."""
     out = bytearray()
     columns = columns_of(block)
     fences, firsts, counts, hulls, kinds, subject_revisions, area_revisions, times = columns.runs
     n, m, named, areas = len(block), len(block.runs), not own.all(), block.runs["area_revision"].any()
     flags = HAS_HULLS * named | HAS_EVENT_TIMES * (len(columns.event_times) > 0)
-    flags |= HAS_FIRST_TIMES * (columns.first_times is not None)
-    flags |= HAS_INSIDE * bool(block.inside) | HAS_ORIGINS * bool(block.origins)
+    flags |= HAS_FIRST_TIMES * (columns.first_times is not None) | more
     flags |= ONE_EACH * (n == m) | NO_AREAS * (not areas) | DECIMALS * columns.decimal
     put_unsigned(out, n)
     put_unsigned(out, m)
@@ -70,7 +91,7 @@ def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
     if not flags & ONE_EACH:
         put_integers(out, counts)
     if named:
-        used, places = np.unique(np.asarray(hulls)[~own], return_inverse=True)
+        used, places = np.unique(hulls[~own], return_inverse=True)
         put_unsigned(out, len(used))
         for place in used.tolist():
             put_text(out, block.names[place])
@@ -88,18 +109,7 @@ def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
         put_integers(out, columns.event_times)
     if columns.first_times is not None:
         put_integers(out, columns.first_times)
-    if block.inside:
-        put_unsigned(out, len(block.inside))
-        for row, members in block.inside.items():
-            put_unsigned(out, row)
-            put_members(out, members)
-    if block.origins:
-        put_unsigned(out, len(block.origins))
-        for row, origin in block.origins.items():
-            put_unsigned(out, row)
-            put_text(out, origin.hull)
-            put_unsigned(out, origin.revision)
-    return bytes(out)
+    return out
 
 
 def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:

@@ -1,0 +1,51 @@
+"""What the server does for each event of a fence, in C++ if that is built; what calls it does the same without.
+
+The environment variable DYNHULL_KERNEL decides for the library and for this.
+"""
+
+from typing import TYPE_CHECKING, Protocol
+
+from dynhull import KERNEL
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    import numpy.typing as npt
+
+
+class Native(Protocol):
+    """The module `dynhull_server._native`. mypy compares it with the module's stub."""
+
+    def numbered(
+        self,
+        waiting: "list[tuple[Any, ...]]",
+        types: bytes,
+        places: "dict[int, int]",
+        lasts: "npt.NDArray[Any]",
+        times: "npt.NDArray[Any]",
+    ) -> "tuple[bytes, bytes, bytes]":
+        """The bytes of the runs, the rows and what is said of the fences: `numbered_natively` in state/fences."""
+
+    def encoded(
+        self,
+        runs: "npt.NDArray[Any]",
+        rows: "npt.NDArray[Any]",
+        keys: bytes,
+        own: "npt.NDArray[Any]",
+        names: "tuple[str, ...]",
+        more: int,
+    ) -> bytes:
+        """What `encode_block` in storage/rows puts before members and origins."""
+
+
+def _load() -> Native | None:
+    if KERNEL == "python":
+        return None
+    try:
+        from . import _native
+    except ModuleNotFoundError:
+        return None
+    return _native
+
+
+native = _load()
