@@ -102,6 +102,10 @@ FOLLOWED_ELSEWHERE = {
     "--consumer": "test_fences.py: test_the_life_of_a_fence",
     "--ack": "test_fences.py: test_the_life_of_a_fence",
     "--day": "test_demo.py: test_hours_of_flights",
+    **dict.fromkeys(
+        ("--max-speed", "--max-growth", "--confirmations", "--off", "--all"),
+        "test_quarantine.py: test_held_positions_are_listed_released_and_dropped",
+    ),
     "pip install": "by hand: needs an index of packages",
 }
 ADVICE = re.compile(r"--[a-z][a-z-]+|dynhull (?:list|create|serve|load)|pip install|iconv|gunzip")

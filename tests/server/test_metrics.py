@@ -15,7 +15,7 @@ from patience import wait_until
 from peers import program
 from server_process import PATIENCE
 
-from dynhull_client import HullClient, PointMissingError
+from dynhull_client import HullClient, PointMissingError, Quarantine
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -106,6 +106,18 @@ def test_what_becomes_of_keys_is_counted() -> None:
         assert {each: samples[f'dynhull_updates_total{{operation="{each}"}}'] for each in updates} == updates
         rows = {"late": 1, "stale": 1, "skipped": 1, "clamped": 1}
         assert {each: samples[f'dynhull_rows_total{{outcome="{each}"}}'] for each in rows} == rows
+
+
+def test_the_quarantine_is_counted() -> None:
+    with measured() as (server, address), HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="int", quarantine=Quarantine(max_growth=1))
+        client.put("fleet", [1, 2, 3], [[0, 0], [4, 0], [0, 4]])
+        client.put("fleet", [4, 5, 6, 1], [[9, 9], [8, 8], [7, 7], [6, 6]])
+        client.release("fleet", [4], drop=[5])
+        samples = scrape(address)
+    assert samples["dynhull_held_keys"] == 2
+    counted = {"held": 4, "released": 1, "dropped": 1}
+    assert {each: samples[f'dynhull_quarantine_total{{outcome="{each}"}}'] for each in counted} == counted
 
 
 def test_promtool_has_nothing_to_complain_about() -> None:

@@ -33,6 +33,7 @@ PANELS = {
         "load",
         "import",
         "ingest",
+        "quarantine",
     ),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Fences": ("fences", "relay"),

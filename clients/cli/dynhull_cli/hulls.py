@@ -12,6 +12,7 @@ from .exits import Exit
 from .json_lines import json_line
 from .listing import below, listed
 from .plural import plural
+from .quarantine import Confirmations, MaxGrowth, MaxSpeed, given_rules, rule_members
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -114,6 +115,9 @@ def create(
             "--centre",
         ),
     ] = None,
+    max_speed: MaxSpeed = None,
+    max_growth: MaxGrowth = None,
+    confirmations: Confirmations = None,
     exist_ok: Annotated[
         bool, typer.Option("--exist-ok", help="Accept a hull that exists already with the same settings.")
     ] = False,
@@ -126,7 +130,7 @@ def create(
 
     A hull with --keyed holds one point for each key: `dynhull put` inserts or moves it. With --max-age or --max-points,
     points leave the hull by themselves. With --geographic, edges are great circles; lengths and areas are metres and
-    square metres on WGS 84.
+    square metres on WGS 84. With --max-speed or --max-growth, bad positions wait in quarantine: `dynhull quarantine`.
     """
     from dynhull_client import HullExistsError
 
@@ -141,6 +145,7 @@ def create(
         "point_limit": point_limit,
         "geographic": geographic,
         "center": None if center is None else _place(center),
+        "quarantine": given_rules(max_speed, max_growth, confirmations),
     }
     if center is not None and not geographic:
         raise ValueError("--center is given with --geographic")
@@ -254,6 +259,8 @@ def _members(info: "HullInfo") -> dict[str, Any]:
         "clock": None if info.clock is None else info.clock.isoformat(),
         "geographic": info.geographic,
         "center": info.center,
+        "held": info.held,
+        **rule_members(info.quarantine),
     }
 
 

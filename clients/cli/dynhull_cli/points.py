@@ -106,7 +106,8 @@ def remove(
         which = f"a {what}" if error.row is None else f"{what} {error.row + 1}, {error.value},"
         fail(Exit.FAILED, f"{which} is not in the hull; nothing was removed. --missing-ok skips such {what}s")
     skipped = f", {applied.missing:,} not there" if applied.missing else ""
-    _report(name, applied, f"{plural(applied.deleted, 'key' if key else 'point')} removed{skipped}", as_json)
+    removed = f"{plural(applied.deleted, 'key' if key else 'point')} removed{skipped}"
+    _report(name, applied, removed + _left_out(applied), as_json)
 
 
 def _all_rows(points: list[str] | None) -> "Points":
@@ -122,7 +123,7 @@ def _all_rows(points: list[str] | None) -> "Points":
 
 def _left_out(applied: "Applied") -> str:
     """The rows that changed nothing, or were changed, by kind; empty if there are none."""
-    kinds = ("stale", "late", "skipped", "clamped", "evicted")
+    kinds = ("stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
     return "".join(f", {getattr(applied, kind):,} {kind}" for kind in kinds if getattr(applied, kind))
 
 

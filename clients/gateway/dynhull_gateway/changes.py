@@ -11,6 +11,7 @@ from .schemas import Batch, Key, Move
 
 OF_KEYS = ("keys", "points", "remove", "only", "ttl", "expire_times")
 OF_POINTS = ("insert", "delete", "move")
+OF_QUARANTINE = ("release", "drop")
 
 
 def check(batch: Batch, *within: str) -> None:
@@ -19,6 +20,11 @@ def check(batch: Batch, *within: str) -> None:
     of_points = [field for field in OF_POINTS if getattr(batch, field) is not None]
     if of_keys and of_points:
         raise FieldError([*within, of_points[0]], f"is about points, and {of_keys[0]} about keys: a batch has either")
+    of_quarantine = [field for field in OF_QUARANTINE if getattr(batch, field) is not None]
+    others = [field for field in (*OF_KEYS, *OF_POINTS, "times", "missing") if getattr(batch, field) is not None]
+    if of_quarantine and others:
+        problem = f"is about keys in quarantine, and {others[0]} is not: a batch has either"
+        raise FieldError([*within, of_quarantine[0]], problem)
     if (batch.keys is None) != (batch.points is None):
         given, lacking = ("keys", "points") if batch.points is None else ("points", "keys")
         raise FieldError([*within, given], f"is given without {lacking}: the position of each key")
@@ -41,7 +47,7 @@ def _check_rows(batch: Batch, within: Sequence[str]) -> None:
     if batch.move is not None:
         _check_columns(batch.move, "origins", ("destinations",), [*within, "move"])
     kind: type[Key] | None = None
-    for field in ("keys", "remove"):
+    for field in ("keys", "remove", *OF_QUARANTINE):
         for row, key in enumerate(getattr(batch, field) or ()):
             kind = kind or type(key)
             if type(key) is not kind:
@@ -75,6 +81,10 @@ async def apply(
             expire_times=batch.expire_times,
             **numbered,
         )
+    if batch.release is not None:
+        return await client.release(name, batch.release, drop=batch.drop, **numbered)
+    if batch.drop is not None:
+        return await client.drop(name, batch.drop, **numbered)
     if batch.remove is not None:
         return await client.remove(name, batch.remove, missing=batch.missing or "count", **numbered)
     return await client.apply(

@@ -22,8 +22,8 @@ async def list_fences(
     client: Caller, prefix: NamePrefix = "", after: After = "", limit: Limit = 100
 ) -> schemas.FencePage:
     """List fences by name, in pages."""
-    fences, following = await page(client.list_fences(prefix), after, limit)
-    return schemas.FencePage(fences=[_shown(each) for each in fences], next=following)
+    fences, more = await page(client.list_fences(prefix), limit, lambda each: each.name <= after)
+    return schemas.FencePage(fences=[_shown(each) for each in fences], next=fences[-1].name if more else None)
 
 
 @router.post("/fences", status_code=status.HTTP_201_CREATED)

@@ -9,10 +9,10 @@ connection of its own.
 import asyncio
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dynhull_client import AsyncHullClient, DynhullError, OutcomeUnknownError, UnavailableError
+from dynhull_client import Applied, AsyncHullClient, DynhullError, OutcomeUnknownError, UnavailableError
 
 from .changes import apply, encoded
 from .problems import ProblemError
@@ -110,7 +110,7 @@ def _next(waiting: deque[_Waiting]) -> list[_Waiting]:
 async def _send(client: AsyncHullClient, name: str, together: Sequence[_Waiting]) -> None:
     """Apply batches together and answer them; after a refusal, each half on its own, so that each has its own error."""
     try:
-        answer = encoded(await apply(client, name, _joined([each.batch for each in together])), len(together))
+        applied = await apply(client, name, _joined([each.batch for each in together]))
     except (DynhullError, ValueError, TypeError) as error:
         uncertain = isinstance(error, DynhullError) and (
             not error.reason or isinstance(error, OutcomeUnknownError | UnavailableError)
@@ -123,9 +123,19 @@ async def _send(client: AsyncHullClient, name: str, together: Sequence[_Waiting]
         await _send(client, name, together[:middle])
         await _send(client, name, together[middle:])
         return
+    first = 0
+    answer = encoded(applied, len(together))
     for each in together:
+        if applied.held:  # each has rows of its own
+            answer = encoded(_with_rows_from(applied, first, first + each.rows), len(together))
         if not each.answer.done():
             each.answer.set_result(answer)
+        first += each.rows
+
+
+def _with_rows_from(applied: Applied, first: int, end: int) -> Applied:
+    """The effect for the request that brought the rows from `first` to before `end`."""
+    return replace(applied, held_rows=tuple(row - first for row in applied.held_rows if first <= row < end))
 
 
 def _fail(waiting: _Waiting, error: Exception) -> None:

@@ -1,15 +1,17 @@
 """Hulls: create, list, read, delete."""
 
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Response, status
 
-from dynhull_client import Hull
+from dynhull_client import HeldPosition, Hull, Quarantine
 
 from . import schemas
 from .bodies import GEOJSON, JsonRoute
 from .callers import Caller
 from .pages import page
+from .problems import ProblemError
 from .schemas import After, HullPath, Limit, MinRevision, Prefix, ProducerPath
 
 router = APIRouter(tags=["hulls"], route_class=JsonRoute)
@@ -19,8 +21,10 @@ Format = Annotated[Literal["json", "geojson"], Query(description="json, or a Geo
 @router.get("/hulls")
 async def list_hulls(client: Caller, prefix: Prefix = "", after: After = "", limit: Limit = 100) -> schemas.HullPage:
     """List hulls by name, in pages. A caller with a token gets those it may read."""
-    hulls, following = await page(client.list_hulls(prefix), after, limit)
-    return schemas.HullPage(hulls=[schemas.HullInfo.model_validate(each) for each in hulls], next=following)
+    hulls, more = await page(client.list_hulls(prefix), limit, lambda each: each.name <= after)
+    return schemas.HullPage(
+        hulls=[schemas.HullInfo.model_validate(each) for each in hulls], next=hulls[-1].name if more else None
+    )
 
 
 @router.post("/hulls", status_code=status.HTTP_201_CREATED)
@@ -60,6 +64,38 @@ async def recenter(client: Caller, name: HullPath, to: schemas.Recenter) -> sche
     return schemas.HullInfo.model_validate(
         await client.recenter(name, None if to.center is None else (to.center[0], to.center[1]))
     )
+
+
+@router.put("/hulls/{name}/quarantine")
+async def set_quarantine(client: Caller, name: HullPath, rules: schemas.QuarantineRules) -> schemas.HullInfo:
+    """Replace the rules that hold bad positions out of a keyed hull. What is held stays so."""
+    return schemas.HullInfo.model_validate(await client.set_quarantine(name, Quarantine(**rules.arguments())))
+
+
+@router.get("/hulls/{name}/held")
+async def list_held(
+    client: Caller,
+    name: HullPath,
+    after: Annotated[
+        str, Query(max_length=255, description="Only keys after this one: the last of the page before.")
+    ] = "",
+    limit: Limit = 100,
+) -> schemas.HeldPage:
+    """List the positions in quarantine by key, in pages. Batches `release` and `drop` them."""
+    held, more = await page(client.list_held(name), limit, partial(_passed, after))
+    following = str(held[-1].key) if more else None
+    return schemas.HeldPage(held=[schemas.HeldPosition.model_validate(each) for each in held], next=following)
+
+
+def _passed(after: str, held: HeldPosition) -> bool:
+    """Whether a position is of a page that ends with the key `after`; empty for none."""
+    if not after or isinstance(held.key, str):
+        return str(held.key) <= after
+    if not (after.isascii() and after.isdecimal()):
+        raise ProblemError(
+            400, f"after is {after!r}: the keys of the hull are integers", "INVALID_FIELD", field="after"
+        )
+    return held.key <= int(after)
 
 
 @router.get("/hulls/{name}/producers/{producer}")

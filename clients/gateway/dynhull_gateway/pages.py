@@ -1,31 +1,21 @@
-"""Pages of what the server lists by name."""
+"""Pages of what the server lists in order."""
 
-from collections.abc import AsyncIterator
-from typing import Protocol, TypeVar
+from collections.abc import AsyncIterator, Callable
+from typing import TypeVar
 
-
-class Named(Protocol):
-    """Something with a name."""
-
-    @property
-    def name(self) -> str:
-        """The name."""
-        ...
+Item = TypeVar("Item")
 
 
-Item = TypeVar("Item", bound=Named)
-
-
-async def page(listed: AsyncIterator[Item], after: str, limit: int) -> tuple[list[Item], str | None]:
-    """At most `limit` of what comes after a name, and the name after which the next page begins; None if it is last.
+async def page(listed: AsyncIterator[Item], limit: int, passed: Callable[[Item], bool]) -> tuple[list[Item], bool]:
+    """At most `limit` of what comes after the items of earlier pages, which are `passed`; and whether more follow.
 
     Reads what is listed up to there, O(1) memory.
     """
     found: list[Item] = []
     async for each in listed:
-        if each.name <= after:
+        if passed(each):
             continue
         if len(found) == limit:
-            return found, found[-1].name
+            return found, True
         found.append(each)
-    return found, None
+    return found, False

@@ -25,6 +25,8 @@ from pydantic import (
     model_validator,
 )
 
+from dynhull_client import Quarantine
+
 NAME = r"^[A-Za-z0-9._/-]{1,200}$"
 NAMES = "1 to 200 letters a to z and A to Z, digits and ._-/; a slash in a path is written %2F"
 LARGEST = 2**64 - 1
@@ -143,6 +145,20 @@ class Response(BaseModel):
 # Hulls
 
 
+class QuarantineRules(Request):
+    """The rules that hold positions of keys out of a hull; null for those that are off."""
+
+    max_speed: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
+        None, description="Greatest speed, in units of the coordinates a second, or metres a second on the globe."
+    )
+    max_growth: Annotated[float, Field(strict=True, ge=1, allow_inf_nan=False)] | None = Field(
+        None, description="Greatest factor by which one position may enlarge the area of the hull."
+    )
+    confirmations: Annotated[int, Field(strict=True, ge=0, le=1000)] = Field(
+        1, description="Later, consistent positions that let a key in; 0 for none: only by request."
+    )
+
+
 class NewHull(Request):
     """The settings of a hull, fixed from its creation."""
 
@@ -163,6 +179,7 @@ class NewHull(Request):
     )
     geographic: StrictBool = Field(False, description="Whether points are longitudes and latitudes in degrees.")
     center: Point | None = Field(None, description="Longitude and latitude of the centre of a geographic hull.")
+    quarantine: QuarantineRules | None = Field(None, description="Rules that hold bad positions of keys out.")
     exist_ok: StrictBool = Field(False, description="Return an existing hull with these settings.")
 
     @field_validator("center")
@@ -171,6 +188,19 @@ class NewHull(Request):
         if center is not None and not info.data.get("geographic", True):
             raise ValueError('is a setting of hulls on the globe: give "geographic": true, too')
         return center
+
+    def arguments(self) -> dict[str, Any]:
+        """The fields as arguments of the SDK."""
+        quarantine = None if self.quarantine is None else Quarantine(**self.quarantine.arguments())
+        return super().arguments() | {"quarantine": quarantine}
+
+
+class PresentRules(Response):
+    """The rules of a quarantine; null for those that are off."""
+
+    max_speed: float | None
+    max_growth: float | None
+    confirmations: int
 
 
 class Window(Response):
@@ -199,6 +229,8 @@ class HullInfo(Response):
     clock: datetime | None
     geographic: bool
     center: Place | None
+    quarantine: PresentRules | None = Field(description="Null for a hull that has never had any rules.")
+    held: int = Field(description="Keys in quarantine.")
 
 
 class HullPage(Response):
@@ -264,6 +296,26 @@ class Recenter(Request):
     center: Point | None = None
 
 
+class HeldPosition(Response):
+    """A position in quarantine. `speed` is null if it is not too fast, or if it moved in no time: see `breaks`."""
+
+    key: str | int
+    position: Place
+    time: datetime | None
+    breaks: Annotated[list[Literal["max_speed", "max_growth"]], BeforeValidator(_listed)]
+    speed: Finite
+    growth: Finite
+    revision: int = Field(description="The revision that has held it.")
+    confirmations: int
+
+
+class HeldPage(Response):
+    """Positions in quarantine by key. `next` is the `after` of the next page; null on the last."""
+
+    held: list[HeldPosition]
+    next: str | None
+
+
 class LastSequence(Response):
     """The number of the last batch of a producer that was applied; 0 if there is none."""
 
@@ -290,6 +342,8 @@ class Batch(Request):
     points: Points | None = Field(None, description="and their positions.")
     times: list[Time] | None = Field(None, description="Event times of the points to insert or put.")
     remove: list[Key] | None = Field(None, description="Keys to remove.")
+    release: list[Key] | None = Field(None, description="Keys in quarantine to let in.")
+    drop: list[Key] | None = Field(None, description="Keys in quarantine whose held position is dropped.")
     only: Literal["absent", "present"] | None = Field(None, description="Put only new keys, or only known ones.")
     ttl: Seconds | None = Field(None, description="Seconds after which the keys leave.")
     expire_times: list[Time] | None = Field(None, description="Times at which the keys leave, instead of ttl.")
@@ -315,6 +369,12 @@ class Applied(Response):
     clamped: int
     evicted: int
     clock: datetime | None
+    held: int = Field(description="Positions put into quarantine.")
+    held_rows: Annotated[list[int], BeforeValidator(_listed)] = Field(
+        description="The rows of this request that these are."
+    )
+    released: int
+    dropped: int
     gathered: int = Field(1, description="Requests whose changes were applied together, as one revision.")
 
 
@@ -351,6 +411,9 @@ class Uploaded(Response):
     skipped: int
     clamped: int
     evicted: int
+    held: int
+    released: int
+    dropped: int
     last_sequence: int | None = Field(description="With an Idempotency-Key, the number of the last row.")
 
 

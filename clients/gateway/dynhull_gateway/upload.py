@@ -18,7 +18,10 @@ from .schemas import Uploaded
 BATCH_ROWS = 8192
 
 KINDS = {type(None): "absent", str: "a string", int: "an integer", datetime: "there"}
-SUMS = ("inserted", "deleted", "missing", "moved", "stale", "late", "skipped", "clamped", "evicted")
+SUMS = (
+    *("inserted", "deleted", "missing", "moved", "stale", "late", "skipped", "clamped", "evicted"),
+    *("held", "released", "dropped"),
+)
 
 
 @dataclass(frozen=True, slots=True)

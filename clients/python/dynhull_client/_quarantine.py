@@ -37,6 +37,7 @@ def release(
     name: str,
     keys: Any,
     *,
+    drop: Any = None,
     producer: str = "",
     sequence: int = 0,
     may_skip: bool = False,
@@ -47,12 +48,13 @@ def release(
     Args:
         name: the hull.
         keys: n keys, as for `put`.
+        drop: keys whose held position is dropped in the same batch.
         producer: as for `apply`.
         sequence: as for `apply`.
         may_skip: as for `apply`.
         timeout: seconds, instead of the client's.
     """
-    return apply_batch(name, Batch(release=keys), producer, sequence, may_skip, timeout)
+    return apply_batch(name, Batch(release=keys, drop=drop), producer, sequence, may_skip, timeout)
 
 
 def drop(

@@ -62,6 +62,12 @@ class HeldPosition:
     revision: int
     confirmations: int
 
+    @property
+    def breaks(self) -> tuple[str, ...]:
+        """The rules that it breaks: "max_speed", "max_growth" or both."""
+        broken = {"max_speed": self.speed, "max_growth": self.growth}
+        return tuple(rule for rule, value in broken.items() if value is not None)
+
 
 def encode_quarantine(rules: Quarantine) -> hull_pb2.Quarantine:
     """The rules in the form of a message."""
