@@ -29,7 +29,7 @@ from nats.js.client import JetStreamContext
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 from brokers import broker, free_port, nats_server
 from ingest_process import ingest_process, ingested
-from patience import wait_until
+from patience import PATIENCE, wait_until
 from server_process import Server, server_process
 
 from dynhull_client import HullClient
@@ -90,7 +90,7 @@ class Publisher:
     async def _publish(self, context: JetStreamContext) -> None:
         points = [[self._number + i, (self._number + i) ** 2] for i in range(POINTS)]
         self._number += POINTS
-        await context.publish(STREAM, json.dumps(points).encode())
+        await context.publish(STREAM, json.dumps(points).encode(), timeout=PATIENCE)
 
 
 async def stored(port: int) -> int:
