@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from .addresses import is_database
-from .failure import fail
 
 DATA = Path("dynhull-data")
 
@@ -14,7 +13,7 @@ DATA = Path("dynhull-data")
 def _folder(path: Path | None) -> Path | None:
     """What an argument names, unless that is a database: these commands are for folders."""
     if path is not None and is_database(path):
-        fail("this command is for folders: copy a database with pg_dump; every start of a server examines it in full")
+        raise typer.BadParameter("no folder: copy a database with pg_dump; every start of a server examines it in full")
     return path
 
 
