@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
 T ?=
-# Twice as many workers as cores: many tests wait, for processes, disks and clocks.
+# More workers than cores: many tests wait, for processes, disks and clocks.
 WORKERS = -n 6 --dist worksteal
 # `make test` counts lines where Python reports them itself (sys.monitoring, 3.12); tracing on 3.11 takes twice as long.
 MONITORING = $(shell $(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "")')

@@ -61,7 +61,9 @@ def ingest(
     max_bad: Annotated[
         int | None, typer.Option(min=0, help="End if there are more bad messages than this. Default: never.")
     ] = None,
-    to_end: Annotated[bool, typer.Option("--to-end", help="NATS, Kafka: end when no message is left, rather than wait.")] = False,
+    to_end: Annotated[
+        bool, typer.Option("--to-end", help="NATS, Kafka: end when no message is left, rather than wait.")
+    ] = False,
     patience: Annotated[
         str | None,
         typer.Option(
