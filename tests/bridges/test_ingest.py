@@ -76,16 +76,17 @@ def test_hulls_by_subject_and_several_points_a_message(
     client: HullClient, address: str, name: str, nats_port: int
 ) -> None:
     batch = {"fixes": [{"n": i, "p": [i, i * i]} for i in range(10)]}
-    publish(nats_port, name, [("a", batch), ("b", batch), ("a", {"fixes": [{"n": 3, "p": [-1, -1]}]})])
+    publish(nats_port, name, [("a", batch), ("x@y", batch), ("b", batch), ("a", {"fixes": [{"n": 3, "p": [-1, -1]}]})])
     url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
     options = ("--hull", f"{name}/{{1}}", "--each", "$.fixes", "--key", "$.n", "--x", "$.p[0]", "--y", "$.p[1]")
-    ingested(address, url, *options)
+    said = ingested(address, url, *options)
+    assert said[-1]["bad"] == 1, "no hull can have that name"
     assert client.get_hull(f"{name}/a").info.keyed == "int"
     assert client.positions(f"{name}/a", [3, 4]).positions.tolist() == [[-1, -1], [4, 16]]
     assert client.positions(f"{name}/b", [3]).positions.tolist() == [[3, 9]]
     assert client.get_hull(f"{name}/a").info.geographic is False
     said = ingested(address, url, *options)  # the place is kept by the broker, for there are several hulls
-    assert [line["after"] for line in said if line["event"] == "reading"] == [3]
+    assert [line["after"] for line in said if line["event"] == "reading"] == [4]
 
 
 BAD = {

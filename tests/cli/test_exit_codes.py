@@ -35,6 +35,9 @@ SETTINGS = {
         ("token", "give --read or --write"),
         ("token --name trucks", "give --read or --write"),
         ("list a\\b", "prefix"),
+        ("top --interval nan", "'--interval': 'nan'"),
+        ("watch fleet --events 99999999999999999999", "'--events': '99999999999999999999'"),
+        ("create fleet --max-points 99999999999999999999", "'--max-points': '99999999999999999999'"),
         ("create places, a*b", "name"),
     ],
 )

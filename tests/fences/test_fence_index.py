@@ -43,6 +43,19 @@ def test_a_first_state_is_not_reported(make):
 
 
 @kinds
+@pytest.mark.parametrize("place", [(1, 1e-20), (1, 1e-150), (1e20, 2), (3, 1e-9)])
+def test_a_distance_far_below_the_radius(make, place):
+    """The rounded difference of distance and radius says nothing about it: the search begins far off, and ends."""
+    x, y = place
+    hull = make.from_entities(["a"], [[0, 0]])
+    index = FenceIndex(hull)
+    index.set_circle(1, 0, 0, x)
+    hull.put("a", x, y)
+    (distance,) = index.take().distances.tolist()
+    assert distance == pytest.approx(y * y / (2 * x), rel=1e-15)
+
+
+@kinds
 def test_only_the_states_before_and_after_count(make):
     hull = make.from_entities([1, 2], [[1, 1], [9, 9]], key_type="int")
     index = FenceIndex(hull)

@@ -69,8 +69,11 @@ class StateFolder:
         """The fences whose receiver wants nothing any more, each with the receiver, and what it answered."""
         if not self._gone.exists():
             return {}
-        found = json.loads(self._gone.read_text("utf-8"))
-        return {str(fence): str(answer) for fence, answer in found.items()}
+        try:
+            found = json.loads(self._gone.read_text("utf-8"))
+            return {str(fence): str(answer) for fence, answer in found.items()}
+        except (AttributeError, ValueError):
+            raise ValueError(f"{self._gone} does not list the receivers that are gone: --enable removes it") from None
 
     def disable(self, fence: str, to: str, answer: str) -> None:
         """Remember that the receiver of a fence is gone."""
@@ -90,10 +93,13 @@ def _store(path: Path, members: dict[str, object] | dict[str, str]) -> None:
     """Write a file as a whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".unfinished")
-    with unfinished.open("w", encoding="utf-8") as file:
-        json.dump(members, file)
-        file.flush()
-        os.fsync(file.fileno())
+    try:
+        with unfinished.open("w", encoding="utf-8") as file:
+            json.dump(members, file)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
     unfinished.replace(path)
     folder = os.open(path.parent, os.O_RDONLY)
     try:

@@ -4,7 +4,8 @@ import asyncio
 import os
 import stat
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from .letters import Letter, read_letter
@@ -57,16 +58,10 @@ class LinesFile:
         os.close(self._file)
 
     def _append(self, text: bytes) -> None:
-        if not self._regular:
-            _write(self._file, text)
-            return
-        size = os.fstat(self._file).st_size
-        try:
-            _write(self._file, text)
-            os.fsync(self._file)
-        except OSError:
-            os.ftruncate(self._file, size)  # a line that is not whole would spoil the next one
-            raise
+        with whole_or_nothing(self._file):
+            write_all(self._file, text)
+            if self._regular:
+                os.fsync(self._file)
 
     def _repair(self) -> None:
         """Find the last events, and cut off a line that a killed relay did not complete."""
@@ -99,7 +94,7 @@ class StandardOutput:
         async with self._writing:
             text = "".join(f"{each.text}\n" for each in letters).encode()
             try:
-                await asyncio.to_thread(_write, self._output, text)
+                await asyncio.to_thread(write_all, self._output, text)
             except BrokenPipeError:
                 raise ReaderGoneError from None
 
@@ -111,7 +106,20 @@ class StandardOutput:
         """Nothing to release."""
 
 
-def _write(file: int, text: bytes) -> None:
+@contextmanager
+def whole_or_nothing(file: int) -> Iterator[None]:
+    """Take back what was appended to a regular file if the rest fails: half a line would spoil the next one."""
+    before = os.fstat(file)
+    try:
+        yield
+    except OSError:
+        if stat.S_ISREG(before.st_mode):
+            os.ftruncate(file, before.st_size)
+        raise
+
+
+def write_all(file: int, text: bytes) -> None:
+    """Write a text to a file, a pipe or a device."""
     rest = memoryview(text)
     while rest:
         rest = rest[os.write(file, rest) :]

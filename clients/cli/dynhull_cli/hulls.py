@@ -66,8 +66,11 @@ def list_hulls(
             typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}")
 
 
-def _setting(text: str, *names: str) -> Any:
-    return typer.Option(*names, help=text, rich_help_panel="Settings, fixed from then on")
+COUNTS = {"min": 1, "max": 2**63 - 1, "metavar": "INTEGER"}
+
+
+def _setting(text: str, *names: str, **more: Any) -> Any:
+    return typer.Option(*names, help=text, rich_help_panel="Settings, fixed from then on", **more)
 
 
 @connected
@@ -82,7 +85,7 @@ def create(
         str | None, _setting("Age at which points leave: 500ms, 90s, 30m, 2h or 7d. Default: never.")
     ] = None,
     max_points: Annotated[
-        int | None, _setting("Number of points beyond which the oldest leave. Default: no such limit.")
+        int | None, _setting("Number of points beyond which the oldest leave. Default: no such limit.", **COUNTS)
     ] = None,
     clock: Annotated[
         ClockKind, _setting("Clock that decides what is too old: the server's, or data for the latest event time.")
@@ -101,7 +104,8 @@ def create(
         ),
     ] = False,
     point_limit: Annotated[
-        int | None, _setting("Number of points beyond which batches are refused. Default: the server's limit.")
+        int | None,
+        _setting("Number of points beyond which batches are refused. Default: the server's limit.", **COUNTS),
     ] = None,
     geographic: Annotated[
         bool, _setting("Points are longitudes and latitudes on the globe. Default: points of a plane.", "--geographic")

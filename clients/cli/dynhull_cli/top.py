@@ -1,5 +1,6 @@
 """`dynhull top`: the hulls of a server, the busiest first."""
 
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -32,9 +33,10 @@ class Row:
 def top(
     client: "HullClient",
     prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="Show only hulls whose names begin with this.")] = "",
-    interval: Annotated[float, typer.Option(min=0.01, help="Seconds between two readings.")] = 1.0,
+    interval: Annotated[float, typer.Option(min=0.01, max=86400, help="Seconds between two readings.")] = 1.0,
     looks: Annotated[
-        int | None, typer.Option(min=1, help="End after this many readings. Default: 1; on a terminal, never.")
+        int | None,
+        typer.Option(min=1, max=sys.maxsize, help="End after this many readings. Default: 1; on a terminal, never."),
     ] = None,
     rows: Annotated[int, typer.Option(min=1, help="Show at most this many hulls.")] = 25,
     as_json: AsJson = False,

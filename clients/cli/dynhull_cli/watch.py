@@ -1,5 +1,6 @@
 """`dynhull watch`: the changes of a hull, live."""
 
+import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,7 +17,7 @@ def watch(
     name: HullName,
     as_json: AsJson = False,
     max_rate: Annotated[float, typer.Option(min=0, help="At most this many events per second; 0 for all.")] = 10.0,
-    events: Annotated[int | None, typer.Option(min=1, help="End after this many events.")] = None,
+    events: Annotated[int | None, typer.Option(min=1, max=sys.maxsize, help="End after this many events.")] = None,
     keys: Annotated[bool, typer.Option("--keys", help="Name the vertices of a keyed hull by their keys.")] = False,
     layer: Annotated[
         int, typer.Option(min=1, max=1000, help="Follow the hull of this convex layer; 1 is the hull itself.")

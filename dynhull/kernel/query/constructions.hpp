@@ -81,7 +81,7 @@ double nearest_double(double guess, Compare compare) {
     const std::uint64_t middle = std::max(least + (most - least) / 2, most - std::min(most, step));
     if (reached(middle)) {
       most = middle;
-      step *= 2;
+      step = std::min(2 * step, INFINITE_BITS);  // with a step of 0 the search would not end
     } else {
       least = middle + 1;
     }

@@ -2,11 +2,13 @@
 
 import base64
 import json
+import os
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import structlog
 
+from ..lines import whole_or_nothing, write_all
 from .feed import Message
 
 log = structlog.get_logger("dynhull_ingest")
@@ -27,15 +29,20 @@ class BadMessages:
 
     def __init__(self, path: Path | None, most: int | None) -> None:
         self.count = 0
-        self._file: IO[str] | None = None if path is None else path.open("a", encoding="utf-8")
+        self._file = None if path is None else os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        self._path = path
         self._most = most
 
     def add(self, message: Message, error: Exception) -> None:
         """Keep a message aside. TooManyBadError if there are too many, OSError if it cannot be written."""
         self.count += 1
         if self._file is not None:
-            self._file.write(json.dumps(_line(message, error), ensure_ascii=False) + "\n")
-            self._file.flush()
+            line = json.dumps(_line(message, error), ensure_ascii=False) + "\n"
+            try:
+                with whole_or_nothing(self._file):
+                    write_all(self._file, line.encode())
+            except OSError as failure:
+                raise OSError(failure.errno, failure.strerror, str(self._path)) from None
         if self.count <= LOGGED:
             log.warning("bad message", **_place(message), error=str(error))
         if self.count == LOGGED + 1:
@@ -46,7 +53,7 @@ class BadMessages:
     def close(self) -> None:
         """Close the file."""
         if self._file is not None:
-            self._file.close()
+            os.close(self._file)
 
 
 class TooManyBadError(Exception):

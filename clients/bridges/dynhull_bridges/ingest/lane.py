@@ -4,7 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import structlog
 
@@ -40,6 +40,10 @@ class NotCreatedError(Exception):
     """There is no such hull, and the ingest shall not create one, or it is of another kind."""
 
 
+class _NoNameError(Exception):
+    """No hull can have the name that messages give."""
+
+
 class _RefusedError(Exception):
     """A chunk was refused."""
 
@@ -61,6 +65,7 @@ class Lane:
         bad: called with each message that is refused, and why.
         settled: called when a chunk is settled, with the number of its rows that were applied.
         away: notes that the server does not answer; all lanes share it.
+        named_by_messages: whether the name comes from messages, which are bad then if no hull can have it.
     """
 
     def __init__(
@@ -74,6 +79,7 @@ class Lane:
         bad: Callable[[Message, Exception], None],
         settled: Callable[[int], None],
         away: Absence,
+        named_by_messages: bool,
     ) -> None:
         self._client = client
         self._hull = hull
@@ -83,6 +89,7 @@ class Lane:
         self._bad = bad
         self._settled = settled
         self._away = away
+        self._named_by_messages = named_by_messages
         self._kind: str | None = None
         self._waiting: deque[Chunk] = deque()  # not given to the writer
         self._flying: deque[Chunk] = deque()  # given to it, and not settled
@@ -114,6 +121,8 @@ class Lane:
             except _RefusedError as refused:
                 self._set_aside(refused.chunk, refused.error)
                 continue
+            except _NoNameError as error:
+                await self._refuse_all(error)
             except (SequenceGapError, ProducerInUseError) as error:
                 log.warning("another ingest of the same log writes to the hull", hull=self._hull, error=str(error))
             except HullNotFoundError:
@@ -236,10 +245,27 @@ class Lane:
         for part in reversed(parts):
             self._waiting.insert(place, part)
 
+    async def _refuse_all(self, error: Exception) -> NoReturn:
+        """Keep all messages aside, those to come as well."""
+        while True:
+            for chunk in self._waiting:
+                for message, _ in chunk.messages:
+                    self._bad(message, error)
+                chunk.settle()
+                self._settled(0)
+            self._waiting.clear()
+            self._room.set()
+            self._news.clear()
+            await self._news.wait()
+
     async def _require_hull(self) -> None:
         """Create the hull if there is none, and learn the type of its keys."""
         try:
             info = (await self._client.get_hull(self._hull, timeout=ANSWER)).info
+        except InvalidRequestError as error:
+            if self._named_by_messages:
+                raise _NoNameError(str(error)) from None
+            raise
         except HullNotFoundError as error:
             if self._create is None:
                 raise NotCreatedError(f"{error}; `dynhull create` adds one, or leave out --no-create") from None

@@ -206,6 +206,7 @@ class Pump:
             bad=self._set_aside,
             settled=self._settled,
             away=self._server_away,
+            named_by_messages=settings.mapping.hull is None,
         )
         self._sending.append(self._group.create_task(lane.run(), name=f"ingest into {hull}"))
         return lane

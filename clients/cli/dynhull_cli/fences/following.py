@@ -27,7 +27,7 @@ def watch(
     after: Annotated[
         int | None, typer.Option(min=0, help="Begin after this sequence; 0 for all events that are kept.")
     ] = None,
-    events: Annotated[int | None, typer.Option(min=1, help="End after this many events.")] = None,
+    events: Annotated[int | None, typer.Option(min=1, max=sys.maxsize, help="End after this many events.")] = None,
     conflate: Annotated[
         bool, typer.Option("--conflate", help="Leave out an enter and an exit that cancel each other.")
     ] = False,
