@@ -135,9 +135,10 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 
 SCHEDULES ?= 100000
 
-robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost messages, killed roots and shards; and the faults that they must find
+robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost messages, killed roots and shards, and the faults that they must find; faults of PostgreSQL under a server
 	PYTHONPATH=tests $(BIN)/python -m shards.simulation --schedules $(SCHEDULES)
 	PYTHONPATH=tests $(BIN)/python -m shards.mutants
+	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100
 
 ray: .venv/.test  ## all tests of Ray Datasets; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray

@@ -225,6 +225,25 @@ def test_a_commit_is_found_although_its_answer_was_lost(url):
         append(storage, LAST + 2, LAST + 2)
 
 
+NO_ROOM = """
+CREATE FUNCTION fail() RETURNS trigger LANGUAGE plpgsql AS
+'BEGIN RAISE EXCEPTION ''no space left on device'' USING ERRCODE = ''53100''; END';
+CREATE TRIGGER fail BEFORE INSERT ON batches FOR EACH ROW EXECUTE FUNCTION fail()
+"""
+
+
+def test_commits_go_on_when_there_is_room_again(url):
+    storage, _ = opened(url)
+    with closing(storage):
+        for revision in range(LAST + 1, LAST + 10):  # the statements are prepared in one of these commits
+            query(url, NO_ROOM)
+            with pytest.raises(NotCommittedError, match="the disk of PostgreSQL is full") as refused:
+                append(storage, revision, revision)
+            assert refused.value.full
+            query(url, "DROP FUNCTION fail CASCADE")
+            append(storage, revision, revision)
+
+
 def test_values_that_postgresql_refuses_change_nothing(url):
     storage, _ = opened(url)
     with closing(storage):

@@ -6,7 +6,6 @@ import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -43,24 +42,23 @@ class PostgreSQL:
     def _data(self) -> Path:
         return self._home / "data"
 
-    @cached_property
-    def _as_nobody(self) -> dict[str, Any]:
-        return {"user": "nobody", "group": "nogroup", "extra_groups": []} if os.getuid() == 0 else {}
+    def _command(self, name: str, *arguments: object) -> list[str]:
+        # Not by subprocess, which would fork for that, and gRPC's handlers of forks have ended the child.
+        as_nobody = ["setpriv", "--reuid=nobody", "--regid=nogroup", "--clear-groups"]
+        return [*(as_nobody if os.getuid() == 0 else ()), postgres_program(name), *map(str, arguments)]
 
     def _run(self, name: str, *arguments: object) -> None:
-        command = [postgres_program(name), *map(str, arguments)]
-        subprocess.run(command, check=True, cwd=self._home, stdout=subprocess.DEVNULL, **self._as_nobody)
+        subprocess.run(self._command(name, *arguments), check=True, cwd=self._home, stdout=subprocess.DEVNULL)
 
     def start(self) -> None:
         """Start it, and wait until it answers."""
         options = [each for setting in self._settings for each in ("-c", setting)]
         with (self._home / "log").open("ab") as log:
             self.process = subprocess.Popen(
-                [postgres_program("postgres"), "-D", self._data, "-k", self._home, "-h", "", *options],
+                self._command("postgres", "-D", self._data, "-k", self._home, "-h", "", *options),
                 stdout=log,
                 stderr=log,
                 cwd=self._home,
-                **self._as_nobody,
             )
         wait_until(self._answers)
 
@@ -78,6 +76,10 @@ class PostgreSQL:
             self.process.send_signal(number)
             self.process.wait(PATIENCE)
             self.process = None
+
+    def runs(self) -> bool:
+        """Whether it has not ended by itself."""
+        return self.process is not None and self.process.poll() is None
 
     def kill(self) -> None:
         """SIGKILL its first process; the others end by themselves, and only then can it start again."""

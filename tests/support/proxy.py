@@ -9,12 +9,16 @@ from contextlib import contextmanager, suppress
 class Proxy:
     """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once.
 
+    While `flowing` is not set, it takes data and passes none on.
+
     Args:
         server: host and port, or the path of a Unix socket; "" to end new connections at once.
     """
 
     def __init__(self, server: str) -> None:
         self.server = server
+        self.flowing = threading.Event()
+        self.flowing.set()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._open: set[socket.socket] = set()
         self._threads: list[threading.Thread] = []
@@ -28,6 +32,7 @@ class Proxy:
     def close(self) -> None:
         shut(self._listener)
         self.cut()
+        self.flowing.set()
         for thread in self._threads:
             thread.join()
         self._listener.close()
@@ -47,10 +52,18 @@ class Proxy:
     def _connect(self, client: socket.socket) -> None:
         with client, suppress(OSError), connected(self.server) as server:
             self._open |= {client, server}
-            back = self._start(forward, server, client)
-            forward(client, server)
+            back = self._start(self._forward, server, client)
+            self._forward(client, server)
             back.join()
             self._open -= {client, server}
+
+    def _forward(self, source: socket.socket, sink: socket.socket) -> None:
+        with suppress(OSError):
+            while data := source.recv(65536):
+                self.flowing.wait()
+                sink.sendall(data)
+        shut(source)
+        shut(sink)
 
 
 def connected(server: str) -> socket.socket:
@@ -60,14 +73,6 @@ def connected(server: str) -> socket.socket:
     connection = socket.socket(socket.AF_UNIX)
     connection.connect(server)
     return connection
-
-
-def forward(source: socket.socket, sink: socket.socket) -> None:
-    with suppress(OSError):
-        while data := source.recv(65536):
-            sink.sendall(data)
-    shut(source)
-    shut(sink)
 
 
 def shut(end: socket.socket) -> None:

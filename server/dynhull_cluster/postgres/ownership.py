@@ -11,6 +11,7 @@ database decides when a lease has ended, and the owner counts from before it ask
 import logging
 import os
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -82,6 +83,11 @@ def _begun(process: int) -> str:
     return "" if state in "ZX" else fields[18]
 
 
+def _now() -> float:
+    """A clock in seconds; on Linux one that goes on while the machine is suspended, as the time of others does."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()
+
+
 def writer_name(partition: int, epoch: int) -> str:
     """What the connection of an owner that commits is called."""
     return f"dynhull writer {partition}/{epoch}"
@@ -114,7 +120,7 @@ class Ownership:
 
     def holds(self) -> bool:
         """Whether the lease has not ended."""
-        return time.monotonic() < self._until
+        return _now() < self._until
 
     def take(self) -> None:
         """Own the partition: at once if nobody does, or a process that has ended; else when the lease has ended.
@@ -145,7 +151,7 @@ class Ownership:
             StorageError: the database cannot be reached.
         """
         with self._turn, self._working() as connection:
-            before = time.monotonic()
+            before = _now()
             renewed = connection.execute(
                 "UPDATE owners SET until = clock_timestamp() + make_interval(secs => %s) "
                 "WHERE partition = %s AND epoch = %s",
@@ -192,7 +198,7 @@ class Ownership:
             owner = self._owner(connection)
             if owner is not None and owner.alive and not is_known_dead(owner.process):
                 return owner
-            before = time.monotonic()
+            before = _now()
             try:
                 epoch = self._succeed(connection, owner)
             except LockNotAvailable:  # it was stopped inside of a transaction, which has locked the row

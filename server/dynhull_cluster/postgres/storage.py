@@ -16,7 +16,6 @@ from functools import partial
 
 import psycopg
 from psycopg.errors import DiskFull
-from psycopg.pq import TransactionStatus
 
 from dynhull_server.state.changes import Change
 from dynhull_server.state.errors import words
@@ -163,7 +162,8 @@ class PostgresStorage(RowStorage):
             self._disconnect()
             raise
         except BaseException as error:
-            self._roll_back()
+            # It ends the transaction. After an error psycopg also takes statements for prepared that are not.
+            self._disconnect()
             if isinstance(error, psycopg.Error | StorageError | OSError | MemoryError):
                 raise _not_committed(error) from error
             raise
@@ -203,16 +203,6 @@ class PostgresStorage(RowStorage):
         with as_storage_errors(), connection.transaction():
             self._require_ownership(connection.execute(REQUIRE, [self._partition, self._owner.epoch]).rowcount)
             put_totals(connection, self._partition, self._ledger.totals)
-
-    def _roll_back(self) -> None:
-        """End the transaction; if that fails, close the connection."""
-        if self._writer is None:
-            return
-        try:
-            if self._writer.info.transaction_status is not TransactionStatus.IDLE:
-                self._writer.execute("ROLLBACK")
-        except (psycopg.Error, MemoryError):
-            self._disconnect()
 
     def _connect_writer(self) -> Connection:
         connection = self._database.connect(writer_name(self._partition, self._owner.epoch))

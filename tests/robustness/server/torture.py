@@ -32,7 +32,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -71,11 +71,11 @@ PAGE_BYTES = 8192  # of the database
 
 
 class Server:
-    """`dynhull serve` on a folder, with these options; it keeps its port over its lives."""
+    """`dynhull serve` on a folder, or on a database, with these options; it keeps its port over its lives."""
 
-    def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
+    def __init__(self, folder: Path, options: Sequence[str] = (), journal: str = "") -> None:
         self.data = folder / "data"
-        self._options = options
+        self._options = [*options, *(["--journal", journal] if journal else ["--data", str(self.data)])]
         self._port = 0
         self._log = folder / "server.log"
 
@@ -83,7 +83,7 @@ class Server:
         require(self.starts(wrap), f"the server did not start: {self.said()}")
 
     def starts(self, wrap: Sequence[str] = ()) -> bool:
-        command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--data", str(self.data)]
+        command = [*wrap, COMMAND, "serve", "--port", str(self._port)]
         command += ["--create-on-write", "--snapshot-points", "300", "--log-level", "warning", "--scrub-cpu", "0"]
         command += self._options
         with self._log.open("ab") as log:
@@ -116,10 +116,12 @@ def killed_at_the_end(server: Server) -> Iterator[None]:
 
 
 class Torture:
-    def __init__(self, folder: Path, seed: int, writers: int, options: Sequence[str] = ()) -> None:
+    """A server, its clients, the model, and the faults."""
+
+    def __init__(self, folder: Path, seed: int, writers: int, options: Sequence[str] = (), journal: str = "") -> None:
         self._folder = folder
         self._random = random.Random(seed)
-        self.server = Server(folder, options)
+        self.server = Server(folder, options, journal)
         self.server.start()
         self._started = wall(), time.monotonic()
         self._proxy = Proxy(self.server.address)
@@ -374,6 +376,26 @@ class Torture:
         if self.shared.failures:
             raise self.shared.failures[0]
 
+    def counts(self) -> str:
+        """What was done and seen, in a line."""
+        acknowledged = sum(writer.acknowledged for writer in self.writers)
+        kinds = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in sorted(self.faults.items()))
+        return (
+            f"faults: {kinds}; batches acknowledged: {acknowledged}, lost: 0, doubled: 0; "
+            f"reads: {sum(reader.reads for reader in self.readers)}, revisions back: 0; "
+            f"watch events after a resume: {sum(watcher.resumed for watcher in self.watchers)}; "
+            f"calls left: {sum(leaver.left for leaver in self.leavers)}"
+        )
+
+    def rounds(self, kinds: Sequence[str], faults: int) -> None:
+        """That many rounds, of each kind in turn, and the end."""
+        try:
+            for i in range(faults):
+                self.round(kinds[i % len(kinds)])
+                print(f"\r{i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
+        finally:
+            self.finish()
+
     def finish(self) -> None:
         self.shared.over.set()
         self.shared.gate.set()
@@ -385,52 +407,54 @@ class Torture:
 
 def torture(folder: Path, faults: int, seed: int, writers: int = 2, *, workers: bool = False) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
-    run = Torture(folder, seed, writers, WORKERS if workers else ())
     clock_back = "clock_back" if shutil.which("faketime") else "kill"
     kinds = ["kill", clock_back, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "kill", "sever"]
     if workers:
         kinds = ["kill_worker", "kill_gateway", "restart", "kill_worker", "pause_worker", "full_disk", "sever", "kill"]
-    try:
-        for i in range(faults):
-            run.round(kinds[i % len(kinds)])
-            print(f"\r{i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
-    finally:
-        run.finish()
-    acknowledged = sum(writer.acknowledged for writer in run.writers)
-    kinds_seen = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in sorted(run.faults.items()))
-    return (
-        f"faults: {kinds_seen}; batches acknowledged: {acknowledged}, lost: 0, doubled: 0; "
-        f"reads: {sum(reader.reads for reader in run.readers)}, revisions back: 0; "
-        f"watch events after a resume: {sum(watcher.resumed for watcher in run.watchers)}; "
-        f"calls left: {sum(leaver.left for leaver in run.leavers)}; "
+    run = Torture(folder, seed, writers, WORKERS if workers else ())
+    run.rounds(kinds, faults)
+    damage = (
         f"with a bit changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
     )
+    return f"{run.counts()}; {damage}"
 
 
-def in_namespace(arguments: list[str]) -> list[str]:
-    """The command that runs this file where it can mount a small disk of its own."""
-    unshare = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--mount", "--map-root-user"]
-    return [*unshare, sys.executable, __file__, "--mounted", *arguments]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Kill, pause, cut off and starve a server while a model watches.")
+def arguments(description: str) -> argparse.ArgumentParser:
+    """The command line of a torture."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--faults", type=int, default=50, help="how many (default 50)")
     parser.add_argument("--seed", type=int, default=0, help="what the faults and the batches depend on (default 0)")
-    parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
     parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if not options.mounted:
-        sys.exit(subprocess.run(in_namespace(sys.argv[1:]), check=False).returncode)
+    return parser
+
+
+def on_small_disk(file: str, size: str, work: Callable[[Path], str], *, mounted: bool) -> None:
+    """Print what some work on a small disk of its own returns; unless `mounted`, by another run of the file."""
+    if not mounted:
+        unshare = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--mount", "--map-root-user"]
+        command = [*unshare, sys.executable, file, "--mounted", *sys.argv[1:]]
+        sys.exit(subprocess.run(command, check=False).returncode)
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "none", folder], check=True)
+        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", folder], check=True)
         try:
-            print("\n" + torture(Path(folder), options.faults, options.seed, workers=options.workers))
+            print("\n" + work(Path(folder)))
         except BaseException:
             print((Path(folder) / "server.log").read_text(), file=sys.stderr)
             raise
         finally:
             subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+def main() -> None:
+    parser = arguments("Kill, pause, cut off and starve a server while a model watches.")
+    parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
+    options = parser.parse_args()
+    on_small_disk(
+        __file__,
+        DISK,
+        lambda folder: torture(folder, options.faults, options.seed, workers=options.workers),
+        mounted=options.mounted,
+    )
 
 
 if __name__ == "__main__":

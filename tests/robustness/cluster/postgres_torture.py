@@ -1,0 +1,160 @@
+"""Torture of a real server on a real PostgreSQL: each of them, and what is between them, fails in turn.
+
+    python tests/robustness/cluster/postgres_torture.py --faults 100
+
+The clients and the models are those of tests/robustness/server/torture.py, and so are the promises. The faults:
+
+* the server is killed, and started again; or another one takes over
+* the server is stopped until another one has taken over, and then goes on: it must end, and tell its callers
+* PostgreSQL ends the connections of the server; is killed and started again; is stopped for a while; has no room
+* the network between the two is cut; or passes nothing on for a while
+"""
+
+import os
+import signal
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from psycopg.conninfo import conninfo_to_dict, make_conninfo
+
+sys.path.append(str(Path(__file__).parents[1] / "server"))
+sys.path.append(str(Path(__file__).parents[2] / "support"))
+import torture
+from cluster import descendants
+from patience import PATIENCE, wait_until
+from postgresql import FAST, PostgreSQL, query
+from promises import require
+from proxy import Proxy
+
+DISK = "256m"
+# So that a disk of that size can be full, and yet have room for the log.
+SMALL = (*FAST, "max_wal_size=64MB", "min_wal_size=32MB")
+ENDED = 70  # the exit code of a server that cannot go on
+
+
+class Torture(torture.Torture):
+    """A server on PostgreSQL, which it reaches through a proxy."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        folder.chmod(0o777)
+        home = folder / "pg"
+        home.mkdir()
+        self._database = PostgreSQL(home, SMALL)
+        self._database.start()
+        self._url = self._database.new_database()
+        self._wire = Proxy(self._socket())
+        host, _, port = self._wire.address.partition(":")
+        given = conninfo_to_dict(self._url)
+        self._journal = make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
+        super().__init__(folder, seed, 2, journal=self._journal)
+
+    def _socket(self) -> str:
+        return f"{conninfo_to_dict(self._url)['host']}/.s.PGSQL.5432"
+
+    def _take_over(self) -> torture.Server:
+        """Start another server, and send new calls there; returns the one before it."""
+        before = self.server
+        self.server = torture.Server(self._folder, journal=self._journal)
+        self._start()
+        self._proxy.server = self.server.address
+        return before
+
+    def _replace(self) -> None:
+        """A kill, and another server."""
+        self.shared.gate.clear()
+        self.server.kill()
+        self._proxy.cut()
+        self._take_over()
+
+    def _zombie(self) -> None:
+        """A server that is stopped until another one has taken over. Calls that it has keep waiting for it."""
+        self.server.process.send_signal(signal.SIGSTOP)
+        try:
+            before = self._take_over()
+            time.sleep(self._random.uniform(0.1, 1.0))
+        finally:
+            before.process.send_signal(signal.SIGCONT)
+        require(before.process.wait(PATIENCE) == ENDED, f"a server that was replaced: {before.said()}")
+        require("taken over partition 0" in before.said(), before.said())
+
+    def _terminate(self) -> None:
+        """PostgreSQL ends all connections of the server."""
+        query(
+            self._url,
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE starts_with(application_name, 'dynhull')",
+        )
+
+    def _crash(self) -> None:
+        """The first process of PostgreSQL is killed, and it starts again when the others have ended, too."""
+        _, *others = self._processes()
+        self._database.kill()
+        wait_until(lambda: not any(Path(f"/proc/{each}").exists() for each in others))
+        self._database.start()
+
+    def _freeze(self) -> None:
+        """PostgreSQL stands still."""
+        stopped = self._processes()
+        for each in stopped:
+            with suppress(ProcessLookupError):
+                os.kill(each, signal.SIGSTOP)
+        time.sleep(self._random.uniform(0.2, 6.0))
+        for each in stopped:
+            with suppress(ProcessLookupError):
+                os.kill(each, signal.SIGCONT)
+
+    def _cut(self) -> None:
+        """The connections to PostgreSQL are lost, and for a while there are no others."""
+        self._wire.server = ""
+        self._wire.cut()
+        time.sleep(self._random.uniform(0, 6.0))
+        self._wire.server = self._socket()
+
+    def _hold(self) -> None:
+        """Nothing arrives, in either direction; then it does, or the connections are lost."""
+        self._wire.flowing.clear()
+        time.sleep(self._random.uniform(0.2, 6.0))
+        if self._random.random() < 0.5:
+            self._wire.cut()
+        self._wire.flowing.set()
+
+    def _full_disk(self) -> None:
+        """The disk of PostgreSQL is full, which ends it if its log has no room; then there is room again."""
+        ballast = self._folder / "ballast"
+        with suppress(OSError), ballast.open("wb") as file:
+            while True:
+                file.write(bytes(2**16))
+        time.sleep(self._random.uniform(0.5, 3.0))
+        ballast.unlink()
+        if not self._database.runs():
+            self._database.start()
+
+    def _processes(self) -> list[int]:
+        first = self._database.process.pid
+        return [first, *descendants(first)]
+
+    def finish(self) -> None:
+        super().finish()
+        self._wire.close()
+        self._database.stop()
+
+
+def run(folder: Path, faults: int, seed: int) -> str:
+    """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
+    kinds = ["zombie", "crash", "terminate", "cut", "kill", "hold", "replace", "freeze", "terminate", "full_disk"]
+    tortured = Torture(folder, seed)
+    tortured.rounds(kinds, faults)
+    return tortured.counts()
+
+
+def main() -> None:
+    description = "Kill, stop and cut off a server and its PostgreSQL while a model watches."
+    options = torture.arguments(description).parse_args()
+    torture.on_small_disk(
+        __file__, DISK, lambda folder: run(folder, options.faults, options.seed), mounted=options.mounted
+    )
+
+
+if __name__ == "__main__":
+    main()
