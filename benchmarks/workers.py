@@ -4,8 +4,9 @@ Server and clients share the cores; the shapes take turns, and the figures are m
 nghttp2-client) makes unary calls of Locate, of one point, over 16 connections: the system deals connections to gateways
 at random, so four of them would often all be at one. The limit is that of handlers that do nothing, in one and in two
 processes. The processor time of a call or a message is that of all processes of a server, then those of its workers and
-gateways. Large batches are a stream of messages of 10,000 points each, inserted and deleted. A restart is the time
-from the kill of a worker with a million points to its next answer.
+gateways. Large batches are a stream of messages of 10,000 points each, inserted and deleted; once in memory, and once
+stored, in a folder or in a PostgreSQL server of its own on the same disk, both with the durability of the default. A
+restart is the time from the kill of a worker with a million points, in either of them, to its next answer.
 """
 
 import argparse
@@ -28,6 +29,7 @@ from server import CYCLE, DYNHULL, EMPTY, cycle, stream
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
 from cluster import processes
+from postgresql import postgresql
 from processor import processor_time
 
 SHAPES = {
@@ -36,6 +38,10 @@ SHAPES = {
     "1 worker, 2 gateways": ["--workers", "1", "--gateways", "2"],
     "2 workers, 2 gateways": ["--workers", "2", "--gateways", "2"],
 }
+WORKS = ["small", "large", "stored", "restart"]
+STORED = ["-m", "dynhull_server", "--port", "0", "--scrub-cpu", "0", "--log-level", "error"]
+# PostgreSQL as it is, with its syncs, but for room for the log between two checkpoints.
+DURABLE = ("max_wal_size=4GB", "shared_buffers=128MB")
 CONNECTIONS = 16
 LARGE = 10_000
 MILLION = 1_000_000
@@ -51,21 +57,20 @@ def serving(command):
             process.terminate()
 
 
-def restart():
-    """Seconds from the kill of a worker with a million points, in a folder, to its next answer."""
-    with tempfile.TemporaryDirectory() as data:
-        command = ["-m", "dynhull_server", "--port", "0", "--data", data, "--log-level", "error"]
-        with serving([*command, "--workers", "1"]) as (address, supervisor), HullClient(address) as client:
-            client.create_hull("a")
-            client.apply("a", insert=np.random.default_rng(1).normal(size=(MILLION, 2)))
-            os.kill(processes(supervisor)["worker-0"], signal.SIGKILL)
-            begun = time.perf_counter()
-            while True:
-                try:
-                    assert client.get_hull("a").info.points == MILLION
-                    return time.perf_counter() - begun
-                except UnavailableError:
-                    time.sleep(0.01)
+def restart(place):
+    """Seconds from the kill of a worker with a million points, stored in some place, to its next answer."""
+    command = [*STORED, *place, "--workers", "1"]
+    with serving(command) as (address, supervisor), HullClient(address) as client:
+        client.create_hull("a")
+        client.apply("a", insert=np.random.default_rng(1).normal(size=(MILLION, 2)))
+        os.kill(processes(supervisor)["worker-0"], signal.SIGKILL)
+        begun = time.perf_counter()
+        while True:
+            try:
+                assert client.get_hull("a").info.points == MILLION
+                return time.perf_counter() - begun
+            except UnavailableError:
+                time.sleep(0.01)
 
 
 def turns(repeat, works):
@@ -137,10 +142,28 @@ def small(repeat, calls):
 
 
 def large(repeat):
-    """Messages of many points a second."""
+    """Messages of many points a second, in memory."""
+    yield from streamed(repeat, {name: [*DYNHULL, *shape] for name, shape in SHAPES.items()})
+
+
+def stored(repeat):
+    """The same, stored."""
+    few = {name: SHAPES[name] for name in ("one process", "1 worker, 1 gateway")}
+    with ExitStack() as stack:
+        database = stack.enter_context(postgresql(*DURABLE))
+        commands = {}
+        for name, shape in few.items():
+            folder = stack.enter_context(tempfile.TemporaryDirectory())
+            commands[name] = [*STORED, "--data", folder, *shape]
+            commands[f"{name}, PostgreSQL"] = [*STORED, "--journal", database.new_database(), *shape]
+        yield from streamed(repeat, commands)
+
+
+def streamed(repeat, commands):
+    """Messages of many points a second to servers, the first of which is what the others are compared with."""
     messages = cycle("large", LARGE)
     with ExitStack() as stack:
-        servers = {name: stack.enter_context(serving([*DYNHULL, *shape])) for name, shape in SHAPES.items()}
+        servers = {name: stack.enter_context(serving(command)) for name, command in commands.items()}
         for address, _ in servers.values():
             with HullClient(address) as client:
                 client.create_hull("large")
@@ -159,11 +182,23 @@ def large(repeat):
 
 
 def restarts(repeat):
-    yield "restart of a worker with a million points", [restart() for _ in range(repeat)], "s"
+    times = {"a folder": [], "PostgreSQL": []}
+    with postgresql(*DURABLE) as database:
+        for _ in range(repeat):
+            with tempfile.TemporaryDirectory() as folder:
+                times["a folder"].append(restart(["--data", folder]))
+            times["PostgreSQL"].append(restart(["--journal", database.new_database()]))
+    for place, seconds in times.items():
+        yield f"restart of a worker, a million points in {place}", seconds, "s"
 
 
 def rounds(repeat, calls, works):
-    kinds = {"small": lambda: small(repeat, calls), "large": lambda: large(repeat), "restart": lambda: restarts(3)}
+    kinds = {
+        "small": lambda: small(repeat, calls),
+        "large": lambda: large(repeat),
+        "stored": lambda: stored(repeat),
+        "restart": lambda: restarts(3),
+    }
     for name in works:
         yield from kinds[name]()
 
@@ -172,9 +207,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--calls", type=int, default=10_000, help="of h2load in a round")
-    parser.add_argument(
-        "--works", nargs="+", choices=["small", "large", "restart"], default=["small", "large", "restart"]
-    )
+    parser.add_argument("--works", nargs="+", choices=WORKS, default=WORKS)
     arguments = parser.parse_args()
     for name, values, unit in rounds(arguments.repeat, arguments.calls, arguments.works):
         print(f"{name:50}{median(values):10,.2f} {unit}   ({min(values):,.2f} to {max(values):,.2f})", flush=True)

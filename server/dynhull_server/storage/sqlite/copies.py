@@ -2,24 +2,24 @@
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...state.records import HullRow, Kept
-from ..port import NEWEST, DamagedError, Progress, StorageError
+from ..port import NEWEST, DamagedError, FormatError, LockedError, Progress, StorageError
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
 from ..rows.reading import read_hull
-from ..rows.tables import FORMAT, UnreadableError
+from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
 from .disk import Access, Disk
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
-from .migration import migrate
+from .migration import make_tables, migrate
 from .readers import SQLiteReader
-from .schema import renew_totals
+from .schema import PAGE_BYTES, renew_totals, sql_of
 
 PAGES_A_STEP = 256
 
@@ -90,28 +90,56 @@ def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = 
         StorageError: the source has no database, or the target is not empty.
         DamagedError: the copied data is damaged.
     """
-    with _opened(source, accept_loss=accept_loss) as opened:
-        made = _claim(target)
-        unfinished = target / UNFINISHED
-        try:
-            with closing(sqlite3.connect(unfinished, isolation_level=None)) as connection:
-                opened.connection.backup(
-                    connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
-                )
-                report = _finish(connection, opened)
-            _make_durable(unfinished)
-        except BaseException as error:
-            for file in target.glob(f"{UNFINISHED}*"):
-                file.unlink()
-            if made:
-                target.rmdir()
-            if isinstance(error, sqlite3.Error):
-                raise StorageError(f"{source} cannot be copied to {target}: {error}") from error
-            raise
-        unfinished.rename(target / DATABASE)
-        _make_durable(target)
-        _make_durable(target.absolute().parent)
-    return report
+    with _opened(source, accept_loss=accept_loss) as opened, _new(source, target) as connection:
+        opened.connection.backup(
+            connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
+        )
+        return _finish(connection, opened)
+
+
+@contextmanager
+def reading(path: Path, progress: Progress) -> Iterator[tuple[SQLiteReader, Findings]]:
+    """The rows of a folder, and what an examination finds; no server can use the folder before the end of the block.
+
+    Raises:
+        StorageError: a server uses it, or it has an older format.
+        DamagedError: it cannot be served.
+    """
+    with _opened(path, unused=True) as opened:
+        if opened.version != FORMAT:
+            raise FormatError(
+                f"{path} has format {opened.version}: copy it with `dynhull restore {path} --data NEW`, which migrates "
+                "the copy"
+            )
+        findings = examine(opened.connection, opened.version, opened.own, progress)
+        if findings.fatal:
+            raise DamagedError(f"{path}: {'; '.join(findings.fatal)}: restore a backup")
+        findings.notes[:0] = opened.notes
+        yield SQLiteReader(opened.connection), findings
+
+
+def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> Findings:
+    """Make a folder with the rows of a source, as a whole or not at all. Returns what an examination finds.
+
+    Raises:
+        StorageError: the target is not empty.
+        DamagedError: the rows do not agree with the totals.
+    """
+    with _new(source, target) as connection:
+        connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+        connection.execute("PRAGMA synchronous = OFF")  # it is made durable before it gets its name
+        connection.execute("BEGIN IMMEDIATE")
+        make_tables(connection)
+        for row in rows:
+            for sql, values in sql_of(row):
+                connection.execute(sql, values)
+        renew_totals(connection, totals._replace(mode=STOPPED))
+        findings = examine(connection, FORMAT, None, lambda *_: None)
+        if findings.fatal:
+            raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
+        connection.execute("COMMIT")
+        connection.execute("PRAGMA journal_mode = WAL")
+    return findings
 
 
 def read(path: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
@@ -152,6 +180,28 @@ class _Opened:
     own: Totals | None
 
 
+@contextmanager
+def _new(source: object, target: Path) -> Iterator[sqlite3.Connection]:
+    """A database that the block fills: with its end, and not before, it is on the disk under its final name."""
+    made = _claim(target)
+    unfinished = target / UNFINISHED
+    try:
+        with closing(sqlite3.connect(unfinished, isolation_level=None)) as connection:
+            yield connection
+        _make_durable(unfinished)
+    except BaseException as error:
+        for file in target.glob(f"{UNFINISHED}*"):
+            file.unlink()
+        if made:
+            target.rmdir()
+        if isinstance(error, sqlite3.Error):
+            raise StorageError(f"{source} cannot be copied to {target}: {error}") from error
+        raise
+    unfinished.rename(target / DATABASE)
+    _make_durable(target)
+    _make_durable(target.absolute().parent)
+
+
 def _claim(target: Path) -> bool:
     """Make the folder for a copy; returns whether it is new."""
     if not target.exists():
@@ -176,7 +226,7 @@ def _make_durable(path: Path) -> None:
 
 
 @contextmanager
-def _opened(path: Path, *, accept_loss: bool = False) -> Iterator[_Opened]:
+def _opened(path: Path, *, accept_loss: bool = False, unused: bool = False) -> Iterator[_Opened]:
     folder = Folder(path, Disk())
     with ExitStack() as stack:
         notes: list[str] = []
@@ -189,6 +239,8 @@ def _opened(path: Path, *, accept_loss: bool = False) -> Iterator[_Opened]:
                 if not accept_loss:
                     raise
                 notes = [f"copied without what is lost: {error}"]
+        elif unused:
+            raise LockedError(f"a server uses {path}: stop it first")
         if not folder.disk.size(folder.database):
             raise StorageError(f"{path} is no data folder: it has no {DATABASE}")
         # Without a log, SQLite need not create files to read the database.

@@ -1,0 +1,47 @@
+"""The command `dynhull move`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dynhull_server.addresses import is_database
+from dynhull_server.failure import code_of, fail, text_of
+
+SOURCE_HELP = "A data folder, or the address of a database; no server may be using it."
+TARGET_HELP = "The address of an empty database, or the folder to create."
+
+
+def move(
+    source: Annotated[str, typer.Argument(metavar="FROM", help=SOURCE_HELP)],
+    target: Annotated[str, typer.Argument(metavar="TO", help=TARGET_HELP)],
+) -> None:
+    """Copy a data folder into a PostgreSQL database, or a database into a folder.
+
+    Everything is examined before and after, and the copy is there as a whole or not at all. FROM is not changed. Do not
+    serve both: what one of them has is not in the other.
+
+        dynhull move dynhull-data postgresql://dynhull@localhost/hulls
+        dynhull serve --journal postgresql://dynhull@localhost/hulls
+    """
+    to_database = is_database(Path(target))
+    if to_database == is_database(Path(source)):
+        fail("one of FROM and TO must be a folder and the other a database, as postgresql://user@host/database")
+
+    from dynhull_server.progress import progress_bar
+    from dynhull_server.storage.port import StorageError
+
+    from .postgres import transfer
+    from .postgres.database import Database
+
+    try:
+        with progress_bar("rows") as progress:
+            if to_database:
+                moved = transfer.to_database(Path(source), Database(target), progress)
+            else:
+                moved = transfer.to_folder(Database(source), Path(target), progress)
+    except (StorageError, OSError, ValueError) as error:
+        fail(text_of(error), code_of(error))
+    for note in moved.notes:
+        typer.echo(note, err=True)
+    typer.echo(f"{moved.target}: {moved.hulls:,} hulls, {moved.fences:,} fences, all as in {moved.source}")
