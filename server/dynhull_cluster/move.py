@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from dynhull_server.addresses import is_database
-from dynhull_server.failure import code_of, fail, text_of
 
 SOURCE_HELP = "A data folder, or the address of a database; no server may be using it."
 TARGET_HELP = "The address of an empty database, or the folder to create."
@@ -26,8 +25,9 @@ def move(
     """
     to_database = is_database(Path(target))
     if to_database == is_database(Path(source)):
-        fail("one of FROM and TO must be a folder and the other a database, as postgresql://user@host/database")
+        raise typer.BadParameter("one of FROM and TO must be a folder, the other one a database: postgresql://…")
 
+    from dynhull_server.failure import code_of, fail, text_of
     from dynhull_server.progress import progress_bar
     from dynhull_server.storage.port import StorageError
 

@@ -60,6 +60,7 @@ def state(client: HullClient, prefix: str = "") -> list[Any]:
     ]
 
 
+@pytest.mark.one_process("its owner is the process that the test starts")
 def test_a_killed_server_its_backup_and_the_next_one_have_the_same(
     url: str, postgres: PostgreSQL, tmp_path: Path
 ) -> None:
@@ -113,6 +114,7 @@ def test_workers_are_killed_and_have_their_partitions_again(url: str) -> None:
         assert [state(client, prefix) for prefix in prefixes] == before
 
 
+@pytest.mark.one_process("a gateway answers for a worker that is away")
 def test_a_database_that_is_away_for_a_while(url: str) -> None:
     given = conninfo_to_dict(url)
     socket = f"{given['host']}/.s.PGSQL.5432"

@@ -137,8 +137,8 @@ def test_a_copy_that_fails_leaves_nothing(folder, url, tmp_path):
 
 
 def test_what_cannot_be_moved_is_said(folder, url, tmp_path):
-    refused(folder, tmp_path / "other", "one of FROM and TO must be a folder and the other a database")
-    refused(url, url, "one of FROM and TO must be a folder and the other a database")
+    refused(folder, tmp_path / "other", "one of FROM and TO must be a folder")
+    refused(url, url, "one of FROM and TO must be a folder")
     refused(url, tmp_path / "copy", "has no tables of dynhull")
     refused(tmp_path / "missing", url, f"{tmp_path / 'missing'} is no data folder")
     old = tmp_path / "old"

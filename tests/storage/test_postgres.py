@@ -1,6 +1,7 @@
 """The storage on PostgreSQL: damage, other servers, lost connections, and databases that it cannot use."""
 
 import threading
+import time
 from contextlib import closing
 
 import pytest
@@ -8,6 +9,7 @@ from folders import append, fill, fill_fence, no_progress, record
 from patience import wait_until
 from postgresql import query
 
+from dynhull_cluster.postgres import ownership
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
 from dynhull_server.state.records import Append, Contents, Kept
@@ -22,8 +24,9 @@ from dynhull_server.storage.port import (
 )
 
 WRITERS = "FROM pg_stat_activity WHERE application_name LIKE 'dynhull writer%%' AND datname = current_database()"
-# Another server has owned the partition, and has ended.
-TAKEN_AND_LEFT = "UPDATE owners SET epoch = epoch + 1, until = clock_timestamp() - interval '1 s', process = ''"
+# Another server has owned the partition, and has ended; or does not renew its lease, whatever clocks say.
+TAKEN_AND_LEFT = "UPDATE owners SET epoch = epoch + 1, until = '-infinity', process = ''"
+TAKEN_AND_SILENT = "UPDATE owners SET epoch = epoch + 1, until = %s, process = ''"
 LAST = 6  # revision of the hull
 
 
@@ -128,6 +131,17 @@ def test_who_is_replaced_commits_nothing_and_hears_of_it(url):
     append(second, LAST + 1, LAST + 1)
     assert second.entitled()
     second.close()
+
+
+@pytest.mark.parametrize("until", ["1970-01-01", "2970-01-01"])
+def test_clocks_of_the_database_do_not_end_a_lease(url, until, monkeypatch):
+    monkeypatch.setattr(ownership, "LEASE", 1.0)
+    query(url, TAKEN_AND_SILENT, until)
+    storage = on(url)
+    begun = time.monotonic()
+    storage.open(no_progress)
+    assert time.monotonic() - begun > 1.0
+    storage.close()
 
 
 def test_a_successor_ends_the_transaction_of_a_server_that_was_stopped(url):

@@ -4,8 +4,10 @@ Taking a partition raises its epoch. Each commit first locks the row of the owne
 a new owner waits for it, and so that nothing is committed under an old epoch. Renewing the lease does not wait for
 commits, nor they for it: the lock is the one of a foreign key.
 
-Reads are answered from memory, and so only within the lease. Clocks of different machines are never compared: the
-database decides when a lease has ended, and the owner counts from before it asked for it, and a margin less.
+Reads are answered from memory, and so only within the lease. No wall clock decides when it ends, and clocks of
+different machines are never compared. The owner counts from before it asked for the lease, and a margin less. A
+successor counts from when it first saw the newest renewal. So the lease has ended for the owner first, if their clocks
+run equally fast.
 """
 
 import logging
@@ -28,7 +30,7 @@ from .database import Connection, Database, as_storage_errors
 
 # Seconds of a lease, between renewals, and by which an owner ends its own lease earlier.
 LEASE, RENEWAL, MARGIN = 5.0, 1.0, 0.5
-# Seconds between looks whether the lease of another server is renewed, or has ended.
+# Seconds between looks whether the lease of another server is renewed.
 LOOK = 0.25
 # Seconds that an owner which was stopped inside of a transaction may hold up the next one.
 LOCK_SECONDS = 1
@@ -45,7 +47,7 @@ class _Owner:
     worker: str
     process: str
     until: str
-    alive: bool
+    free: bool
 
 
 def this_worker() -> str:
@@ -130,15 +132,14 @@ class Ownership:
             StorageError: the database cannot be used.
         """
         seen: str | None = None
-        while True:
-            owner = self._try_to_take()
-            if owner is None:
-                break
-            if seen not in (None, owner.until):
+        since = _now()
+        while owner := self._try_to_take(seen if _now() > since + LEASE else None):
+            if seen is None:
+                seen, since = owner.until, _now()
+            elif owner.until != seen:
                 raise LockedError(
                     f"{self._database} is served by {owner.worker}: stop that server first, or choose another database"
                 )
-            seen = owner.until
             time.sleep(LOOK)
         self._thread = threading.Thread(target=self._keep, name="lease", daemon=True)
         self._thread.start()
@@ -174,7 +175,7 @@ class Ownership:
             if self.epoch:
                 with self._working() as connection:
                     connection.execute(
-                        "UPDATE owners SET until = clock_timestamp(), process = '' WHERE partition = %s AND epoch = %s",
+                        "UPDATE owners SET until = '-infinity', process = '' WHERE partition = %s AND epoch = %s",
                         [self._partition, self.epoch],
                     )
         except StorageError as error:
@@ -192,11 +193,11 @@ class Ownership:
             [1000 * LOCK_SECONDS, writer_name(self._partition, 0)[:-1], until],
         )
 
-    def _try_to_take(self) -> _Owner | None:
-        """Own the partition if it is free; else its owner."""
+    def _try_to_take(self, ended: str | None) -> _Owner | None:
+        """Own the partition if it is free, or the lease is one that has `ended`; else its owner."""
         with self._turn, self._working() as connection:
             owner = self._owner(connection)
-            if owner is not None and owner.alive and not is_known_dead(owner.process):
+            if owner and not owner.free and owner.until != ended and not is_known_dead(owner.process):
                 return owner
             before = _now()
             try:
@@ -212,7 +213,7 @@ class Ownership:
 
     def _owner(self, connection: Connection) -> _Owner | None:
         row = connection.execute(
-            "SELECT epoch, worker, process, until::text, until > clock_timestamp() FROM owners WHERE partition = %s",
+            "SELECT epoch, worker, process, until::text, until = '-infinity' FROM owners WHERE partition = %s",
             [self._partition],
         ).fetchone()
         return None if row is None else _Owner(*row)

@@ -4,6 +4,7 @@ Rows, checksums and totals are the same in both, so the copy is right if an exam
 source: they have the number and the sum of all rows.
 """
 
+import logging
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
@@ -21,6 +22,8 @@ from .ownership import Ownership
 from .reader import PostgresReader
 from .schema import INSERTED_BYTES, hold, partitions_of, prepare, put_totals, queries_of
 from .storage import examined
+
+log = logging.getLogger(__name__)
 
 # Rows that are sent together, at most.
 SENT_ROWS = 4096
@@ -102,23 +105,20 @@ def to_folder(database: Database, folder: Path, progress: Progress) -> Moved:
         partitions = _partitions(connection, database)
         if partitions > 1 and folder.exists() and any(folder.iterdir()):
             raise StorageError(f"{folder} is not empty")
-        lost: list[str] = []
-        for partition in range(partitions):
-            owner = Ownership(database, partition, "", lost.append)
+        owners = [Ownership(database, partition, "", log.error) for partition in range(partitions)]
+        for owner in owners:
             stack.callback(owner.release)
             owner.take()
         connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
-        for partition in range(partitions):
+        for partition, owner in enumerate(owners):
             findings = examined(connection, partition, lambda *_: None)
             if findings.fatal:
                 raise DamagedError(f"{database}: {'; '.join(findings.fatal)}: restore a backup")
             target = folder if partitions == 1 else worker_folder(folder, partition)
-            rows = _rows(PostgresReader(connection, partition), progress)
+            rows = _while_owned(owner, _rows(PostgresReader(connection, partition), progress))
             copy = copies.write(str(database), target, rows, findings.ledger.totals)
             _require_same(findings, copy, str(target))
             moved.add(findings)
-        if lost:
-            raise StorageError(f"{database} was taken over by a server meanwhile: {lost[0]}")
         if partitions > 1:
             write_manifest(folder, partitions, complete=True)  # at the end: without it, the copy is refused
     return moved
@@ -142,6 +142,12 @@ def _rows(reader: Reader, progress: Progress) -> Iterator[Insert]:
             if not done % SENT_ROWS:
                 progress(done, total)
     progress(total, total)
+
+
+def _while_owned(owner: Ownership, rows: Iterator[Insert]) -> Iterator[Insert]:
+    """The rows. Raises TakenOverError at the end if a server has taken over, whose commits the copy would not have."""
+    yield from rows
+    owner.renew()
 
 
 def _together(rows: Iterator[Insert]) -> Iterator[list[Insert]]:
