@@ -1,14 +1,22 @@
-"""The end of a worker: it serves the calls that arrive as frames, by the handlers that gRPC has."""
+"""The end of a worker: it serves the calls that arrive as frames, by the handlers that gRPC has.
+
+Of calls that arrive together, neighbours that ask the same about other points are a run, which is answered at once: a
+busy worker finds more of them, and so has less to do for each.
+"""
 
 import asyncio
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Mapping, Sequence
+from functools import cache, partial
+from itertools import islice, takewhile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import grpc
 from google.rpc import code_pb2
 from google.rpc.status_pb2 import Status
+
+from dynhull_server.rpc.methods import RunHandler
+from dynhull_server.rpc.runs import Run, run_of_requests
 
 from .callers import KEY, OWNER
 from .frames import Frames, Kind, unpack_request
@@ -22,10 +30,12 @@ class FrameServer:
 
     Args:
         handlers: the handlers of all methods.
+        runs: those of runs of calls, by the paths of their methods.
     """
 
-    def __init__(self, handlers: Sequence[grpc.GenericRpcHandler]) -> None:
+    def __init__(self, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler]) -> None:
         self._handlers = handlers
+        self._runs = {path.encode(): handler for path, handler in runs.items()}
         self._handler = cache(self._find)
         self._open: set[_Connection] = set()
 
@@ -40,7 +50,7 @@ class FrameServer:
             each.close()
 
     def _connect(self) -> "_Connection":
-        return _Connection(self._handler, self._open)
+        return _Connection(self._handler, self._runs, self._open)
 
     def _find(self, method: bytes) -> Any:
         details = _Details(method.decode(), ())
@@ -54,12 +64,22 @@ class _Details(grpc.HandlerCallDetails):
         self.invocation_metadata = metadata
 
 
+class _Request(NamedTuple):
+    number: int
+    method: bytes
+    caller: bytes
+    message: bytes
+
+
 class _Connection(Frames):
-    def __init__(self, handler: Any, among: "set[_Connection]") -> None:
+    def __init__(self, handler: Any, runs: Mapping[bytes, RunHandler], among: "set[_Connection]") -> None:
         super().__init__()
         self._handler = handler
+        self._runs = runs
         self._among = among
+        self._arrived: list[_Request] = []
         self._running: dict[int, asyncio.Task[None]] = {}
+        self._running_runs: set[asyncio.Task[None]] = set()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
@@ -69,7 +89,7 @@ class _Connection(Frames):
         """The gateway has ended: so have its callers."""
         super().connection_lost(error)
         self._among.discard(self)
-        for task in self._running.values():
+        for task in (*self._running.values(), *self._running_runs):
             task.cancel()
 
     def pause_writing(self) -> None:
@@ -82,27 +102,83 @@ class _Connection(Frames):
             self._transport.resume_reading()
 
     def received(self, number: int, kind: Kind, rest: bytes) -> None:
-        if kind is Kind.CANCEL:
-            if number in self._running:
-                self._running[number].cancel()
-            return
-        method, caller, message = unpack_request(rest)
-        task = self._loop.create_task(self._serve(number, self._handler(method), caller, message))
-        self._running[number] = task
-        task.add_done_callback(lambda task: self._ended(number, task))
+        if kind is Kind.REQUEST:
+            self._arrived.append(_Request(number, *unpack_request(rest)))
+        elif number in self._running:
+            self._running[number].cancel()
+        else:  # it has been answered, or has just arrived
+            self._arrived = [each for each in self._arrived if each.number != number]
 
-    async def _serve(self, number: int, handler: Any, caller: bytes, message: bytes) -> None:
-        context = FrameContext(handler.request_deserializer(message), caller)
+    def data_received(self, data: bytes) -> None:
+        """Serve what has arrived."""
+        super().data_received(data)
+        arrived, self._arrived = self._arrived, []
+        index = 0
+        while index < len(arrived):
+            run = self._run_of(arrived, index)
+            if run is None:
+                self._begin(arrived[index])
+                index += 1
+            else:
+                self._begin_run(run, arrived[index : index + run.length])
+                index += run.length
+
+    def _run_of(self, arrived: list[_Request], index: int) -> Run | None:
+        """The run that begins with a request; none that waits for a revision, because each may be cancelled."""
+        first = arrived[index]
+        handler = self._runs.get(first.method)
+        if handler is None or index + 1 == len(arrived) or not _alike(first, arrived[index + 1]):
+            return None
+        alike = takewhile(partial(_alike, first), islice(arrived, index, None))
+        run = run_of_requests(handler.kind, first.message, (each.message for each in alike))
+        return None if run is None or run.request.min_revision else run
+
+    def _begin(self, request: _Request) -> None:
+        task = self._loop.create_task(self._serve(request))
+        self._running[request.number] = task
+        task.add_done_callback(lambda task: self._ended(request.number, task))
+
+    async def _serve(self, request: _Request) -> None:
+        handler = self._handler(request.method)
+        context = FrameContext(handler.request_deserializer(request.message), request.caller)
         answer = await handler.stream_unary(None, context)
         if context.status is None:
-            self.send(number, Kind.ANSWER, answer)
+            self.send(request.number, Kind.ANSWER, answer)
         else:
-            self.send(number, Kind.REFUSAL, context.status.SerializeToString())
+            self.send(request.number, Kind.REFUSAL, context.status.SerializeToString())
 
     def _ended(self, number: int, task: "asyncio.Task[None]") -> None:
         del self._running[number]
         if task.cancelled() or task.exception() is not None:
             self.send(number, Kind.REFUSAL, ENDED.SerializeToString())
+
+    def _begin_run(self, run: Run, requests: list[_Request]) -> None:
+        task = self._loop.create_task(self._serve_run(run, requests))
+        self._running_runs.add(task)
+        task.add_done_callback(lambda task: self._ended_run(requests, task))
+
+    async def _serve_run(self, run: Run, requests: list[_Request]) -> None:
+        context = FrameContext((run, run.request.ByteSize()), requests[0].caller)
+        answers = await self._runs[requests[0].method].handle(None, context)
+        if context.status is not None:  # one of them may be at fault, or all
+            for each in requests:
+                self._begin(each)
+            return
+        for request, answer in zip(requests, answers, strict=True):
+            self.send(request.number, Kind.ANSWER, answer)
+
+    def _ended_run(self, requests: list[_Request], task: "asyncio.Task[None]") -> None:
+        self._running_runs.discard(task)
+        if task.cancelled() or task.exception() is not None:
+            for each in requests:
+                self.send(each.number, Kind.REFUSAL, ENDED.SerializeToString())
+
+
+def _alike(request: _Request, other: _Request) -> bool:
+    """Whether two requests may be of one run."""
+    return (
+        request.method == other.method and request.caller == other.caller and len(request.message) == len(other.message)
+    )
 
 
 class FrameContext:

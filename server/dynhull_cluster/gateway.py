@@ -103,7 +103,7 @@ class Gateway:
             UnknownMethods(self._calls),
         )
         self._server.add_generic_rpc_handlers(handlers)
-        self.address = await self._entrance.listen(self._server, handlers)
+        self.address = await self._entrance.listen(self._server, handlers, {})
         self.registry.register(CallCollector(self._metrics, asyncio.get_running_loop()))
         self._health.set(NOT_SERVING, WHOLE, *SERVICES, SCRUB)
         self._calls.ready()

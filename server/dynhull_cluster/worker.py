@@ -1,12 +1,13 @@
 """A worker: the server of one process, reached through private sockets, on its own part of the data."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import grpc
 
 from dynhull_server.app import Server
 from dynhull_server.rpc.access import Caller, TokenFile
 from dynhull_server.rpc.calls import Context
+from dynhull_server.rpc.methods import RunHandler
 from dynhull_server.settings import Settings
 from dynhull_server.storage.worker_folders import worker_folder
 
@@ -47,11 +48,13 @@ class PrivateEntrance:
         """Callers are who a gateway says they are."""
         return authenticator(tokens)
 
-    async def listen(self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler]) -> str:
+    async def listen(
+        self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler]
+    ) -> str:
         """Listen on both sockets."""
         address = f"unix:{self._sockets.grpc(self._number)}"
         server.add_insecure_port(address)
-        self._frames = FrameServer(handlers)
+        self._frames = FrameServer(handlers, runs)
         await self._frames.listen(self._sockets.frames(self._number))
         return address
 

@@ -34,6 +34,7 @@ from .rpc.methods import (
     health_handlers,
     hull_handlers,
     reflection_handlers,
+    run_handlers,
 )
 from .rpc.metrics import Metrics, StateCollector
 from .rpc.metrics_page import MetricsPage
@@ -151,7 +152,8 @@ class Server:
             UnknownMethods(self._calls),
         )
         self._server.add_generic_rpc_handlers(handlers)
-        self.address = await self._entrance.listen(self._server, handlers)
+        runs = run_handlers(service, self._calls)
+        self.address = await self._entrance.listen(self._server, handlers, runs)
         self._serve_metrics()
         self._health.set(NOT_SERVING, "", *SERVICES)
         await self._server.start()

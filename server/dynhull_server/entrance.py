@@ -2,7 +2,7 @@
 
 import math
 import ssl
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import grpc
@@ -11,6 +11,7 @@ from .certificates import server_context
 from .listening import why_not
 from .rpc.access import ANONYMOUS, Caller, TokenFile
 from .rpc.calls import Context
+from .rpc.methods import RunHandler
 from .settings import Settings
 
 # Milliseconds between pings on an idle connection, and until a connection that does not answer them is closed.
@@ -30,8 +31,15 @@ class Entrance(Protocol):
     def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
         """What returns the caller of a call, or raises UnauthenticatedError."""
 
-    async def listen(self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler]) -> str:
+    async def listen(
+        self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler]
+    ) -> str:
         """Listen, before `server` is started. Returns the address.
+
+        Args:
+            server: the server.
+            handlers: the handlers of all methods.
+            runs: those of runs of calls, by the paths of their methods.
 
         Raises:
             OSError: it cannot listen there.
@@ -61,7 +69,7 @@ class PublicEntrance:
         """Callers are known by their tokens, or without tokens by their addresses."""
         return _anonymous if tokens is None else _bearer(tokens)
 
-    async def listen(self, server: grpc.aio.Server, _: Sequence[grpc.GenericRpcHandler]) -> str:
+    async def listen(self, server: grpc.aio.Server, _handlers: object, _runs: object) -> str:
         """Listen on the host and the port."""
         settings = self._settings
         address = f"{settings.host}:{settings.port}"

@@ -20,13 +20,13 @@ class CallCounts:
         self._ended: Counter[tuple[str, str]] = Counter()
         self._took: dict[str, Durations] = {}
 
-    def ended(self, method: str, code: str, seconds: float) -> None:
-        """Count a completed call."""
-        self._ended[method, code] += 1
+    def ended(self, method: str, code: str, seconds: float, calls: int = 1) -> None:
+        """Count completed calls, each of this duration."""
+        self._ended[method, code] += calls
         took = self._took.get(method)
         if took is None:
             took = self._took[method] = Durations(self._bounds)
-        took.add(seconds)
+        took.add(seconds, calls)
 
     def families(self) -> list[Metric]:
         """The metrics for Prometheus."""

@@ -44,6 +44,7 @@ class Call:
         access: the permissions of the call.
         batches: the number of batches the call has applied; None for calls that do not stream batches.
         message_bytes: the size of the last message received.
+        counted: the number of calls that it is counted as.
         ending: the error that ends it, or None.
         waiting: its tasks that `end` may cancel.
     """
@@ -56,6 +57,7 @@ class Call:
         "access",
         "batches",
         "caller",
+        "counted",
         "ending",
         "message_bytes",
         "waiting",
@@ -67,6 +69,7 @@ class Call:
         self.access = Rights(caller.access)
         self.batches: int | None = None
         self.message_bytes = 0
+        self.counted = 1
         self.ending: Exception | None = None
         self.waiting: set[asyncio.Task[Any]] = set()
         self._calls = calls
@@ -297,7 +300,7 @@ class Calls:
             finally:
                 if call is not None:
                     open_calls.discard(call)
-                ended(method, code, time.perf_counter() - begun)
+                ended(method, code, time.perf_counter() - begun, 1 if call is None else call.counted)
 
         return handle
 

@@ -23,10 +23,10 @@ class Durations:
         self._counts = [0] * (len(bounds) + 1)
         self.seconds = 0.0
 
-    def add(self, seconds: float) -> None:
-        """Count a duration."""
-        self._counts[bisect_left(self._bounds, seconds)] += 1
-        self.seconds += seconds
+    def add(self, seconds: float, times: int = 1) -> None:
+        """Count a duration, or several equal ones."""
+        self._counts[bisect_left(self._bounds, seconds)] += times
+        self.seconds += seconds * times
 
     def buckets(self) -> list[tuple[str, float]]:
         """Each bound, as Prometheus writes it, and the number of durations up to it."""

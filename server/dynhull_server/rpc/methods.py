@@ -6,7 +6,7 @@ the handler, so callers without permission could fill the memory.
 
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import aclosing
-from typing import Any
+from typing import Any, NamedTuple
 
 import grpc
 from google.protobuf.descriptor import MethodDescriptor, ServiceDescriptor
@@ -22,6 +22,8 @@ from .calls import Call, Calls, Context, Received, Work
 from .fence_service import FenceService
 from .health import MAX_BYTES, Health
 from .hull_service import HullService
+from .query import METHODS
+from .runs import RUNS, Run
 from .status import MethodUnknownError
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
@@ -52,6 +54,13 @@ UNKNOWN_METHOD = "unknown"
 Behave = Callable[[Any, Call], Awaitable[Any]]
 
 
+class RunHandler(NamedTuple):
+    """What answers runs of calls, and the kind of read that these are."""
+
+    kind: str
+    handle: Callable[[object, Any], Awaitable[Any]]
+
+
 def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
     """The handlers of the hull service."""
     return _own_handlers(DESCRIPTOR, service, calls)
@@ -60,6 +69,20 @@ def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
 def fence_handlers(service: FenceService, calls: Calls) -> grpc.GenericRpcHandler:
     """The handlers of the fence service."""
     return _own_handlers(FENCES, service, calls)
+
+
+def run_handlers(service: HullService, calls: Calls) -> dict[str, RunHandler]:
+    """What answers runs of calls, by the path of their method: for what serves several calls at a time.
+
+    The request is a Run, and the answer has the serialized response to each call. A refused run is not counted: each of
+    its calls has to be answered by itself, because one may be at fault, or all.
+    """
+    found = {}
+    for kind in RUNS:
+        method = METHODS[kind]
+        handle = calls.handler(method, calls.admit, _run(getattr(service, method)))
+        found[f"/{DESCRIPTOR.full_name}/{method}"] = RunHandler(kind, handle)
+    return found
 
 
 def health_handlers(health: Health, calls: Calls) -> grpc.GenericRpcHandler:
@@ -129,6 +152,18 @@ def _handlers(
             request_deserializer=_received(GetMessageClass(method.input_type), max_bytes),
         )
     return grpc.method_handlers_generic_handler(service.full_name, handlers)
+
+
+def _run(behave: Behave) -> Work:
+    async def answer(call: Call) -> list[bytes]:
+        run: Run = await call.receive()
+        call.counted = 0
+        with call.cutoff():
+            response = await behave(run.request, call)
+        call.counted = run.length
+        return run.responses(response)
+
+    return answer
 
 
 def _unary(method: MethodDescriptor, behave: Behave) -> Work:

@@ -4,12 +4,13 @@ Of a message of many small reads, most are like their neighbours: points in one 
 and a row some nanoseconds, so a run of 64 reads is answered in a tenth of the time.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 import numpy as np
+from google.protobuf.message import DecodeError
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
@@ -30,7 +31,7 @@ class Rows:
     """
 
     field: str
-    request: Callable[..., Any]
+    request: Any
     rows: Callable[[Any], bytes]
     answer: Callable[[int, bytes], Any]
 
@@ -73,29 +74,45 @@ class Run:
 
     def answers(self, response: Any) -> bytes:
         """The serialized QueryResponse with the answer to each read."""
+        return b"".join(self._each(response, lambda first: pb.QueryResponse(answers=[{self.kind: first}])))
+
+    def responses(self, response: Any) -> list[bytes]:
+        """The serialized response to each read."""
+        return self._each(response, lambda first: first)
+
+    def _each(self, response: Any, message_of: Callable[[Any], Any]) -> list[bytes]:
         rows = RUNS[self.kind].rows(response)
         size = len(rows) // self.length
-        first = RUNS[self.kind].answer(response.revision, rows[:size])
-        head = _head(pb.QueryResponse(answers=[{self.kind: first}]), rows[:size])
-        return b"".join([head + rows[i : i + size] for i in range(0, len(rows), size)])
+        head = _head(message_of(RUNS[self.kind].answer(response.revision, rows[:size])), rows[:size])
+        return [head + rows[i : i + size] for i in range(0, len(rows), size)]
 
 
 def run_of(kind: str, reads: Sequence[pb.Read], first: int) -> Run | None:
     """The run that begins with a read, whose kind is one of RUNS; None if it ends there."""
+    serialized = (read.SerializeToString() for read in islice(reads, first, None))
+    return _run_of(kind, getattr(reads[first], kind), serialized, lambda request: pb.Read(**{kind: request}))
+
+
+def run_of_requests(kind: str, first: bytes, requests: Iterable[bytes]) -> Run | None:
+    """The run that serialized requests begin with, all of one of RUNS and `first` among them; None if it ends there."""
+    try:
+        example = RUNS[kind].request.FromString(first)
+    except DecodeError:
+        return None
+    return _run_of(kind, example, requests, lambda request: request)
+
+
+def _run_of(kind: str, first: Any, serialized: Iterable[bytes], message_of: Callable[[Any], Any]) -> Run | None:
     like = RUNS[kind]
-    example = getattr(reads[first], kind)
-    rows = getattr(example, like.field).packed
+    rows = getattr(first, like.field).packed
     if not rows or len(rows) % BYTES_PER_ROW:
         return None
     # Messages are serialized in the order of their fields: those after the rows would be at the end.
-    request = like.request(name=example.name, min_revision=example.min_revision, **{like.field: {"packed": rows}})
-    data = reads[first].SerializeToString()
-    if data != pb.Read(**{kind: request}).SerializeToString():
-        return None
-    head, size = _head(reads[first], rows), len(data)
+    request = like.request(name=first.name, min_revision=first.min_revision, **{like.field: {"packed": rows}})
+    message = message_of(request)
+    head, size = _head(message, rows), message.ByteSize()
     found = []
-    for read in islice(reads, first, first + MOST_ROWS * BYTES_PER_ROW // len(rows)):
-        data = read.SerializeToString()
+    for data in islice(serialized, MOST_ROWS * BYTES_PER_ROW // len(rows)):
         if len(data) != size or not data.startswith(head):
             break
         found.append(data[len(head) :])
