@@ -5,6 +5,7 @@ import json
 import os
 import re
 import subprocess
+from pathlib import Path
 
 import pytest
 import trustme
@@ -351,6 +352,13 @@ def test_a_reader_that_has_enough(hull, served):
     command = f"{COMMAND} query {hull} --address {served} | head -1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert (done.stdout.count("\n"), done.stderr) == (1, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux only")
+def test_a_full_disk_behind_standard_output(hull, served):
+    command = f"{COMMAND} query {hull} --address {served} > /dev/full"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "error: standard output: No space left on device\n")
 
 
 def test_a_reader_of_a_quiet_hull_that_has_enough(hull, served):

@@ -97,6 +97,8 @@ class StandardOutput:
                 await asyncio.to_thread(write_all, self._output, text)
             except BrokenPipeError:
                 raise ReaderGoneError from None
+            except OSError as error:
+                raise NotDeliveredError(f"standard output: {error.strerror}") from None
 
     def place(self, letter: Letter) -> str:  # noqa: ARG002
         """A dash."""

@@ -4,11 +4,13 @@ import asyncio
 import signal
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import structlog
 
+from dynhull_cli.closed_pipe import when_pipe_closes
 from dynhull_client import AsyncHullClient, DeadlineError, FenceNotFoundError, UnavailableError
 
 from .dead_letters import DeadLetter, StateFolder, gone_key
@@ -90,6 +92,8 @@ async def run(
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
+    if to == "-":
+        when_pipe_closes(partial(_stop_from_thread, loop, stop))
     figures = Figures()
     port = {} if metrics is None else {"metrics_port": figures.serve(*metrics)}
     await unless(stop, _require_fences(client, server, wanted))
@@ -136,6 +140,11 @@ async def send_again(letters: Sequence[DeadLetter], target: Target) -> tuple[int
     finally:
         await target.close()
     return sent, None
+
+
+def _stop_from_thread(loop: asyncio.AbstractEventLoop, stop: asyncio.Event) -> None:
+    with suppress(RuntimeError):  # the loop has ended
+        loop.call_soon_threadsafe(stop.set)
 
 
 async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence[str]) -> None:

@@ -9,17 +9,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from .exits import Exit
+
 
 class _Output(io.FileIO):
-    """Standard output; a write to a closed pipe ends the process with exit code 0 and without a message."""
+    """Standard output; a write to a closed pipe ends the process with exit code 0, one to a full disk with an error."""
 
     def write(self, data: Any, /) -> int:
         try:
             return super().write(data) or 0
-        except BrokenPipeError:
+        except OSError as error:
             # Whatever is still buffered goes nowhere, so that it cannot fail again on the way out.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
-            raise SystemExit(0) from None
+            if isinstance(error, BrokenPipeError):
+                raise SystemExit(0) from None
+            sys.stderr.write(f"error: standard output: {error.strerror}\n")
+            raise SystemExit(Exit.UNUSABLE) from None
 
 
 @contextmanager

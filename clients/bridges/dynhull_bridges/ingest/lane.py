@@ -124,10 +124,13 @@ class Lane:
             except _NoNameError as error:
                 await self._refuse_all(error)
             except (SequenceGapError, ProducerInUseError) as error:
+                self._away.ends()
                 log.warning("another ingest of the same log writes to the hull", hull=self._hull, error=str(error))
             except HullNotFoundError:
+                self._away.ends()
                 log.warning("the hull was deleted", hull=self._hull)
             except LimitExceededError as error:
+                self._away.ends()
                 log.warning("a limit of the server is reached, trying again", hull=self._hull, error=str(error))
             except (UnavailableError, DeadlineError) as error:
                 self._away.lasts(error)
