@@ -9,9 +9,10 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from gateway_process import Gateway, gateway_process
+from gateway_process import Events, Gateway, gateway_process
 from peers import missing
 
 EXAMPLES = os.environ.get("FUZZ_EXAMPLES", "1")
@@ -26,15 +27,67 @@ def gateway(address: str) -> Iterator[Gateway]:
         yield running
 
 
+def examples(operation: dict[str, Any]) -> list[Any]:
+    """The examples of the body of an operation."""
+    (content,) = operation["requestBody"]["content"].values()
+    return [each["value"] for each in content["examples"].values()]
+
+
+def calls(described: dict[str, Any], path: str, operation: dict[str, Any]) -> Iterator[tuple[str, Any, str | None]]:
+    """The paths, bodies and media types that the examples of an operation make; those of one name go together."""
+    parameters = [each for each in operation.get("parameters", ()) if each["required"]]
+    fixed = {each["name"]: each["schema"]["examples"][0] for each in parameters if "examples" not in each}
+    path += "&".join(f"?{each['name']}={fixed[each['name']]}" for each in parameters if each["in"] == "query")
+    for kind, content in operation.get("requestBody", {"content": {None: {}}})["content"].items():
+        if "example" in content:
+            yield path.format(**fixed), content["example"].encode(), kind
+        elif "examples" in content:
+            for name, each in content["examples"].items():
+                chosen = {of["name"]: of["examples"][name]["value"] for of in parameters if "examples" in of}
+                yield path.format(**fixed, **chosen), each["value"], kind
+        elif kind is None:
+            yield path.format(**fixed), None, None
+        else:
+            schema = content["schema"]["$ref"].rpartition("/")[2]
+            yield path.format(**fixed), described["components"]["schemas"][schema]["examples"][0], kind
+
+
+def test_every_example_of_the_description_works(gateway: Gateway) -> None:
+    """In the order of the description, and then deletions in the reverse order."""
+    described = gateway.get("/openapi.json").json
+    operations = [(path, method, each) for path, of in described["paths"].items() for method, each in of.items()]
+    made = [each["name"] for each in examples(described["paths"]["/hulls"]["post"])]
+    fences = [each["name"] for each in examples(described["paths"]["/fences"]["post"])]
+    assert made[0] == "fleet"
+    deletions = [each for each in operations if each[1] == "delete"]
+    called = 0
+    try:
+        for path, method, operation in [*(each for each in operations if each[1] != "delete"), *reversed(deletions)]:
+            if path == "/hulls/{name}" and method == "delete":
+                for name in fences[1:]:  # all of which need the hull
+                    gateway.call("DELETE", f"/fences/{name}")
+            for at, body, kind in calls(described, path, operation):
+                if at.endswith("/events"):
+                    events = Events(gateway, f"{at}?after=0" if "fences" in at else at)
+                    assert events.next()
+                    events.close()
+                    continue
+                answer = gateway.call(method.upper(), at, body, kind)
+                assert answer.status in (200, 201, 204), (method, at, body, answer.body)
+                called += 1
+    finally:
+        for name in fences:
+            gateway.call("DELETE", f"/fences/{name}")
+        for name in made:
+            gateway.call("DELETE", f"/hulls/{name}")
+    assert called > len(operations)
+
+
 @pytest.mark.long
 def test_answers_are_as_described(gateway: Gateway, tmp_path: Path) -> None:
-    for name, more in (
-        ("0", {}),
-        ("fleet", {"keyed": "str"}),
-        ("north", {"keyed": "str"}),
-        ("south", {"keyed": "str"}),
-    ):
-        gateway.post("/hulls", {"name": name, "exist_ok": True, **more})
+    described = gateway.get("/openapi.json").json
+    for each in (*examples(described["paths"]["/hulls"]["post"]), {"name": "0"}):
+        gateway.post("/hulls", {**each, "exist_ok": True})
     program = Path(sys.executable).with_name("schemathesis")
     if not program.exists():
         missing("schemathesis", "install the extra test")

@@ -14,6 +14,7 @@ from dynhull_client import AsyncHullClient
 from . import fences, handlers, health, hulls, points, questions, uploads
 from .bodies import JSON, LimitedBodies
 from .events import routes as events
+from .events.documents import FenceEvent, HullChange, HullProgress, HullSnapshot
 from .events.feeds import Feeds
 from .figures import Figures, Measured
 from .gathering import Gatherer
@@ -31,9 +32,16 @@ DESCRIPTION = """Exact convex hulls of points that are inserted, moved and delet
 
 Every error is an `application/problem+json` (RFC 9457) that names the field, the position and the value at fault. A
 token of the server is sent as `Authorization: Bearer`. Numbers are doubles; there is null where a double is infinite or
-not a number. A slash in the name of a hull or a fence is written `%2F` in a path."""
+not a number. A slash in the name of a hull or a fence is written `%2F` in a path. Of a
+name that is given twice in an object of JSON, the last one counts.
+
+The examples work as they are written, each after those that create what it names: hulls first, then points, fences,
+questions."""
 # What the descriptions of routes refer to by name.
-REFERRED: tuple[type[BaseModel], ...] = (Problem, Batch, Feature, FeatureCollection, Item)
+REFERRED: tuple[type[BaseModel], ...] = (
+    *(Problem, Batch, Feature, FeatureCollection, Item),
+    *(HullSnapshot, HullChange, HullProgress, FenceEvent),
+)
 SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
 
 
@@ -57,7 +65,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()
-    routers = [module.router for module in (points, uploads, hulls, questions, fences, events, maps, health)]
+    routers = [module.router for module in (hulls, points, uploads, fences, questions, events, maps, health)]
     for router in routers:
         app.include_router(router)
     app.state.routes = [route for router in routers for route in router.routes]

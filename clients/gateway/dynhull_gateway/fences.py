@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, status
 
 from dynhull_client import Circle, Fence, Polygon, Prefix
 
-from . import schemas
+from . import examples, schemas
 from .bodies import JsonRoute
 from .callers import Caller
 from .pages import page
@@ -27,7 +27,9 @@ async def list_fences(
 
 
 @router.post("/fences", status_code=status.HTTP_201_CREATED)
-async def create_fence(client: Caller, fence: schemas.NewFence) -> schemas.Fence:
+async def create_fence(
+    client: Caller, fence: Annotated[schemas.NewFence, schemas.body(examples.FENCES)]
+) -> schemas.Fence:
     """Create a fence: it compares subjects with an area, and makes an event when one enters or leaves."""
     return _shown(await client.create_fence(**_arguments(fence)))
 
@@ -39,7 +41,9 @@ async def get_fence(client: Caller, name: FencePath) -> schemas.Fence:
 
 
 @router.put("/fences/{name}")
-async def replace_fence(client: Caller, name: FencePath, settings: schemas.FenceSettings) -> schemas.Fence:
+async def replace_fence(
+    client: Caller, name: FencePath, settings: Annotated[schemas.FenceSettings, schemas.body(examples.REPLACED)]
+) -> schemas.Fence:
     """Replace the area and the settings of a fence; the subjects must stay the same."""
     return _shown(await client.replace_fence(name, **_arguments(settings)))
 

@@ -7,12 +7,12 @@ from fastapi import APIRouter, Query, Response, status
 
 from dynhull_client import HeldPosition, Hull, Quarantine
 
-from . import schemas
+from . import examples, schemas
 from .bodies import GEOJSON, JsonRoute
 from .callers import Caller
 from .pages import page
 from .problems import ProblemError
-from .schemas import After, HullPath, Limit, MinRevision, Prefix, ProducerPath
+from .schemas import After, GlobePath, HullPath, Limit, MinRevision, Prefix, ProducerPath
 
 router = APIRouter(tags=["hulls"], route_class=JsonRoute)
 Format = Annotated[Literal["json", "geojson"], Query(description="json, or a GeoJSON Feature.")]
@@ -28,7 +28,9 @@ async def list_hulls(client: Caller, prefix: Prefix = "", after: After = "", lim
 
 
 @router.post("/hulls", status_code=status.HTTP_201_CREATED)
-async def create_hull(client: Caller, hull: schemas.NewHull) -> schemas.HullInfo:
+async def create_hull(
+    client: Caller, hull: Annotated[schemas.NewHull, schemas.body(examples.HULLS)]
+) -> schemas.HullInfo:
     """Create an empty hull."""
     return schemas.HullInfo.model_validate(await client.create_hull(**hull.arguments()))
 
@@ -59,7 +61,9 @@ async def delete_hull(client: Caller, name: HullPath) -> None:
 
 
 @router.post("/hulls/{name}/recenter")
-async def recenter(client: Caller, name: HullPath, to: schemas.Recenter) -> schemas.HullInfo:
+async def recenter(
+    client: Caller, name: GlobePath, to: Annotated[schemas.Recenter, schemas.body(examples.CENTER)]
+) -> schemas.HullInfo:
     """Move the centre of a geographic hull."""
     return schemas.HullInfo.model_validate(
         await client.recenter(name, None if to.center is None else (to.center[0], to.center[1]))

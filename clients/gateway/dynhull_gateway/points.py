@@ -7,11 +7,11 @@ from pydantic import TypeAdapter
 
 from dynhull_client import Batch as ClientBatch
 
-from . import schemas
+from . import examples, schemas
 from .bodies import JSON, JsonRoute, keep, require_type
 from .callers import Caller, client_of, described, token_of
 from .changes import apply, check, encoded
-from .schemas import Batch, HullPath, IdempotencyKey, MaySkip, Points, Transfer
+from .schemas import AnyHullPath, Batch, IdempotencyKey, MaySkip, Points, Transfer
 from .texts import BYTE_ORDER_MARK
 
 router = APIRouter(tags=["changes"], route_class=JsonRoute)
@@ -21,7 +21,12 @@ FIRST_OF_LIST = b"["
 BODY = {
     "requestBody": {
         "required": True,
-        "content": {JSON: {"schema": {"anyOf": [{"$ref": "#/components/schemas/Batch"}, POINTS.json_schema()]}}},
+        "content": {
+            JSON: {
+                "schema": {"anyOf": [{"$ref": "#/components/schemas/Batch"}, POINTS.json_schema()]},
+                "examples": examples.POINTS,
+            }
+        },
     }
 }
 
@@ -29,7 +34,7 @@ BODY = {
 @router.post("/hulls/{name}/points", response_model=schemas.Applied, openapi_extra=BODY)
 async def change_points(
     request: Request,
-    name: HullPath,
+    name: AnyHullPath,
     _: Annotated[object, Depends(described)],
     idempotency_key: IdempotencyKey = None,
     may_skip: MaySkip = False,
@@ -52,7 +57,10 @@ async def change_points(
 
 @router.post("/transfers")
 async def transfer(
-    client: Caller, batches: Transfer, idempotency_key: IdempotencyKey = None, may_skip: MaySkip = False
+    client: Caller,
+    batches: Annotated[Transfer, schemas.body(examples.TRANSFERS)],
+    idempotency_key: IdempotencyKey = None,
+    may_skip: MaySkip = False,
 ) -> schemas.Transferred:
     """Apply a batch to each of several hulls: all of them or none."""
     producer, sequence = numbered(idempotency_key)

@@ -4,13 +4,13 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
-from . import schemas
+from . import examples, schemas
 from .bodies import JsonRoute
 from .callers import Caller
-from .schemas import HullPath, MinRevision, Name
+from .schemas import AlloyPath, AssetsPath, HullPath, MinRevision, Name
 
 router = APIRouter(prefix="/hulls/{name}", tags=["questions"], route_class=JsonRoute)
-Other = Annotated[Name, Query(description="The other hull.")]
+Other = Annotated[Name, Query(description="The other hull.", examples=["alloy"])]
 Layer = Annotated[
     int,
     Query(ge=1, le=1000, description="The convex layer to ask; 1 is the hull, and a layer without points is empty."),
@@ -18,6 +18,7 @@ Layer = Annotated[
 LayerCount = Annotated[int, Query(ge=1, le=1000, description="The number of layers, from the outermost.")]
 SampleSize = Annotated[int, Query(ge=1, le=100_000, description="The most points.")]
 WithKeys = Annotated[bool, Query(description="Whether to name the points, in a keyed hull.")]
+AboutPointsOrKeys = Annotated[schemas.AboutPointsOrKeys, schemas.body(examples.ABOUT)]
 OtherRevision = Annotated[int, Query(ge=0, le=schemas.LARGEST, description="A revision of the other hull to wait for.")]
 
 
@@ -28,7 +29,7 @@ def _about(question: schemas.AboutPointsOrKeys) -> dict[str, Any]:
 
 @router.post("/locate")
 async def locate(
-    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Located:
     """The side of each point or key: inside, on the boundary or outside. Exact."""
     answer = await client.locate(name, **_about(question), layer=layer, min_revision=min_revision)
@@ -37,7 +38,7 @@ async def locate(
 
 @router.post("/distance")
 async def distance(
-    client: Caller, name: HullPath, question: schemas.AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
 ) -> schemas.Distances:
     """The distance of each point or key to the hull; of a geographic hull in metres."""
     answer = await client.distance(name, **_about(question), layer=layer, min_revision=min_revision)
@@ -146,7 +147,7 @@ async def separate(
 
 @router.post("/phase-diagram")
 async def phase_diagram(
-    client: Caller, name: HullPath, question: schemas.Entries, min_revision: MinRevision = 0
+    client: Caller, name: AlloyPath, question: schemas.Entries, min_revision: MinRevision = 0
 ) -> schemas.Phases:
     """The hull as a binary phase diagram: its points are compositions from 0 to 1 and energies."""
     answer = await client.phase_diagram(name, question.entries, min_revision=min_revision)
@@ -155,7 +156,7 @@ async def phase_diagram(
 
 @router.post("/frontier")
 async def frontier(
-    client: Caller, name: HullPath, question: schemas.FrontierQuestion, min_revision: MinRevision = 0
+    client: Caller, name: AssetsPath, question: schemas.FrontierQuestion, min_revision: MinRevision = 0
 ) -> schemas.Efficient:
     """The hull as an efficient frontier: its points are risks and returns."""
     answer = await client.frontier(name, question.points, question.rates, min_revision=min_revision)

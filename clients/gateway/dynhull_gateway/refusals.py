@@ -46,6 +46,8 @@ IN_BATCH = {
     "puts.ttl": ("ttl",),
     "puts.condition": ("only",),
     "removes": ("remove",),
+    "releases": ("release",),
+    "drops": ("drop",),
     "missing_points": ("missing",),
     "missing_keys": ("missing",),
 }

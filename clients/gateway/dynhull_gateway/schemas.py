@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from urllib.parse import unquote
 
 import numpy as np
-from fastapi import Header, Path, Query
+from fastapi import Body, Header, Path, Query
 from pydantic import (
     AwareDatetime,
     BaseModel,
@@ -26,6 +26,8 @@ from pydantic import (
 )
 
 from dynhull_client import Quarantine
+
+from . import examples
 
 NAME = r"^[A-Za-z0-9._/-]{1,200}$"
 NAMES = "1 to 200 letters a to z and A to Z, digits and ._-/; a slash in a path is written %2F"
@@ -93,10 +95,24 @@ Times = Annotated[list[str | None], BeforeValidator(_times)]
 Span = Annotated[float | None, BeforeValidator(_seconds)]
 
 Segment = Annotated[str, StringConstraints(pattern=NAME), BeforeValidator(unquoted)]
-HullPath = Annotated[Segment, Path(alias="name", description=f"The hull: {NAMES}.")]
-FencePath = Annotated[Segment, Path(alias="name", description=f"The fence: {NAMES}.")]
-ConsumerPath = Annotated[Segment, Path(alias="consumer", description=f"The durable consumer: {NAMES}.")]
-ProducerPath = Annotated[Segment, Path(alias="producer", description=f"The producer: {NAMES}.")]
+THE_HULL = f"The hull: {NAMES}."
+HullPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["fleet"])]
+GlobePath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["ships"])]
+AlloyPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["alloy"])]
+AssetsPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["assets"])]
+AnyHullPath = Annotated[
+    Segment,
+    Path(
+        alias="name",
+        description=THE_HULL,
+        openapi_examples=examples.hulls("fleet", "ships", "alloy", "assets"),
+    ),
+]
+FencePath = Annotated[Segment, Path(alias="name", description=f"The fence: {NAMES}.", examples=["yard"])]
+ConsumerPath = Annotated[
+    Segment, Path(alias="consumer", description=f"The durable consumer: {NAMES}.", examples=["billing"])
+]
+ProducerPath = Annotated[Segment, Path(alias="producer", description=f"The producer: {NAMES}.", examples=["sensor-7"])]
 MinRevision = Annotated[
     int, Query(ge=0, le=LARGEST, description="Wait, within the time limit, until the hull has reached this revision.")
 ]
@@ -126,6 +142,16 @@ MaySkip = Annotated[
 ]
 
 
+def body(of: examples.Examples) -> Any:
+    """A body with examples."""
+    return Body(openapi_examples=of)
+
+
+def example(**fields: Any) -> ConfigDict:
+    """The configuration of a body with an example."""
+    return ConfigDict(json_schema_extra={"examples": [fields]})
+
+
 class Request(BaseModel):
     """A body: unknown fields are refused."""
 
@@ -147,6 +173,8 @@ class Response(BaseModel):
 
 class QuarantineRules(Request):
     """The rules that hold positions of keys out of a hull; null for those that are off."""
+
+    model_config = example(max_speed=1000, confirmations=2)
 
     max_speed: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
         None, description="Greatest speed, in units of the coordinates a second, or metres a second on the globe."
@@ -381,11 +409,7 @@ class Applied(Response):
 class Transfer(Request):
     """A batch for each of 2 to 16 hulls: all are applied or none."""
 
-    batches: dict[Name, Batch] = Field(
-        min_length=2,
-        max_length=16,
-        examples=[{"north": {"remove": ["LH400"]}, "south": {"keys": ["LH400"], "points": [[4, 1]]}}],
-    )
+    batches: dict[Name, Batch] = Field(min_length=2, max_length=16)
 
 
 class Transferred(Response):
@@ -423,13 +447,15 @@ class Uploaded(Response):
 class AboutPoints(Request):
     """Points to ask about."""
 
-    points: Points = Field(examples=[[[1, 1], [9, 9]]])
+    model_config = example(points=[[1, 1], [9, 9]])
+
+    points: Points
 
 
 class AboutPointsOrKeys(Request):
     """Points to ask about, or keys whose positions are asked about."""
 
-    points: Points | None = Field(None, examples=[[[1, 1], [9, 9]]])
+    points: Points | None = None
     keys: list[Key] | None = None
     keys_of: Name | None = Field(None, description="The hull that has the keys; null for the hull itself.")
     keys_min_revision: Count = Field(0, description="A revision of that hull to wait for.")
@@ -461,7 +487,9 @@ class Counted(Response):
 class Directions(Request):
     """Vectors of any length but 0."""
 
-    directions: Points = Field(examples=[[[1, 0], [0, 1]]])
+    model_config = example(directions=[[1, 0], [0, 1]])
+
+    directions: Points
     keys: StrictBool = Field(False, description="Whether to name the vertices, in a keyed hull.")
 
 
@@ -483,8 +511,10 @@ class Tangents(Response):
 class Lines(Request):
     """Lines, each through an origin and a target."""
 
-    origins: Points = Field(examples=[[[-1, 1]]])
-    targets: Points = Field(examples=[[[9, 1]]])
+    model_config = example(origins=[[-1, 1]], targets=[[9, 1]])
+
+    origins: Points
+    targets: Points
 
 
 class Crossings(Response):
@@ -497,7 +527,9 @@ class Crossings(Response):
 class AboutKeys(Request):
     """Keys to ask about."""
 
-    keys: list[Key] = Field(examples=[["LH400"]])
+    model_config = example(keys=["LH400", "BA117"])
+
+    keys: list[Key]
 
 
 class Positions(Response):
@@ -559,6 +591,8 @@ class Separation(Response):
 class Entries(Request):
     """Entries of a phase diagram: composition and energy."""
 
+    model_config = example(entries=[[0.25, -0.4]])
+
     entries: Points = []
 
 
@@ -574,6 +608,8 @@ class Phases(Response):
 
 class FrontierQuestion(Request):
     """Risks and returns to compare with the frontier, and risk-free rates."""
+
+    model_config = example(points=[[0.25, 0.05]], rates=[0.01])
 
     points: Points = []
     rates: list[Number] = []
@@ -704,6 +740,8 @@ class Consumer(Response):
 
 class Acknowledgement(Request):
     """The last sequence that was processed."""
+
+    model_config = example(sequence=1)
 
     sequence: Count
     uid: StrictStr = Field("", max_length=200, description="The uid of the fence, to notice that it was replaced.")

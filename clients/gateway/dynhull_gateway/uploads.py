@@ -30,11 +30,13 @@ TYPES: dict[str, bytes | None] = {
     "application/geo+json": None,
     "application/geo+json-seq": RECORD,
 }
-POINT = '{"type": "Point", "coordinates": [8.57, 50.03]}'
-FEATURE = f'{{"type": "Feature", "id": "LH400", "geometry": {POINT}, "properties": null}}'
+FEATURE = (
+    '{"type": "Feature", "id": "LH400", "geometry": {"type": "Point", "coordinates": [1, 2]}, '
+    '"properties": {"time": "2026-01-31T12:00:00Z"}}'
+)
 EXAMPLES = {
-    "application/x-ndjson": '{"key": "LH400", "x": 8.57, "y": 50.03, "time": "2026-01-31T12:00:00Z"}\n[4, 1]\n',
-    "text/csv": "x,y\n0,0\n4,0\n",
+    "application/x-ndjson": '{"key": "LH400", "x": 1, "y": 2}\n{"key": "BA117", "x": 4, "y": 1}\n',
+    "text/csv": "key,x,y\nLH400,1,2\nBA117,4,1\n",
     "application/geo+json": FEATURE,
     "application/geo+json-seq": f"\x1e{FEATURE}\n",
 }

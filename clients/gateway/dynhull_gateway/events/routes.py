@@ -11,6 +11,7 @@ from dynhull_client import AsyncHullClient, UnavailableError
 from ..callers import Caller, token_of
 from ..problems import ProblemError
 from ..schemas import LARGEST, NAME, FencePath, HullPath
+from . import documents
 from .feeds import Form, View
 from .fence_events import Reading
 from .fence_events import events as fence_events
@@ -58,12 +59,13 @@ class Described(Response):
     media_type = EventStream.media_type
 
 
-EVENTS: dict[int | str, dict[str, Any]] = {
-    200: {"description": "Events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
-}
+def events(example: str) -> dict[int | str, dict[str, Any]]:
+    """The description of a stream of events."""
+    content = {"schema": {"type": "string"}, "example": example}
+    return {200: {"description": "Events.", "content": {Described.media_type: content}}}
 
 
-@router.get("/hulls/{name}/events", response_class=Described, responses=EVENTS)
+@router.get("/hulls/{name}/events", response_class=Described, responses=events(documents.OF_HULL))
 async def hull_events(
     request: Request,
     client: Caller,
@@ -82,6 +84,11 @@ async def hull_events(
     a snapshot; so does one that is too slow. A hull that is created again begins with a snapshot. What ends the stream
     is an event "problem".
 
+    The data is JSON, as described by the schemas HullSnapshot, HullChange and HullProgress. With form=changes, the
+    events after the first one are "change", with what differs: HullChange says how to apply it. With form=vertices and
+    form=geojson each change is a "snapshot" of the whole hull. "progress" is a revision with the same vertices,
+    "deleted" has its revision alone, and "problem" is a Problem.
+
     Events of a stream with max_vertices have no ids: each shows all there is, and a reader that connects again begins
     with the present one. An inner layer begins with a snapshot also when the gateway has lost the server for a while.
     """
@@ -94,7 +101,7 @@ async def hull_events(
     return EventStream(texts, state.health, state.figures)
 
 
-@router.get("/fences/{name}/events", response_class=Described, responses=EVENTS)
+@router.get("/fences/{name}/events", response_class=Described, responses=events(documents.OF_FENCE))
 async def follow_fence(
     request: Request,
     client: Caller,
@@ -107,7 +114,9 @@ async def follow_fence(
     """Follow a fence: each event once and in order, named by its type, with ids UID:SEQUENCE.
 
     It begins with the next event unless Last-Event-ID, a sequence or a consumer says where; a consumer acknowledges
-    with PUT, and is sent what it has not acknowledged.
+    with `PUT /fences/{name}/consumers/{consumer}`, and is sent what it has not acknowledged. `POST /fences` creates a
+    fence. The data is JSON, as described by the schema FenceEvent. Also: "replaced", when another fence has the name
+    now, and "problem", which ends the stream.
     """
     if consumer is not None and (after is not None or conflate):
         raise ValueError("give either consumer, which knows its place, or after and conflate")

@@ -125,7 +125,9 @@ class Page(BaseModel):
         examples=["8,53,11,54"],
     )
     datetime: Annotated[str, Field(max_length=100), _readable(Interval)] | None = Field(
-        default=None, description="An instant, or an interval such as 2026-01-01T00:00:00Z/.."
+        default=None,
+        description="An instant, or an interval such as 2026-01-01T00:00:00Z/.. with one open end.",
+        examples=["2026-01-01T00:00:00Z/.."],
     )
     limit: int = Field(default=FEW, ge=1, description=f"The most features of a page; more than {MOST} means {MOST}.")
     after: str | None = Field(default=None, max_length=300, description="The feature before the first one of the page.")

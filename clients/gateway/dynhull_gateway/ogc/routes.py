@@ -49,8 +49,10 @@ ENTITIES = "entities:"
 ROUND = 100
 
 Segment = Annotated[str, StringConstraints(min_length=1, max_length=300), BeforeValidator(unquoted)]
-CollectionId = Annotated[Segment, Path(description="hulls, or entities:NAME for the keys of a hull.")]
-FeatureId = Annotated[Segment, Path(description="The name of a hull, or a key.")]
+CollectionId = Annotated[
+    Segment, Path(description="hulls, or entities:NAME for the keys of a hull.", examples=["entities:ships"])
+]
+FeatureId = Annotated[Segment, Path(description="The name of a hull, or a key.", examples=["ferry"])]
 
 
 def geojson(model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:

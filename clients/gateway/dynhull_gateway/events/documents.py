@@ -1,0 +1,96 @@
+"""What the data of events looks like, for the description."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..schemas import Measures, Place, Rows
+
+
+class HullEvent(BaseModel):
+    """What all events of a hull have."""
+
+    model_config = ConfigDict(extra="allow")
+
+    revision: int = Field(description="The revision of the hull. An event may stand for several revisions.")
+
+
+class HullSnapshot(HullEvent):
+    """The whole hull: event `snapshot`, not with form=geojson."""
+
+    points: int = Field(description="The number of points.")
+    vertices: Rows = Field(description="The vertices, counter-clockwise.")
+    vertex_keys: list[str] | list[int] | None = Field(None, description="With keys=true, the key of each vertex.")
+    center: Place | None = Field(description="Of a hull on the globe, longitude and latitude of its centre.")
+    measures: Measures | None = Field(None, description="With measures=true.")
+    error: float | None = Field(
+        None, description="With max_vertices, the distance by which the hull reaches beyond the vertices, rounded up."
+    )
+
+
+class HullChange(HullEvent):
+    """The difference to the event before: event `change`, with form=changes.
+
+    From the vertices of the event before, remove the rows `removed_rows`, move the first `rotation` of those that are
+    left to the end, then insert `added`, one after the other, each so that it becomes the row in `added_rows`. With
+    keys=true, treat the keys alike, with `added_keys`; then the rows `renamed_rows` have the keys `renamed_keys`.
+    """
+
+    points: int = Field(description="The number of points.")
+    removed: Rows = Field(description="The vertices that are no longer there.")
+    removed_rows: list[int] = Field(description="Their rows before, ascending.")
+    rotation: int = Field(description="The number of rows to move from the front to the end.")
+    added: Rows = Field(description="The vertices that are new.")
+    added_rows: list[int] = Field(description="Their rows afterwards, ascending.")
+    added_keys: list[str] | list[int] | None = Field(None, description="With keys=true, their keys.")
+    renamed_rows: list[int] | None = Field(None, description="With keys=true, the rows that have another key now,")
+    renamed_keys: list[str] | list[int] | None = Field(None, description="and these keys.")
+    measures: Measures | None = Field(None, description="With measures=true.")
+    cause: str = Field(description="What has changed the hull: batch, expiry or recenter.")
+    center: Place | None = Field(None, description="Of a hull on the globe whose centre has moved.")
+
+
+class HullProgress(HullEvent):
+    """A later revision with the same vertices: event `progress`."""
+
+    points: int = Field(description="The number of points.")
+    cause: str = Field(description="As in a change.")
+
+
+class FenceEvent(BaseModel):
+    """The data of an event of a fence; fields that do not apply are left out."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: Literal[
+        "enter", "exit", "cross", "dwell", "transfer", "begin", "cease", "snapshot", "closed", "lost", "progress"
+    ] = Field(description="What happened; the name of the event, too.")
+    sequence: int = Field(description="Counted per fence from 1, without gaps.")
+    fence: str = Field("", description="The name of the fence.")
+    uid: str = Field("", description="Which fence of that name it is.")
+    cause: list[str] = Field([], description="Why it happened: subject_appeared, subject_moved, area_moved and others.")
+    hull: str = Field("", description="The hull of the subject.")
+    key: str | int | None = Field(None, description="The key of the subject.")
+    revision: int = Field(0, description="The revision of that hull.")
+    position: Place | None = Field(None, description="Where the subject is.")
+    previous_position: Place | None = Field(None, description="Where it was.")
+    time: str = Field("", description="When the server made the event.")
+    event_time: str | None = Field(None, description="The event time of the position.")
+
+
+OF_HULL = (
+    "retry: 1000\n\n"
+    "event: snapshot\nid: fe203b7c85e2be96:1\n"
+    'data: {"revision":1,"points":3,"vertices":[[0.0,0.0],[4.0,0.0],[4.0,3.0]],"center":null}\n\n'
+    "event: progress\nid: fe203b7c85e2be96:2\n"
+    'data: {"revision":2,"points":4,"cause":"batch"}\n\n'
+    "event: change\nid: fe203b7c85e2be96:3\n"
+    'data: {"revision":3,"points":5,"removed":[[4.0,3.0]],"removed_rows":[2],"added":[[4.0,4.0],[2.0,4.0]],'
+    '"added_rows":[2,3],"rotation":0,"cause":"batch"}\n\n'
+)
+OF_FENCE = (
+    "retry: 1000\n\n"
+    "event: enter\nid: beb1f1fb68d6cfdb:2\n"
+    'data: {"type":"enter","sequence":2,"fence":"yard","uid":"beb1f1fb68d6cfdb","cause":["subject_appeared"],'
+    '"hull":"fleet","key":"LH400","revision":1,"position":[0.0,0.0],"time":"2026-01-31T12:00:00Z"}\n\n'
+)
