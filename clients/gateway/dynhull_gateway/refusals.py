@@ -97,6 +97,8 @@ def of_refusal(error: DynhullError, body: Any = None, *, waited: bool = False, *
         return problem(HTTPStatus.CONFLICT, detail, reason="REVISION_NOT_REACHED", field="min_revision", **more)
     fields: dict[str, Any] = {"row": error.row, "value": error.value, "expected": error.expected}
     detail = str(error)
+    if error.code == grpc.StatusCode.UNAVAILABLE and not error.reason:
+        detail = f"no answer from the server behind the gateway: {detail}"
     cause = _cause(error, body)
     if cause is not None:
         detail = said(cause)
