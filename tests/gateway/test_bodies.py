@@ -150,6 +150,20 @@ def test_a_slow_body_is_given_up(hasty: Gateway, gateway: Gateway, plane: str) -
     assert size(gateway, plane) == 0
 
 
+def test_half_a_body_is_nothing_to_log(gateway: Gateway, plane: str) -> None:
+    """The gateway may log nothing: see `gateway_process`."""
+    for path in ("points", "locate", "rows"):
+        connection = gateway.connection()
+        connection.putrequest("POST", f"/hulls/{plane}/{path}")
+        connection.putheader("Content-Type", NDJSON if path == "rows" else "application/json")
+        connection.putheader("Content-Length", "100")
+        connection.endheaders(b"[[1, 2],")
+        connection.close()
+    assert size(gateway, plane) == 0
+    missing = gateway.get(f"/{'a' * 60_000}")
+    assert (missing.status, len(missing.body) < 1000) == (404, True)
+
+
 def test_of_half_a_body_whole_batches_are_applied_and_the_rest_can_follow(gateway: Gateway, plane: str) -> None:
     body = lines(0, ROWS)
     connection = gateway.connection()

@@ -318,6 +318,8 @@ def test_json_ends_with_a_newline(gateway: Gateway, square: str) -> None:
         assert gateway.get(path).body.endswith(b"}\n"), path
     for body in ([[1, 1]], [[1, "1"]], {"insert": [[1, 1]]}):
         assert gateway.post(f"/hulls/{square}/points", body).body.endswith(b"}\n")
+    deleted = gateway.call("DELETE", f"/hulls/{square}")
+    assert (deleted.status, deleted.body, deleted.headers.get("Content-Length")) == (204, b"", None)
 
 
 def test_a_port_in_use_is_said_in_words(gateway: Gateway) -> None:

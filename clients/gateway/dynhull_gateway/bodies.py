@@ -83,8 +83,9 @@ class JsonRoute(APIRoute):
             if self.body_field is not None and _has_body(request):
                 require_type(request, (JSON,))
             response = await handle(_JsonRequest(request.scope, request.receive))
-            if response.media_type in ANSWERS and not bytes(response.body).endswith(NEWLINE):
-                response.body = bytes(response.body) + NEWLINE
+            body = bytes(response.body) if response.media_type in ANSWERS else b""
+            if body and not body.endswith(NEWLINE):  # 204 has none
+                response.body = body + NEWLINE
                 response.headers["content-length"] = str(len(response.body))
             return response
 

@@ -8,6 +8,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import Match, Route
 
@@ -15,7 +16,7 @@ from dynhull_client import DynhullError
 
 from .bodies import body_of
 from .invalid import of_validation
-from .problems import ProblemError, problem
+from .problems import ProblemError, cut, problem
 from .refusals import of_refusal, of_value_error
 
 NEAR = 3
@@ -46,6 +47,10 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, ValueError | TypeError)
         return of_value_error(error, body_of(request))
 
+    @app.exception_handler(ClientDisconnect)
+    async def gone(_: Request, __: Exception) -> Response:
+        return Response(status_code=HTTPStatus.BAD_REQUEST)  # of half a body; nobody is there to read it
+
     @app.exception_handler(HTTPException)
     async def failed(request: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
@@ -60,14 +65,14 @@ def install(app: FastAPI) -> None:
 
 def _not_allowed(request: Request) -> Response:
     allowed = sorted(_methods(request))
-    detail = f"{_path(request)} takes {' and '.join(allowed)}, not {request.method}"
+    detail = f"{cut(_path(request))} takes {' and '.join(allowed)}, not {request.method}"
     response = problem(HTTPStatus.METHOD_NOT_ALLOWED, detail, reason="METHOD_NOT_ALLOWED", value=request.method)
     response.headers["Allow"] = ", ".join(allowed)
     return response
 
 
 def _not_found(request: Request) -> Response:
-    path = _path(request)
+    path = cut(_path(request))
     near = get_close_matches(path, _paths_like(path, request.app.state.routes), NEAR)
     what = f"near it {'is' if len(near) == 1 else 'are'} {', '.join(near)}; " if near else ""
     detail = f"there is no {path}: {what}/openapi.json lists what there is"

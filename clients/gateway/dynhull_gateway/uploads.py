@@ -4,8 +4,7 @@ from collections.abc import AsyncIterator
 from http import HTTPStatus
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
-from starlette.requests import ClientDisconnect
+from fastapi import APIRouter, Query, Request
 
 from dynhull_client import DynhullError
 
@@ -81,8 +80,6 @@ async def upload_rows(
     upload = Upload(client, name, numbers, delete=delete, keep_last=coalesce)
     try:
         return await _uploaded(request, upload, _reader(kind, delete=delete), TYPES[kind], keys)
-    except ClientDisconnect:
-        return Response(status_code=HTTPStatus.BAD_REQUEST)  # nobody is there to read it
     finally:
         request.app.state.figures.rows.inc(upload.settled)
 
