@@ -34,15 +34,16 @@ def of_validation(errors: Iterable[Any], body: Any = None, **more: Any) -> Respo
         more: further fields of the problem.
     """
     causes: dict[tuple[str | None, str | None], Cause] = {}
+    paths = []
     for each in errors:
-        cause = _cause(each, body)
+        path, cause = _cause(each, body)
+        paths.append(path)
         known = causes.setdefault((cause.pointer, cause.parameter), cause)
         if cause.detail not in known.detail:  # one alternative of several
             known.detail = f"{known.detail}, or {cause.detail}"
     listed = list(causes.values())[:SHOWN_ERRORS]
-    first = listed[0]
-    fields = {**named(first), "errors": listed, **more}
-    return problem(HTTPStatus.BAD_REQUEST, said(first), reason="INVALID_FIELD", **fields)
+    fields = {**named(listed[0], paths[0]), "errors": listed, **more}
+    return problem(HTTPStatus.BAD_REQUEST, said(listed[0]), reason="INVALID_FIELD", **fields)
 
 
 def detail(error: Mapping[str, Any]) -> str:
@@ -76,11 +77,13 @@ def path_in(body: Any, place: Sequence[str | int], *, absent: bool) -> list[str 
     return path
 
 
-def _cause(error: Mapping[str, Any], body: Any) -> Cause:
-    place, *path = error["loc"]
+def _cause(error: Mapping[str, Any], body: Any) -> tuple[list[str | int], Cause]:
+    """The way to a value in the body, if it is there, and what is wrong with it."""
+    place, *loc = error["loc"]
     shows_value = error["type"] not in ("missing", "json_invalid")
     if place in PARAMETERS:
         value = cut(str(error["input"])) if shows_value else None
-        return Cause(detail=detail(error), parameter=str(path[0]) if path else None, value=value)
-    inner = [] if error["type"] == "json_invalid" else path_in(body, path, absent=error["type"] == "missing")
-    return Cause(detail=detail(error), pointer=pointer(inner), value=shown(error["input"]) if shows_value else None)
+        return [], Cause(detail=detail(error), parameter=str(loc[0]) if loc else None, value=value)
+    path = [] if error["type"] == "json_invalid" else path_in(body, loc, absent=error["type"] == "missing")
+    value = shown(error["input"]) if shows_value else None
+    return path, Cause(detail=detail(error), pointer=pointer(path), value=value)

@@ -68,8 +68,9 @@ class FieldError(ProblemError):
     """
 
     def __init__(self, path: Iterable[str | int], detail: str, value: Any = None) -> None:
-        cause = Cause(detail=detail, pointer=pointer(path), value=None if value is None else shown(value))
-        super().__init__(HTTPStatus.BAD_REQUEST, said(cause), "INVALID_FIELD", **named(cause))
+        way = list(path)
+        cause = Cause(detail=detail, pointer=pointer(way), value=None if value is None else shown(value))
+        super().__init__(HTTPStatus.BAD_REQUEST, said(cause), "INVALID_FIELD", **named(cause, way))
 
 
 RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -125,9 +126,9 @@ def said(cause: Cause) -> str:
     return f"{cause.parameter or cause.pointer or 'body'}: {cause.detail}"
 
 
-def named(cause: Cause) -> dict[str, Any]:
-    """The fields of a problem that name a cause."""
-    path = [part.replace("~1", "/").replace("~0", "~") for part in (cause.pointer or "").split("/")[1:]]
-    row = next((int(part) for part in path if part.isdecimal()), None)
-    field = cause.parameter or next(iter(path), "body")
+def named(cause: Cause, path: Iterable[str | int] = ()) -> dict[str, Any]:
+    """The fields of a problem that name a cause. `path`: the way to it in the body."""
+    parts = list(path)
+    row = next((part for part in parts if isinstance(part, int)), None)
+    field = cause.parameter or (str(parts[0]) if parts else "body")
     return {"field": field, "row": row, "value": cause.value, "errors": [cause]}

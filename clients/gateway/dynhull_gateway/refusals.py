@@ -72,7 +72,7 @@ PARAMETERS = {
 BATCH = re.compile(r"(?:batches\[(\d+)\]\.)?batch(?:\.(.*))?")
 POLYGON = re.compile(r"polygon_area\.polygons\[(\d+)\](?:\.(exterior|holes)(?:\[(\d+)\])?)?")
 SDK = re.compile(r"(\w+)(?: row (\d+))? is .*?: (.*)", re.DOTALL)
-KEYED = re.compile(r"(?:batches\[\d+\]\.)?batch\.(inserts|deletes|puts\.keys|removes)")
+OF_KIND = re.compile(r"(?:batches\[\d+\]\.)?batch\.(inserts|deletes|puts\.keys|removes)")
 COLUMNS = {"puts.keys": "key", "removes": "key", "puts.times": "time", "insert_times": "time"}
 HINT_OF_ROWS = (
     'a row with a key is {"key": KEY, "x": X, "y": Y}, and one without [X, Y]; ?keys=none, str or int leaves keys out '
@@ -99,10 +99,11 @@ def of_refusal(error: DynhullError, body: Any = None, *, waited: bool = False, *
     detail = str(error)
     if error.code == grpc.StatusCode.UNAVAILABLE and not error.reason:
         detail = f"no answer from the server behind the gateway: {detail}"
-    cause = _cause(error, body)
-    if cause is not None:
+    path = None if error.field is None else _path(error.field, body)
+    if path is not None:
+        cause = _cause(error, path, body)
         detail = said(cause)
-        fields |= {name: each for name, each in named(cause).items() if each is not None}
+        fields |= {name: each for name, each in named(cause, path).items() if each is not None}
     elif error.field is not None:
         fields["field"] = PARAMETERS.get(error.field, error.field)
     return problem(status_of(error), detail, reason=error.reason or error.code.name, **(fields | more))
@@ -113,10 +114,10 @@ def of_value_error(error: ValueError | TypeError, body: Any = None) -> Response:
     found = SDK.fullmatch(str(error))
     if found is None or not isinstance(body, dict) or found[1] not in body:
         return problem(HTTPStatus.BAD_REQUEST, str(error), reason="INVALID_FIELD")
-    path = [found[1], *([] if found[2] is None else [int(found[2])])]
+    path: list[str | int] = [found[1], *([] if found[2] is None else [int(found[2])])]
     value = shown(_at(body, path))
     cause = Cause(detail=found[3], pointer=pointer(path), value=value)
-    return problem(HTTPStatus.BAD_REQUEST, said(cause), reason="INVALID_FIELD", **named(cause))
+    return problem(HTTPStatus.BAD_REQUEST, said(cause), reason="INVALID_FIELD", **named(cause, path))
 
 
 def of_refused_rows(error: DynhullError | ValueError, applied: int) -> Response:
@@ -137,7 +138,7 @@ def of_refused_rows(error: DynhullError | ValueError, applied: int) -> Response:
     if error.reason == "KEY_REPEATED":
         first = applied + int(error.metadata["first_row"])
         detail = f"{place}: a batch names a key once, and row {first} has the same"
-    if error.reason == "HULL_UNSUITABLE":
+    if error.reason == "HULL_UNSUITABLE" and OF_KIND.fullmatch(error.field or ""):
         detail = f"{detail}; {HINT_OF_ROWS}"
     fields = {"field": column, "row": row, "value": value, "applied": applied}
     return problem(status_of(error), detail, reason=error.reason or error.code.name, **fields)
@@ -159,17 +160,14 @@ def problem_of(error: DynhullError) -> str:
     return text
 
 
-def _cause(error: DynhullError, body: Any) -> Cause | None:
-    """What is wrong with the body; None if it is nothing in the body."""
-    path = None if error.field is None else _path(error.field, body)
-    if path is None:
-        return None
+def _cause(error: DynhullError, path: list[str | int], body: Any) -> Cause:
+    """What is wrong with the body at a path, to which the row is added."""
     detail = problem_of(error)
     if error.reason == "KEY_REPEATED":
         first = _path(error.metadata["first_field"], body) or []
         detail = f"a batch names a key once, and {pointer([*first, error.metadata['first_row']])} is the same"
     row = error.row
-    if error.reason == "HULL_UNSUITABLE" and KEYED.fullmatch(error.field or ""):
+    if error.reason == "HULL_UNSUITABLE" and OF_KIND.fullmatch(error.field or ""):
         detail, row = f"{detail}; {HINT_OF_BATCH}", 0  # the first of rows that are all alike
     if row is not None:
         path.append(row)
