@@ -139,6 +139,7 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	PYTHONPATH=tests $(BIN)/python -m shards.simulation --schedules $(SCHEDULES)
 	PYTHONPATH=tests $(BIN)/python -m shards.mutants
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100
+	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
 
 ray: .venv/.test  ## all tests of Ray Datasets; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray

@@ -18,7 +18,7 @@ from proxy import proxy
 from psycopg.conninfo import conninfo_to_dict
 from server_process import run, server_process
 
-from dynhull_client import Circle, HullClient
+from dynhull_client import Circle, HullClient, Quarantine
 from dynhull_proto.v1 import batch_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -37,6 +37,9 @@ def fill(client: HullClient, prefix: str = "") -> None:
     client.create_hull(points)
     client.apply(points, insert=np.random.default_rng(1).normal(size=(1000, 2)), producer="p", sequence=1)
     client.create_hull(fleet, keyed="str")
+    client.create_hull(f"{prefix}held", keyed="str", quarantine=Quarantine(max_growth=1.5))
+    client.put(f"{prefix}held", ["a", "b", "c"], [[0, 0], [1, 0], [0, 1]])
+    client.put(f"{prefix}held", ["far"], [[100, 100]])
     client.create_fence(f"{prefix}depot", area=Circle(0, 0, 2), subjects=fleet)
     for x in (1, 5, 1):
         client.put(fleet, ["a"], [[x, 0]])
@@ -48,6 +51,8 @@ def state(client: HullClient, prefix: str = "") -> list[Any]:
     fleet = client.positions(f"{prefix}fleet", ["a", "b"])
     with client.watch_fence(f"{prefix}depot", after=0) as watch:
         events = [next(watch) for _ in range(3)]
+    held = list(client.list_held(f"{prefix}held"))
+    assert [each.key for each in held] == ["far"]
     last = client.last_sequence(f"{prefix}points", "p")
     return [
         points.info,
@@ -56,6 +61,7 @@ def state(client: HullClient, prefix: str = "") -> list[Any]:
         fleet.present.tolist(),
         fleet.positions[0].tolist(),
         events,
+        held,
         last,
     ]
 

@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -37,7 +38,7 @@ ENDED = 70  # the exit code of a server that cannot go on
 class Torture(torture.Torture):
     """A server on PostgreSQL, which it reaches through a proxy."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
+    def __init__(self, folder: Path, seed: int, options: Sequence[str] = ()) -> None:
         folder.chmod(0o777)
         home = folder / "pg"
         home.mkdir()
@@ -48,7 +49,8 @@ class Torture(torture.Torture):
         host, _, port = self._wire.address.partition(":")
         given = conninfo_to_dict(self._url)
         self._journal = make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
-        super().__init__(folder, seed, 2, journal=self._journal)
+        self._options = options
+        super().__init__(folder, seed, 2, options, self._journal)
 
     def _socket(self) -> str:
         return f"{conninfo_to_dict(self._url)['host']}/.s.PGSQL.5432"
@@ -56,7 +58,7 @@ class Torture(torture.Torture):
     def _take_over(self) -> torture.Server:
         """Start another server, and send new calls there; returns the one before it."""
         before = self.server
-        self.server = torture.Server(self._folder, journal=self._journal)
+        self.server = torture.Server(self._folder, self._options, self._journal)
         self._start()
         self._proxy.server = self.server.address
         return before
@@ -140,10 +142,22 @@ class Torture(torture.Torture):
         self._database.stop()
 
 
-def run(folder: Path, faults: int, seed: int) -> str:
+def run(folder: Path, faults: int, seed: int, *, workers: bool) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     kinds = ["zombie", "crash", "terminate", "cut", "kill", "hold", "replace", "freeze", "terminate", "full_disk"]
-    tortured = Torture(folder, seed)
+    if workers:
+        kinds = [
+            "kill_worker",
+            "crash",
+            "pause_worker",
+            "terminate",
+            "restart",
+            "cut",
+            "replace",
+            "freeze",
+            "full_disk",
+        ]
+    tortured = Torture(folder, seed, torture.WORKERS if workers else ())
     tortured.rounds(kinds, faults)
     return tortured.counts()
 
@@ -152,7 +166,10 @@ def main() -> None:
     description = "Kill, stop and cut off a server and its PostgreSQL while a model watches."
     options = torture.arguments(description).parse_args()
     torture.on_small_disk(
-        __file__, DISK, lambda folder: run(folder, options.faults, options.seed), mounted=options.mounted
+        __file__,
+        DISK,
+        lambda folder: run(folder, options.faults, options.seed, workers=options.workers),
+        mounted=options.mounted,
     )
 
 

@@ -424,6 +424,7 @@ def arguments(description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--faults", type=int, default=50, help="how many (default 50)")
     parser.add_argument("--seed", type=int, default=0, help="what the faults and the batches depend on (default 0)")
+    parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
     parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
     return parser
 
@@ -446,9 +447,7 @@ def on_small_disk(file: str, size: str, work: Callable[[Path], str], *, mounted:
 
 
 def main() -> None:
-    parser = arguments("Kill, pause, cut off and starve a server while a model watches.")
-    parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
-    options = parser.parse_args()
+    options = arguments("Kill, pause, cut off and starve a server while a model watches.").parse_args()
     on_small_disk(
         __file__,
         DISK,
