@@ -104,7 +104,7 @@ def test_workers_are_killed_and_have_their_partitions_again(url: str) -> None:
     prefixes = "north/", "fleet/"  # of the workers 0 and 1
     with (
         server_process(*options, killed=True, complaints="is started again") as server,
-        HullClient(server.address) as client,
+        HullClient(server.address, retries=100) as client,
     ):
         for prefix in prefixes:
             fill(client, prefix)
