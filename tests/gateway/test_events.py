@@ -165,6 +165,14 @@ def test_layers_and_sketches_out_of_range_are_refused(gateway: Gateway, name: st
     assert (refused.status, refused.json["field"]) == (400, query.partition("=")[0])
 
 
+def test_what_a_hull_does_not_have_is_refused_before_the_stream(gateway: Gateway, name: str) -> None:
+    """After an event "problem", an EventSource would come again and again."""
+    gateway.post("/hulls", {"name": name, "geographic": True})
+    for query in ("max_vertices=9", "keys=true"):
+        refused = gateway.get(f"/hulls/{name}/events?{query}")
+        assert (refused.status, refused.json["field"]) == (409, query.partition("=")[0])
+
+
 def test_what_is_not_there_is_not_found(gateway: Gateway, name: str) -> None:
     for path in (f"/hulls/{name}/events", f"/fences/{name}/events"):
         assert gateway.get(path).status == 404

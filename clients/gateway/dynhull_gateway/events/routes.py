@@ -95,6 +95,7 @@ async def hull_events(
     _admit(request)
     with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
         await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
+        await _require_kind(client, name, keys=keys, few=max_vertices is not None)
     view = View(token_of(request), name, form, rate, keys, measures, layer, max_vertices)
     state = request.app.state
     texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
@@ -127,6 +128,20 @@ async def follow_fence(
     state = request.app.state
     texts = fence_events(client, Reading(name, consumer, uid, place, conflate), state.settings.keepalive_seconds)
     return EventStream(texts, state.health, state.figures)
+
+
+async def _require_kind(client: AsyncHullClient, name: str, *, keys: bool, few: bool) -> None:
+    """Refuse what the hull does not have: an EventSource would come again and again after an event "problem"."""
+    if not (keys or few):
+        return
+    async for info in client.list_hulls(name):
+        if info.name == name and keys and info.keyed is None:
+            detail = f"keys: the hull {name!r} has points without keys"
+            raise ProblemError(409, detail, "HULL_UNSUITABLE", field="keys", value=name)
+        if info.name == name and few and info.geographic:
+            detail = f"max_vertices: the hull {name!r} is on the globe, and sketches are of a plane"
+            raise ProblemError(409, detail, "HULL_UNSUITABLE", field="max_vertices", value=name)
+        return
 
 
 async def _require_fence(client: AsyncHullClient, name: str) -> None:
