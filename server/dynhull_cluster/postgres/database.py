@@ -17,6 +17,8 @@ SCHEMA = "dynhull"
 OLDEST_VERSION = 15
 # Seconds until a connection attempt ends; milliseconds until data that nobody acknowledges ends a connection.
 CONNECT_SECONDS, UNACKNOWLEDGED_MS = 10, 10_000
+# Whatever the defaults of the database are. An epoch that is lost would let two servers own the hulls.
+SETTINGS = f"search_path={SCHEMA}", "synchronous_commit=on", "statement_timeout=0", "idle_session_timeout=0"
 # Where the address does not say otherwise.
 DEFAULTS = {
     "connect_timeout": CONNECT_SECONDS,
@@ -46,9 +48,7 @@ class Database:
             given: dict[str, Any] = {**DEFAULTS, **conninfo_to_dict(address)}
         except psycopg.ProgrammingError as error:
             raise ValueError(f"no address of a PostgreSQL database: {_words(error)}") from None
-        # Whatever the database's own default is: an epoch that is lost would let two servers own the hulls.
-        settings = f"-c search_path={SCHEMA} -c synchronous_commit=on"
-        given["options"] = f"{given.get('options') or ''} {settings}".strip()
+        given["options"] = " ".join([*filter(None, [given.get("options")]), *(f"-c {each}" for each in SETTINGS)])
         self._address = make_conninfo(**given)
         where = f"{given.get('host') or 'localhost'}{':' + str(given['port']) if given.get('port') else ''}"
         self._words = f"the database {given.get('dbname') or given.get('user') or 'of the user'} on {where}"

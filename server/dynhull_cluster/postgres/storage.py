@@ -155,9 +155,7 @@ class PostgresStorage(RowStorage):
 
     def _write(self, group: Group) -> None:
         try:
-            if self._writer is None:
-                self._writer = self._connect_writer()
-            self._send(self._writer, group)
+            writer = self._sent(group)
         except TakenOverError:
             self._disconnect()
             raise
@@ -170,12 +168,26 @@ class PostgresStorage(RowStorage):
         with self._visible:
             self._unsettled = True
             with as_storage_errors():
-                ended = self._writer.execute("COMMIT").statusmessage
+                ended = writer.execute("COMMIT").statusmessage
             if ended != "COMMIT":
                 raise StorageError(f"PostgreSQL: the commit ended with {ended}")
             group.adopt()
             self._unsettled = False
         self._not_durable = self._durability is not Durability.SYNC
+
+    def _sent(self, group: Group) -> Connection:
+        """Send all of a transaction but its COMMIT; on another connection if the present one is lost."""
+        if self._writer is not None:
+            try:
+                self._send(self._writer, group)
+                return self._writer
+            except psycopg.Error:
+                if not self._writer.broken:
+                    raise
+                self._disconnect()
+        connection = self._writer = self._connect_writer()
+        self._send(connection, group)
+        return connection
 
     def _send(self, connection: Connection, group: Group) -> None:
         """Send all of a transaction but its COMMIT."""
