@@ -80,7 +80,8 @@ def export_hull(data: Path, name: str, file: Path) -> None:
         contents = replayed(kept, row.settings).stored()
         with progress_bar("points") as progress:
             WRITERS[file.suffix](file, contents, progress, geographic=row.settings.geographic)
-    typer.echo(f"{file}: {len(contents):,} points of {name} at revision {kept.last_revision}")
+    points = "1 point" if len(contents) == 1 else f"{len(contents):,} points"
+    typer.echo(f"{file}: {points} of {name} at revision {kept.last_revision}")
 
 
 def _read(data: Path, name: str) -> tuple[HullRow, Kept, list[str]]:

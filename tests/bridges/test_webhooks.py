@@ -292,6 +292,8 @@ def test_a_relay_ends_when_its_fence_is_deleted(
         (["--to", "http://{fence}/", "--unsigned"], "has no host of its own"),
         (["--to", "gopher://a"], "--to gopher: must be a URL of http, https, mqtt"),
         (["--to", "http://a.example/", "--secret", "word"], "a secret must be whsec_ and base64"),
+        (["--to", "http://a.example/", "--secret", "wörd"], "random bytes: look at --secret"),
+        (["--to", ""], "--to is empty: give a URL, a file or -"),
         (["--to", "file.ndjson", "--batch", 2], "--batch is for webhooks"),
         (["--to", "mqtt://a/#"], "the topic '#' has a wildcard"),
         (["--to", "mqtt://a/#", "--secret", f"whsec_{'A' * 32}"], "the topic '#' has a wildcard"),  # not of the secret

@@ -49,6 +49,8 @@ def target_of(
             from .jetstream import JetStream
 
             return JetStream(to, timeout)
+        case "" if not to:
+            raise ValueError("--to is empty: give a URL, a file or -")
         case "" | "file":
             from .lines import LinesFile, StandardOutput
 

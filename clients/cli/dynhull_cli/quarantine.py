@@ -7,6 +7,7 @@ import typer
 from .connected import AsJson, HullName, connected
 from .groups import group
 from .json_lines import json_line
+from .listing import listed
 from .plural import plural
 
 if TYPE_CHECKING:
@@ -40,9 +41,10 @@ def list_held(client: "HullClient", name: HullName, as_json: AsJson = False) -> 
     from rich.console import Console
 
     console = Console(highlight=False)
-    held = client.list_held(name)
+    held = listed(client.list_held(name), f"{name} has no keys in quarantine")
     if console.is_terminal and not as_json:
-        console.print(_table(list(held)))
+        if rows := list(held):
+            console.print(_table(rows))
         return
     for each in held:
         typer.echo(json_line(**_members(each)) if as_json else "\t".join(_columns(each)))
