@@ -11,3 +11,18 @@ def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[s
     """
     Events as the bytes that are stored, without those of members and origins, whose flags are `more`.
     """
+
+def followed(runs: object, places: dict[int, int], lasts: object, news: dict[int, int]) -> bool:
+    """
+    Whether each run follows the last event of its fence; if so, `news` has the new last events.
+    """
+
+def own(runs: object, places: dict[int, int], subjects: object, names: tuple[int, ...]) -> bytes | None:
+    """
+    Of which runs the hull is the one that the fence names; None if a fence does not exist.
+    """
+
+def added(runs: object, places: dict[int, int], lasts: object, news: object, end: int, row: int) -> None:
+    """
+    Add runs to the columns of new ones, and set the last events of their fences.
+    """

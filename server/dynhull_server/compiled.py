@@ -37,6 +37,35 @@ class Native(Protocol):
     ) -> bytes:
         """What `encode_block` in storage/rows puts before members and origins."""
 
+    def followed(
+        self,
+        runs: "npt.NDArray[Any]",
+        places: "dict[int, int]",
+        lasts: "npt.NDArray[Any]",
+        news: "dict[int, int]",
+    ) -> bool:
+        """Whether runs follow the last events of their fences: `FenceRuns.follow` in storage/rows."""
+
+    def own(
+        self,
+        runs: "npt.NDArray[Any]",
+        places: "dict[int, int]",
+        subjects: "npt.NDArray[Any]",
+        names: "tuple[int, ...]",
+    ) -> bytes | None:
+        """`FenceRuns.own` in storage/rows; None if a fence does not exist."""
+
+    def added(
+        self,
+        runs: "npt.NDArray[Any]",
+        places: "dict[int, int]",
+        lasts: "npt.NDArray[Any]",
+        news: "npt.NDArray[Any]",
+        end: int,
+        row: int,
+    ) -> None:
+        """`FenceRuns.add` in storage/rows, where there is room."""
+
 
 def _load() -> Native | None:
     if KERNEL == "python":

@@ -6,11 +6,13 @@ import random
 import pytest
 
 from dynhull_server.compiled import native
+from dynhull_server.state.fences.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.event_block import EventBlock, block_of, joined
-from dynhull_server.state.fences.records import EventType, FenceEvent, Origin
+from dynhull_server.state.fences.records import EventType, FenceEvent, FenceRow, Origin
 from dynhull_server.state.records import NO_TIME
-from dynhull_server.storage.rows import event_blocks
+from dynhull_server.storage.rows import event_blocks, fence_runs
 from dynhull_server.storage.rows.event_blocks import decode_block, encode_block
+from dynhull_server.storage.rows.fence_runs import FenceRuns
 
 HULLS = "fleet", "others/1", "others/2"
 
@@ -91,3 +93,47 @@ def test_blocks_are_joined_and_parted() -> None:
     some = together.only(together.fences % 2 == 0)
     left = {number: of_fence for each in made for number, of_fence in each.items() if number % 2 == 0}
     assert repr(some.by_fence()) == repr(left)
+
+
+@pytest.mark.skipif(native is None, reason="the server runs on pure Python")
+def test_runs_are_kept_alike_in_both_implementations(monkeypatch: pytest.MonkeyPatch) -> None:
+    def kept() -> tuple[list[object], list[object]]:
+        dice, noted = random.Random("runs"), []
+        rows = {number: fence_rows(number) for number in range(1, 20)}
+        runs = FenceRuns(rows)
+        for number in rows:
+            runs.begin(number)
+        lasts: dict[int, int] = {}
+        for place in range(30):
+            made: dict[int, list[FenceEvent]] = {}
+            for number in dice.choices(range(1, 20), k=dice.choice([1, 3, 30])):
+                sequence = lasts.get(number, 0) + len(made.get(number, [])) + 1
+                moment = dice.randrange(3)
+                made.setdefault(number, []).append(event(sequence, dice.choice(HULLS), moment))
+            block = block_of(made)
+            runs.follow(block, lasts)
+            noted += [runs.own(block).tolist(), dict(sorted(lasts.items()))]
+            runs.add(block, place)
+            for wrong, error in ((made, ValueError), ({99: [event(1, "fleet", 0)]}, KeyError)):
+                with pytest.raises(error):
+                    runs.follow(block_of(wrong), lasts)
+            noted.append(dict(sorted(lasts.items())))
+        found = []
+        for each in rows.values():
+            runs.update(each)
+            found.append((list(each.firsts), list(each.places), each.last))
+        return noted, found
+
+    first = kept()
+    monkeypatch.setattr(fence_runs, "native", None)
+    assert kept() == first
+    assert {own for each in first[0][::3] for own in each} == {True, False}
+
+
+def fence_rows(number: int) -> fence_runs.FenceRows:
+    config = FenceConfig(CircleArea(0.0, 0.0, 1.0), "hull", HULLS[number % 3])
+    return fence_runs.FenceRows(FenceRow(number, f"fence/{number}", "uid", 0.0, config), 0, 0)
+
+
+def event(sequence: int, hull: str, moment: int) -> FenceEvent:
+    return FenceEvent(sequence, EventType.ENTER, 1, hull, 7, moment, 0, (0.0, 0.0), None, 0.0, NO_TIME, moment)

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 
 #include <memory>
+#include <unordered_map>
 #include <utility>
 
 #include "encoding.hpp"
@@ -43,6 +44,25 @@ class View {
  private:
   Py_buffer buffer_ = {};
   bool held_ = false;
+};
+
+// The memory of an array, to be changed.
+class Room {
+ public:
+  explicit Room(const nb::object& source) {
+    if (PyObject_GetBuffer(source.ptr(), &buffer_, PyBUF_WRITABLE) != 0) throw nb::python_error();
+  }
+  Room(const Room&) = delete;
+  ~Room() { PyBuffer_Release(&buffer_); }
+
+  std::size_t size() const { return size_t(buffer_.len) / sizeof(std::int64_t); }
+  std::int64_t& operator[](std::size_t place) const {
+    if (place >= size()) throw nb::value_error("a place outside of the column");
+    return static_cast<std::int64_t*>(buffer_.buf)[place];
+  }
+
+ private:
+  Py_buffer buffer_ = {};
 };
 
 // The columns of crossings of one revision, in the order of `Crossed` there and here.
@@ -164,6 +184,66 @@ nb::bytes encoded(const nb::object& runs, const nb::object& rows, const nb::byte
   return nb::bytes(out.data.data(), out.data.size());
 }
 
+// The value of an integer in a dictionary; nothing if it is not there.
+std::optional<std::int64_t> value_of(const nb::dict& numbers, std::int64_t key) {
+  PyObject* const value = PyDict_GetItemWithError(numbers.ptr(), nb::int_(key).ptr());
+  if (value) return nb::cast<std::int64_t>(nb::handle(value));
+  if (PyErr_Occurred()) throw nb::python_error();
+  return {};
+}
+
+// Takes note in `news` of the last events of fences, if each run follows the one before; otherwise changes nothing.
+bool followed(const nb::object& runs, const nb::dict& places, const nb::object& lasts, nb::dict news) {
+  const View<Run> of_runs(runs);
+  const View<std::int64_t> of_lasts(lasts);
+  std::unordered_map<std::int64_t, std::int64_t> found;
+  for (const Run& run : of_runs.values()) {
+    const auto known = found.find(run.fence);
+    std::optional<std::int64_t> last = known == found.end() ? value_of(news, run.fence) : known->second;
+    if (!last) {
+      const auto place = value_of(places, run.fence);
+      if (!place || static_cast<std::size_t>(*place) >= of_lasts.size()) return false;
+      last = of_lasts.data()[*place];
+    }
+    if (run.first != *last + 1) return false;
+    found[run.fence] = *last + run.count;
+  }
+  for (const auto& [fence, last] : found) news[nb::int_(fence)] = last;
+  return true;
+}
+
+// Of which runs the hull is the one that the fence names; None if a fence does not exist. The columns have the names as
+// numbers, and `names` those of the hulls.
+nb::object own(const nb::object& runs, const nb::dict& places, const nb::object& subjects, const nb::tuple& names) {
+  const View<Run> of_runs(runs);
+  const View<std::int64_t> of_subjects(subjects);
+  std::string found;
+  for (const Run& run : of_runs.values()) {
+    const auto place = value_of(places, run.fence);
+    if (!place) return nb::none();
+    if (static_cast<std::size_t>(*place) >= of_subjects.size() || static_cast<std::size_t>(run.hull) >= names.size())
+      throw nb::value_error("a place outside of the columns");
+    const auto name = nb::cast<std::int64_t>(names[static_cast<std::size_t>(run.hull)]);
+    found.push_back(of_subjects.data()[*place] == name);
+  }
+  return nb::bytes(found.data(), found.size());
+}
+
+// Adds runs to the three columns of new ones, from `end` on, and sets the last events of their fences.
+void added(const nb::object& runs, const nb::dict& places, const nb::object& lasts, const nb::object& news,
+           std::size_t end, std::int64_t row) {
+  const View<Run> of_runs(runs);
+  const Room of_lasts(lasts), of_news(news);
+  const std::size_t room = of_news.size() / 3;
+  if (end + of_runs.size() > room) throw nb::value_error("there is no room for the runs");
+  for (const Run& run : of_runs.values()) {
+    of_news[end] = run.fence;
+    of_news[room + end] = run.first;
+    of_news[2 * room + end++] = row;
+    of_lasts[nb::cast<std::size_t>(places[nb::int_(run.fence)])] = run.first + run.count - 1;
+  }
+}
+
 }  // namespace
 }  // namespace dynhull_server
 
@@ -177,4 +257,15 @@ NB_MODULE(_native, module) {
              nb::sig("def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[str, ...], "
                      "more: int) -> bytes"),
              "Events as the bytes that are stored, without those of members and origins, whose flags are `more`.");
+  module.def("followed", &dynhull_server::followed, "runs"_a, "places"_a, "lasts"_a, "news"_a,
+             nb::sig("def followed(runs: object, places: dict[int, int], lasts: object, news: dict[int, int]) -> bool"),
+             "Whether each run follows the last event of its fence; if so, `news` has the new last events.");
+  module.def("own", &dynhull_server::own, "runs"_a, "places"_a, "subjects"_a, "names"_a,
+             nb::sig("def own(runs: object, places: dict[int, int], subjects: object, names: tuple[int, ...]) "
+                     "-> bytes | None"),
+             "Of which runs the hull is the one that the fence names; None if a fence does not exist.");
+  module.def("added", &dynhull_server::added, "runs"_a, "places"_a, "lasts"_a, "news"_a, "end"_a, "row"_a,
+             nb::sig("def added(runs: object, places: dict[int, int], lasts: object, news: object, end: int, row: int) "
+                     "-> None"),
+             "Add runs to the columns of new ones, and set the last events of their fences.");
 }

@@ -286,21 +286,16 @@ class FenceChanges:
 
     def _follow(self, block: EventBlock) -> None:
         """Raise NotCommittedError if events do not follow the last ones of their fences."""
-        lasts, numbers = self._lasts, block.fences.tolist()
-        try:
-            known = self._ledger.runs.lasts(block).tolist()
-        except KeyError:  # one is new, or does not exist
-            known = [self._ledger.runs.last(number) for number in numbers]
         gone = {number for number, now in self._now.items() if now.deleted}
-        runs = zip(numbers, known, block.firsts.tolist(), block.counts.tolist(), strict=True)
-        for number, committed, first, count in runs:
-            last = lasts.get(number, committed)
-            if last is None or number in gone:
-                raise NotCommittedError(f"there is no fence {number}")
-            if first != last + 1:
-                name = self._rows(number).row.name
-                raise NotCommittedError(f"event {first} of fence {name} does not follow event {last}")
-            lasts[number] = last + count
+        missing = gone.intersection(block.fences.tolist()) if gone else gone
+        if missing:
+            raise NotCommittedError(f"there is no fence {min(missing)}")
+        try:
+            self._ledger.runs.follow(block, self._lasts)
+        except KeyError as error:
+            raise NotCommittedError(f"there is no fence {error}") from None
+        except ValueError as error:
+            raise NotCommittedError(str(error)) from None
 
     def finish(self) -> None:
         """Write all events, after the last change: in one row, or in several if they are many."""

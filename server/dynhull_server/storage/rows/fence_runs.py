@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from ...compiled import native
 from ...state.fences.event_block import EventBlock
 from ...state.fences.records import Consumer, FenceRow, Subject
 from ...state.fences.tallies import Integers, Table
@@ -203,7 +204,6 @@ class FenceRuns:
     _name_ids: "count[int]" = field(default_factory=count)
     _new: Integers = field(default_factory=lambda: np.empty((3, MOST_NEW), np.int64))  # number, sequence, row
     _end: int = 0
-    _placed: tuple[EventBlock | Runs, Integers] | None = None
     _turn: Any = field(default_factory=Lock)  # fences take runs for commits, and for readers
 
     def begin(self, number: int) -> None:
@@ -224,11 +224,28 @@ class FenceRuns:
         if not self._uses[name]:
             del self._uses[name], self._names[name]
 
-    def lasts(self, block: EventBlock) -> Integers:
-        """The sequence of the last event of the fence of each run; KeyError if a fence does not exist."""
-        self._placed = None
-        found: Integers = self.table.columns[LAST][self._places(block)]
-        return found
+    def follow(self, block: EventBlock, lasts: dict[int, int]) -> None:
+        """Take note in `lasts` of the last events of fences after a block; it has those before where they are new.
+
+        Raises:
+            ValueError: an event does not follow the last one of its fence. Nothing was noted.
+            KeyError: a fence does not exist.
+        """
+        if native is not None and native.followed(block.runs, self.table.at, self.table.columns[LAST], lasts):
+            return
+        found: dict[int, int] = {}
+        for number, first, made in zip(
+            *(block.runs[name].tolist() for name in ("fence", "first", "count")), strict=True
+        ):
+            last = found.get(number, lasts.get(number, self.last(number)))
+            if last is None:
+                raise KeyError(number)
+            if first != last + 1:
+                fence = self.fences.get(number)
+                name = number if fence is None else fence.row.name
+                raise ValueError(f"event {first} of fence {name} does not follow event {last}")
+            found[number] = last + made
+        lasts |= found
 
     def last(self, number: int) -> int | None:
         """The sequence of the last event of a fence; None if it does not exist."""
@@ -237,13 +254,21 @@ class FenceRuns:
 
     def own(self, block: EventBlock) -> npt.NDArray[np.bool_]:
         """Of which runs the hull is the one that the fence names; KeyError if a fence does not exist."""
-        subjects = self.table.columns[SUBJECTS][self._places(block)]
-        names = np.array([self._names.get(name, NO_NAME) for name in block.names])
-        found: npt.NDArray[np.bool_] = names[block.runs["hull"]] == subjects
-        return found
+        names = tuple([self._names.get(name, NO_NAME) for name in block.names])
+        if native is not None:
+            found = native.own(block.runs, self.table.at, self.table.columns[SUBJECTS], names)
+            if found is not None:
+                return np.frombuffer(found, np.bool_)
+        subjects = self.table.columns[SUBJECTS][self.table.places(block.fences)]
+        own: npt.NDArray[np.bool_] = np.array(names)[block.runs["hull"]] == subjects
+        return own
 
     def add(self, block: EventBlock | Runs, row: int) -> None:
         """Add the runs of a row. O(runs), with O(all new runs) now and then."""
+        if native is not None and isinstance(block, EventBlock) and self._end + len(block.runs) <= MOST_NEW:
+            native.added(block.runs, self.table.at, self.table.columns[LAST], self._new, self._end, row)
+            self._end += len(block.runs)
+            return
         for first in range(0, len(block.fences), MOST_NEW):
             fences = block.fences[first : first + MOST_NEW]
             if self._end + len(fences) > MOST_NEW:
@@ -254,14 +279,7 @@ class FenceRuns:
             self._new[2, self._end : end] = row
             self._end = end
         # A fence may have several runs: the last one counts.
-        self.table.columns[LAST][self._places(block)] = block.firsts + block.counts - 1
-        self._placed = None
-
-    def _places(self, block: EventBlock | Runs) -> Integers:
-        """Where the fence of each run is in the table. A commit asks several times, from `lasts` to `add`."""
-        if self._placed is None or self._placed[0] is not block:
-            self._placed = block, self.table.places(block.fences)
-        return self._placed[1]
+        self.table.columns[LAST][self.table.places(block.fences)] = block.firsts + block.counts - 1
 
     def update(self, fence: FenceRows) -> None:
         """Let a fence have all of its runs. O(new runs of all)."""
