@@ -213,6 +213,7 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
         (gateway.post(f"{at}/points", {"delete": [[0, 0], [7, 7]]}), 409, "POINT_MISSING"),
         (gateway.get(f"{at}/entities"), 409, "HULL_UNSUITABLE"),
         (hasty.get(f"{at}?min_revision=99"), 409, "REVISION_NOT_REACHED"),
+        (hasty.get(f"{at}/separation?other={square}&other_min_revision=99"), 409, "REVISION_NOT_REACHED"),
         (gateway.post(f"{at}/points", SQUARE, Idempotency_Key=f"{square}:2"), 409, "SEQUENCE_GAP"),
         (gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number"), 400, "INVALID_FIELD"),
         (gateway.get(f"{at}?min_revision=-1"), 400, "INVALID_FIELD"),

@@ -20,6 +20,7 @@ from .problems import ProblemError, cut, problem
 from .refusals import of_refusal, of_value_error
 
 NEAR = 3
+REVISIONS = "min_revision", "other_min_revision", "keys_min_revision"
 
 
 def install(app: FastAPI) -> None:
@@ -28,7 +29,9 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(DynhullError)
     async def refused(request: Request, error: Exception) -> Response:
         assert isinstance(error, DynhullError)
-        return of_refusal(error, body_of(request), waited="min_revision" in request.query_params)
+        body = body_of(request)
+        given = (request.query_params, body if isinstance(body, dict) else {})
+        return of_refusal(error, body, waited=[name for name in REVISIONS if any(name in each for each in given)])
 
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: Exception) -> Response:

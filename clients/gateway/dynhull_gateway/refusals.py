@@ -1,7 +1,7 @@
 """Refusals of the server, in the names of the request that the caller has sent."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -83,18 +83,18 @@ HINT_OF_BATCH = (
 )
 
 
-def of_refusal(error: DynhullError, body: Any = None, *, waited: bool = False, **more: Any) -> Response:
+def of_refusal(error: DynhullError, body: Any = None, *, waited: Sequence[str] = (), **more: Any) -> Response:
     """The response for an error of the server.
 
     Args:
         error: the error.
         body: the body of the request; None for a request without.
-        waited: whether the request asked for a revision to wait for.
+        waited: the names of the revisions that the request asked to wait for.
         more: further fields of the problem, in place of those of the error.
     """
     if waited and isinstance(error, DeadlineError):
-        detail = "the hull has not reached min_revision within the time limit of the gateway"
-        return problem(HTTPStatus.CONFLICT, detail, reason="REVISION_NOT_REACHED", field="min_revision", **more)
+        detail = f"{' or '.join(waited)}: not reached within the time limit of the gateway"
+        return problem(HTTPStatus.CONFLICT, detail, reason="REVISION_NOT_REACHED", field=waited[0], **more)
     fields: dict[str, Any] = {"row": error.row, "value": error.value, "expected": error.expected}
     detail = str(error)
     if error.code == grpc.StatusCode.UNAVAILABLE and not error.reason:
