@@ -264,6 +264,17 @@ def test_a_broker_that_is_away(address: str, scheme: str) -> None:
     assert advice == f"Is it running, is {scheme}://127.0.0.1:1/t right?\n"
 
 
+def test_a_broker_that_wants_a_password(address: str, tmp_path: Path) -> None:
+    port = free_port()
+    command = [*nats_server(tmp_path, port), "--user", "u", "--pass", "right"]
+    url = f"nats://u:wrong@127.0.0.1:{port}/S"
+    with broker(command, port), ingest_process(address, url, "--hull", "h", code=2) as ingest:
+        ingest.process.wait(PATIENCE)
+        (said,) = ingest.lines()
+    assert said.startswith("error: the broker refuses the connection: ")
+    assert "wrong" not in said
+
+
 def test_a_server_that_is_away(name: str, nats_port: int) -> None:
     """The log says which, also where each message has a hull of its own; an interruption is no success."""
     publish(nats_port, name, [(f"v{i}", {"lon": i, "lat": i}) for i in range(3)])

@@ -32,6 +32,7 @@ WAIT = 1.0  # seconds that a read waits for messages
 EXPIRES = 5.0  # seconds after which the server ends a request, and says so
 SILENCE = 15.0  # seconds without a word, after which the connection is lost
 NO_MESSAGES, REQUEST_EXPIRED = "404", "408"
+REFUSAL = "authorization violation"
 # The reply subject of a message: $JS.ACK.STREAM.CONSUMER.attempts.sequence.delivered.time.pending
 SHORT_REPLY, SEQUENCE = 9, 5
 
@@ -69,6 +70,8 @@ class JetStream:
         except NotFoundError:
             raise ValueError(f"NATS has no stream {self._stream!r}") from None
         except (Error, OSError, TimeoutError) as error:
+            if REFUSAL in str(error).lower():  # which has no class of its own
+                raise ValueError(f"the broker refuses the connection: {error}") from None
             raise feed_error("NATS", error) from None
 
     async def _begin(self, known: int | None) -> int:
