@@ -129,6 +129,9 @@ class Caller:
     def cutoff(self) -> AbstractContextManager[None]:
         return nullcontext()
 
+    def require_entitled(self) -> None:
+        """It is: these engines have no lease that could end."""
+
     async def write_within(self, _: float, message: Any) -> None:
         await asyncio.sleep(0)
         self.sent.append(message)
