@@ -139,7 +139,11 @@ def test_a_database_that_is_away_for_a_while(url: str) -> None:
             next(watch)
             between.server = ""
             between.cut()
-            refused = [apply(stub, sequence) for sequence in (2, 2)]
+            with pytest.raises(grpc.RpcError) as unwritten:
+                stub.Apply(pb.ApplyRequest(name="a", batch=ONE, producer="p", sequence=2))
+            assert "the database of the server, PostgreSQL, cannot be used at present" in unwritten.value.details()
+            assert "\n" not in unwritten.value.details(), "PostgreSQL's own words are for the log"
+            refused = [unwritten.value.code(), apply(stub, 2)]
             assert set(refused) <= {grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.UNKNOWN}, refused
             with pytest.raises(grpc.RpcError) as ended:
                 for _ in watch:  # marks, as long as no other server can have the hulls
@@ -149,6 +153,10 @@ def test_a_database_that_is_away_for_a_while(url: str) -> None:
             with pytest.raises(grpc.RpcError) as unread:
                 stub.GetHull(pb.GetHullRequest(name="a"))
             assert unread.value.code() == grpc.StatusCode.UNAVAILABLE
+            done = dynhull("query", "a", "vertices", "--address", server.address)
+            assert done.exit_code == 3
+            assert done.stderr.startswith(f"error: the server at {server.address} answers, but cannot do this now: ")
+            assert "dynhull serve" not in done.stderr
             wait_until(lambda: scrape(metrics)['dynhull_background_failures_total{work="lease"}'])
             between.server = socket
             wait_until(lambda: apply(stub, 2) == 2)

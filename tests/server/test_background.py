@@ -129,7 +129,7 @@ def test_an_outcome_is_unknown_until_the_disk_can_be_read(tmp_path: Path) -> Non
         client.apply("a", insert=[[0, 0]])
         (faults / "settle").touch()
         (faults / "commit").touch()
-        with pytest.raises(OutcomeUnknownError, match="whether this was applied, until the disk can be read again"):
+        with pytest.raises(OutcomeUnknownError, match="whether this was applied, until the storage can be read again"):
             client.apply("a", insert=[[1, 1]])
         with pytest.raises(UnavailableError):
             client.get_hull("a", min_revision=1)

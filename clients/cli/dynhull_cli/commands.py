@@ -241,6 +241,7 @@ def options(
     DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
 
     Exit codes: 0 success, 1 a hull differs, data is damaged or the server refused a request, 2 the command or its input
-    is unusable, 3 the server does not answer, 4 the server requires another token, 70 `dynhull serve` ended itself
-    because it could not rely on its own state, 130 interrupted.
+    is unusable, 3 the server does not answer, or cannot do it now, 4 the server requires another token, 70
+    `dynhull serve` ended itself because it could not rely on its own state, 130 interrupted. `serve`, `gateway`,
+    `dashboard`, `ingest` and `relay` end with 0 when they are interrupted, because that is how they are ended.
     """

@@ -101,6 +101,8 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
             encryption = credentials(tls, tls_ca, client_cert, client_key)
             command(Connect(address, token, encryption), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
+            if error.reason:  # which only our server gives
+                fail(Exit.UNAVAILABLE, f"the server at {address} answers, but cannot do this now: {error}")
             encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
             about_tls = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
             advice = f"Is it running (dynhull serve), is the address right (--address), {about_tls}?"

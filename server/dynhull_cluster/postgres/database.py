@@ -19,6 +19,8 @@ OLDEST_VERSION = 15
 CONNECT_SECONDS, UNACKNOWLEDGED_MS = 10, 10_000
 # Whatever the defaults of the database are. An epoch that is lost would let two servers own the hulls.
 SETTINGS = f"search_path={SCHEMA}", "synchronous_commit=on", "statement_timeout=0", "idle_session_timeout=0"
+# What callers get of an error: PostgreSQL's own words are for the log of the server.
+FOR_CALLERS = "the database of the server, PostgreSQL, cannot be used at present"
 # Where the address does not say otherwise.
 DEFAULTS = {
     "connect_timeout": CONNECT_SECONDS,
@@ -67,7 +69,7 @@ class Database:
         try:
             connection = psycopg.connect(self._address, autocommit=True, application_name=name, client_encoding="utf8")
         except psycopg.Error as error:
-            raise StorageError(f"cannot connect to {self}: {_words(error)}") from error
+            raise StorageError(f"cannot connect to {self}: {_words(error)}", for_callers=FOR_CALLERS) from error
         try:
             if connection.info.server_version < OLDEST_VERSION * 10_000:
                 version = connection.info.parameter_status("server_version")
@@ -89,7 +91,12 @@ def as_storage_errors() -> Iterator[None]:
     except (psycopg.errors.DataCorrupted, psycopg.errors.IndexCorrupted) as error:
         raise UnreadableError(_words(error)) from error
     except psycopg.Error as error:
-        raise StorageError(f"PostgreSQL: {_words(error)}") from error
+        raise storage_error(error) from error
+
+
+def storage_error(error: psycopg.Error) -> StorageError:
+    """An error of PostgreSQL as one of the storage."""
+    return StorageError(f"PostgreSQL: {_words(error)}", for_callers=FOR_CALLERS)
 
 
 def _words(error: psycopg.Error) -> str:

@@ -18,7 +18,7 @@ import psycopg
 from psycopg.errors import DiskFull
 
 from dynhull_server.state.changes import Change
-from dynhull_server.state.errors import words
+from dynhull_server.state.errors import words, words_for_callers
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import (
     Contents,
@@ -35,7 +35,7 @@ from dynhull_server.storage.rows.storage import RowStorage
 from dynhull_server.storage.rows.tables import FORMAT, UnreadableError
 from dynhull_server.storage.rows.totals import COPIES
 
-from .database import Connection, Database, as_storage_errors
+from .database import Connection, Database, as_storage_errors, storage_error
 from .ownership import REQUIRE, Ownership, taken_over, writer_name
 from .reader import PostgresReader, Readers
 from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of
@@ -260,9 +260,9 @@ class PostgresStorage(RowStorage):
         """Look at the size of the database now and then. Its housekeeping is PostgreSQL's own."""
         if time.monotonic() < self._size_due:
             return
-        self._size_due = time.monotonic() + SIZE_SECONDS
         with self._readers.lend() as reader:
             self._size = reader.number(SIZE)
+        self._size_due = time.monotonic() + SIZE_SECONDS  # only now: a call that does not look would count as a success
 
     def bytes_used(self) -> int:
         """The size of the tables of all partitions in bytes, as of the last look."""
@@ -284,4 +284,7 @@ def _not_committed(error: BaseException) -> NotCommittedError:
         return NotCommittedError(
             "the disk of PostgreSQL is full: free some space, and writes are accepted again", full=True
         )
-    return NotCommittedError(f"nothing was written: {words(error)}")
+    if isinstance(error, psycopg.Error):
+        error = storage_error(error)
+    nothing = "nothing was written"
+    return NotCommittedError(f"{nothing}: {words(error)}", for_callers=f"{nothing}: {words_for_callers(error)}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError
+from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError, words_for_callers
 from ..state.fences.config import FenceConfig
 from ..state.fences.event_block import EventBlock
 from ..state.fences.fence import Fence
@@ -100,7 +100,7 @@ class LiveFence:
         except KeyError:  # deleted meanwhile: what is left of it is in memory
             return self.fence.events(self.fence.oldest_recent - 1, most) or []
         except (StorageError, OSError, MemoryError) as error:
-            raise NotStoredError(str(error)) from error
+            raise NotStoredError(words_for_callers(error)) from error
         return events
 
     async def reached(self, sequence: int) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from ..state.changes import Change
+from ..state.errors import words, words_for_callers
 from ..storage.port import NotCommittedError, Step, Storage, TakenOverError
 from .threads import Clock, Inbox, Threads
 
@@ -138,7 +139,10 @@ class GroupCommit:
         except TakenOverError as error:
             self._end(group, error)
         except Exception as error:
-            refusal = NotCommittedError(f"an earlier commit failed, and the disk cannot be read yet: {error}")
+            refused = "an earlier commit failed, and the storage cannot be read yet"
+            refusal = NotCommittedError(
+                f"{refused}: {words(error)}", for_callers=f"{refused}: {words_for_callers(error)}"
+            )
             for each in group:
                 each.done(refusal, False)
             self._report(error)

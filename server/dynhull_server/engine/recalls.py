@@ -11,7 +11,7 @@ from typing import Any
 from dynhull.arrays import Points
 
 from ..state.contents import replayed
-from ..state.errors import HullNotFoundError, NotStoredError, RevisionForgottenError
+from ..state.errors import HullNotFoundError, NotStoredError, RevisionForgottenError, words_for_callers
 from ..state.hull import Hull
 from ..state.records import HullSettings, Kept
 from ..storage.port import DamagedError, Storage, StorageError
@@ -98,7 +98,7 @@ class Recalls:
         try:
             answers: dict[int, Answer] = await self._run(partial(self._recall, hull, revisions))
         except Exception as error:
-            refusal = NotStoredError(str(error)) if isinstance(error, UNREADABLE) else error
+            refusal = NotStoredError(words_for_callers(error)) if isinstance(error, UNREADABLE) else error
             return dict.fromkeys(revisions, refusal)
         return answers
 

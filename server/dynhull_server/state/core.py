@@ -21,7 +21,7 @@ from .errors import (
     NotStoredError,
     OutcomeUnknownError,
     StoppingError,
-    words,
+    words_for_callers,
 )
 from .events import (
     Arrived,
@@ -542,7 +542,7 @@ class Core:
             return
         trip.ill = event.error
         if trip.unknown:
-            self._refuse_changes(trip, OutcomeUnknownError(words(event.error)), effects)
+            self._refuse_changes(trip, OutcomeUnknownError(words_for_callers(event.error)), effects)
         self._wait_again(trip, [request for request in trip.requests if not request.abandoned])
         trip.requests = []
         if self._stopping:
@@ -673,10 +673,12 @@ class Core:
 
 def _not_stored(error: Exception) -> NotStoredError:
     full = getattr(error, "full", False)
-    return DiskFullError(words(error)) if full else NotStoredError(words(error))
+    reason = words_for_callers(error)
+    return DiskFullError(reason) if full else NotStoredError(reason)
 
 
 def _ill(error: Exception) -> NotStoredError:
     return NotStoredError(
-        f"the last commit of the hull failed, and its data cannot be read yet ({words(error)}): try again later"
+        "the last commit of the hull failed, and its data cannot be read yet "
+        f"({words_for_callers(error)}): try again later"
     )

@@ -6,6 +6,11 @@ def words(error: BaseException) -> str:
     return str(error) or type(error).__name__
 
 
+def words_for_callers(error: BaseException) -> str:
+    """The message of an error, without what only the operator of the server should read."""
+    return getattr(error, "for_callers", "") or words(error)
+
+
 class RefusedError(Exception):
     """A request that cannot be granted."""
 
@@ -315,7 +320,7 @@ class OutcomeUnknownError(Exception):
 
     def __init__(self, reason: str) -> None:
         super().__init__(
-            f"it is unknown whether this was applied, until the disk can be read again ({reason}): "
+            f"it is unknown whether this was applied, until the storage can be read again ({reason}): "
             "ask for the producer's last number, or read the hull, before you send it again"
         )
 

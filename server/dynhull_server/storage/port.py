@@ -20,7 +20,15 @@ Progress = Callable[[int, int], None]
 
 
 class StorageError(Exception):
-    """The storage cannot do what was requested; the message says why, and what to do."""
+    """The storage cannot do what was requested; the message says why, and what to do.
+
+    Attributes:
+        for_callers: what callers get instead of the message, if it is only for the log of the server; else empty.
+    """
+
+    def __init__(self, message: str = "", *, for_callers: str = "") -> None:
+        super().__init__(message)
+        self.for_callers = for_callers
 
 
 class NotCommittedError(StorageError):
@@ -30,8 +38,8 @@ class NotCommittedError(StorageError):
         full: whether the disk is full.
     """
 
-    def __init__(self, message: str, *, full: bool = False) -> None:
-        super().__init__(message)
+    def __init__(self, message: str, *, full: bool = False, for_callers: str = "") -> None:
+        super().__init__(message, for_callers=for_callers)
         self.full = full
 
 
