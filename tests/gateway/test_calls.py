@@ -80,6 +80,9 @@ def test_keys_and_transfers(gateway: Gateway, name: str) -> None:
     assert (found["present"], found["positions"]) == ([False, True], [[None, None], [1, 1]])
     assert gateway.get(f"{other}/entities").json == {"revision": 1, "keys": ["a"], "points": [[5, 5]], "times": None}
     assert gateway.post(f"{at}/locate", {"keys": ["a"], "keys_of": south}).json["sides"] == [-1]
+    gateway.post(f"{at}/points", {"keys": ["t"], "points": [[2, 2]], "times": ["2026-01-31T12:00:00Z"]})
+    at_noon = gateway.get(f"{at}/entities").json
+    assert (at_noon["keys"], at_noon["times"]) == (["b", "t"], [None, "2026-01-31T12:00:00.000000Z"])
 
 
 def test_fences(gateway: Gateway, name: str) -> None:
@@ -234,6 +237,11 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
     assert f"{at}/rows" in next(
         answer.json["detail"] for answer, _, _ in cases if answer.json.get("value") == f"{at}/row"
     )
+    for url in (f"{at}/measures?layr=2", f"{at}/events?layr=2"):
+        misspelled = gateway.get(url)
+        assert (misspelled.status, misspelled.json["field"]) == (400, "layr")
+        assert "did you mean layer?" in misspelled.json["detail"]
+    assert "here are min_revision" in gateway.get(f"{at}/verification?what=3").json["detail"]
     assert "must be a name: 1 to 200 letters" in gateway.get("/hulls/bad%20name").json["detail"]
     assert (
         "must be PRODUCER:SEQUENCE" in gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number").json["detail"]
@@ -288,7 +296,8 @@ def test_tokens_are_passed_on(tmp_path) -> None:
         anonymous = gateway.get("/hulls/a")
         assert (anonymous.status, anonymous.headers["WWW-Authenticate"]) == (401, "Bearer")
         assert gateway.get("/hulls/a", Authorization="Basic x").status == 401
-        assert gateway.get("/hulls/a", Authorization="Bearer wrong").status == 401
+        wrong = gateway.get("/hulls/a", Authorization="Bearer wrong")
+        assert (wrong.status, "Authorization: Bearer TOKEN" in wrong.json["detail"]) == (401, True)
         assert gateway.post("/hulls", {"name": "a"}, Authorization="Bearer secret").status == 201
         assert gateway.post("/hulls/a/points", [[0, 0]], Authorization="Bearer secret").status == 200
         assert gateway.post("/hulls/b/points", [[0, 0]], Authorization="Bearer secret").status == 403

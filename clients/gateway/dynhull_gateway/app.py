@@ -1,10 +1,10 @@
 """The gateway as an application: what it answers to, and in which order."""
 
 import json
-from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any
 
-from fastapi import FastAPI, Request, Response
+from fastapi import Depends, FastAPI, Request, Response
 from fastapi.middleware.cors import CORSMiddleware
 from pydantic import BaseModel
 
@@ -22,6 +22,7 @@ from .hosts import KnownHosts
 from .ogc import routes as maps
 from .ogc.documents import FeatureCollection, Item
 from .ogc.entities import Snapshots
+from .parameters import require_known
 from .paths import PathsAsSent
 from .problems import RESPONSES, Problem
 from .schemas import Batch, Feature
@@ -55,6 +56,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         docs_url=None,  # their pages load scripts from elsewhere
         redoc_url=None,
         responses=RESPONSES,
+        dependencies=[Depends(require_known)],
         separate_input_output_schemas=False,
         generate_unique_id_function=lambda route: route.name,
     )
@@ -69,7 +71,8 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     for router in routers:
         app.include_router(router)
     app.state.routes = [route for router in routers for route in router.routes]
-    app.add_route("/openapi.json", _description_of(app), include_in_schema=False)
+    app.openapi = partial(_description, app)  # type: ignore[method-assign]  # the framework's way to have one's own
+    app.add_route("/openapi.json", _answer_description, include_in_schema=False)
     handlers.install(app)
     app.add_middleware(SmallChanges, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
@@ -88,16 +91,13 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     return app
 
 
-def _description_of(app: FastAPI) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-    async def openapi(request: Request) -> Response:
-        root = request.scope.get("root_path")
-        servers = {"servers": [{"url": root}]} if root else {}
-        return Response(f"{json.dumps(description(app) | servers)}\n", media_type=JSON)
-
-    return openapi
+async def _answer_description(request: Request) -> Response:
+    root = request.scope.get("root_path")
+    servers = {"servers": [{"url": root}]} if root else {}
+    return Response(f"{json.dumps(request.app.openapi() | servers)}\n", media_type=JSON)
 
 
-def description(app: FastAPI) -> dict[str, Any]:
+def _description(app: FastAPI) -> dict[str, Any]:
     """The OpenAPI document: of what the routes declare, and what holds for all of them."""
     if app.openapi_schema is None:
         made = FastAPI.openapi(app)

@@ -99,6 +99,8 @@ def of_refusal(error: DynhullError, body: Any = None, *, waited: Sequence[str] =
     detail = str(error)
     if error.code == grpc.StatusCode.UNAVAILABLE and not error.reason:
         detail = f"no answer from the server behind the gateway: {detail}"
+    elif error.code == grpc.StatusCode.UNAUTHENTICATED:
+        detail = "a token that the server knows is required: send the header Authorization: Bearer TOKEN"
     path = None if error.field is None else _path(error.field, body)
     if path is not None:
         cause = _cause(error, path, body)

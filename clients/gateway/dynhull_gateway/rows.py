@@ -108,7 +108,7 @@ def ndjson_to_delete(lines: Sequence[bytes]) -> list[Row]:
 class Csv:
     """Lines of CSV: first the names of the columns, x and y or lon and lat, and key and time if there are any.
 
-    A row is one line. Columns with other names are left out.
+    A row is one line, with as many fields as the first. Columns with other names are left out.
     """
 
     _NAMES = (("x", "y"), ("lon", "lat"), ("longitude", "latitude"))
@@ -116,6 +116,7 @@ class Csv:
     def __init__(self, *, delete: bool) -> None:
         self._delete = delete
         self._columns: dict[str, int] | None = None
+        self._fields = 0
 
     def __call__(self, lines: Sequence[bytes]) -> list[Row]:
         """The rows of some lines."""
@@ -125,30 +126,27 @@ class Csv:
             if first is None:
                 return []
             self._columns = self._named([each.strip().lower() for each in first])
+            self._fields = len(first)
         columns = self._columns
         rows: list[Row] = []
         for row in cells:
-            try:
-                found = {name: row[column] for name, column in columns.items()}
-            except IndexError:
-                raise RowError(
-                    len(rows), f"has {len(row)} columns, fewer than the first line", None, cut(",".join(row))
-                ) from None
-            rows.append(_typed(found, len(rows)))
+            if len(row) != self._fields:
+                detail = f"{len(row)} fields in a table of {self._fields} columns"
+                raise RowError(len(rows), detail, None, cut(",".join(row)))
+            rows.append(_typed({name: row[column] for name, column in columns.items()}, len(rows)))
         return rows
 
     def _named(self, header: list[str]) -> dict[str, int]:
+        twice = next((name for name in header if header.count(name) > 1), None)
+        if twice is not None:
+            raise RowError(0, f"the first line names the column {twice!r} twice", "header", cut(",".join(header)))
         columns: dict[str, int] = {name: header.index(name) for name in KEY_AND_TIME if name in header}
         pair = next((pair for pair in self._NAMES if set(pair) <= set(header)), None)
         if pair is not None:
             columns |= {"x": header.index(pair[0]), "y": header.index(pair[1])}
         elif not (self._delete and "key" in columns):
-            raise RowError(
-                0,
-                "the first line must name the columns: x,y or lon,lat, and key, time",
-                "header",
-                cut(",".join(header)),
-            )
+            detail = "the first line must name the columns, separated by commas: x,y or lon,lat, and key, time"
+            raise RowError(0, detail, "header", cut(",".join(header)))
         return columns
 
 

@@ -29,6 +29,8 @@ from dynhull_client import Quarantine
 
 from . import examples
 
+NO_TIME = np.datetime64(0, "us")  # of a key without event time
+
 NAME = r"^[A-Za-z0-9._/-]{1,200}$"
 NAMES = "1 to 200 letters a to z and A to Z, digits and ._-/; a slash in a path is written %2F"
 LARGEST = 2**64 - 1
@@ -53,7 +55,7 @@ def _listed(value: Any) -> Any:
 def _times(value: Any) -> Any:
     if not isinstance(value, np.ndarray):
         return value
-    return [None if np.isnat(each) else f"{each}Z" for each in value]
+    return [None if np.isnat(each) or each == NO_TIME else f"{each}Z" for each in value]
 
 
 def _seconds(value: Any) -> Any:
@@ -533,7 +535,7 @@ class AboutKeys(Request):
 
 
 class Positions(Response):
-    """The position of each key, null for one that is not there; times null for hulls without."""
+    """The position of each key, null for one that is not there; no times for hulls without, null for a key without."""
 
     revision: int
     positions: Rows
@@ -542,7 +544,7 @@ class Positions(Response):
 
 
 class Entities(Response):
-    """All keys of a hull at one revision, ascending, with their positions."""
+    """All keys of a hull at one revision, ascending, with their positions; times as for `Positions`."""
 
     revision: int
     keys: Keys

@@ -12,11 +12,11 @@ import numpy.typing as npt
 from dynhull_client import AsyncHullClient, Entities, HullInfo
 
 from ..problems import ProblemError
+from ..schemas import NO_TIME
 from .filters import Found, Page
 
 KEPT = 16
 KEPT_KEYS = 1_000_000  # of all that are kept, beside the latest: about 200 bytes each
-NO_TIME = np.datetime64(0, "us")  # of a key without event time
 
 Key = str | int
 

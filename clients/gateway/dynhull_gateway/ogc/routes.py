@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from urllib.parse import quote, urlencode
 
 import numpy as np
-from fastapi import APIRouter, Depends, Path, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, BeforeValidator, StringConstraints
 from starlette.responses import Response
 
@@ -67,16 +67,7 @@ class GeoJson(Response):
     media_type = GEOJSON
 
 
-async def _no_parameters(request: Request) -> None:
-    """Refuse parameters that are not described, as the standard demands."""
-    for name in request.query_params:
-        raise ProblemError(HTTPStatus.BAD_REQUEST, f"there is no parameter {name!r}", "INVALID_FIELD", field=name)
-
-
-PLAIN = [Depends(_no_parameters)]
-
-
-@router.get("/", dependencies=PLAIN)
+@router.get("/")
 async def landing(request: Request) -> Landing:
     """The landing page: where the description and the data are."""
     links = [
@@ -88,13 +79,13 @@ async def landing(request: Request) -> Landing:
     return Landing(title="dynhull", description="Convex hulls of moving points, live.", links=links)
 
 
-@router.get("/conformance", dependencies=PLAIN)
+@router.get("/conformance")
 async def conformance() -> Conformance:
     """The classes of OGC API Features that are met."""
     return Conformance(conforms_to=CONFORMANCE)
 
 
-@router.get("/collections", dependencies=PLAIN, response_model_exclude_none=True)
+@router.get("/collections", response_model_exclude_none=True)
 async def collections(request: Request, client: Caller) -> Collections:
     """The collections: all geographic hulls, and the keys of each that is keyed."""
     keyed = [info.name async for info in client.list_hulls() if info.geographic and info.keyed is not None]
@@ -102,7 +93,7 @@ async def collections(request: Request, client: Caller) -> Collections:
     return Collections(links=[_link(request, "collections", "self", JSON, "This page")], collections=found)
 
 
-@router.get("/collections/{collection}", dependencies=PLAIN, response_model_exclude_none=True)
+@router.get("/collections/{collection}", response_model_exclude_none=True)
 async def describe_collection(request: Request, client: Caller, collection: CollectionId) -> Collection:
     """A collection."""
     name = _hull_of(collection)
@@ -126,7 +117,6 @@ class JsonSchema(Response):
     "/collections/{collection}/schema",
     response_class=JsonSchema,
     responses={200: {"description": "A JSON schema.", "content": {SCHEMA: {"schema": {"type": "object"}}}}},
-    dependencies=PLAIN,
 )
 async def schema(request: Request, client: Caller, collection: CollectionId) -> Response:
     """The JSON schema of the features of a collection of entities."""
@@ -178,7 +168,6 @@ async def items(request: Request, client: Caller, collection: CollectionId, page
     "/collections/{collection}/items/{feature_id}",
     response_class=GeoJson,
     responses=geojson(Item),
-    dependencies=PLAIN,
 )
 async def item(request: Request, client: Caller, collection: CollectionId, feature_id: FeatureId) -> Response:
     """A feature: a hull, or a key."""
