@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import dynhull
 from metrics import scrape
 from patience import PATIENCE, wait_until
 from receiver import Received, Receiver, receiver
@@ -299,11 +300,19 @@ def test_a_relay_ends_when_its_fence_is_deleted(
         (["--to", "mqtt://a/#", "--secret", f"whsec_{'A' * 32}"], "the topic '#' has a wildcard"),  # not of the secret
         (["--to", "nats://a/b.>"], "the subject 'b.>' has a wildcard"),
         (["--to", "-", "--timeout", "0s"], "--timeout '0s' must be more than 0"),
+        (["--to", "127.0.0.1:8000"], "did you mean http://127.0.0.1:8000? A file of that name is ./127.0.0.1:8000"),
+        (["--to", "localhost:8000/hook"], "did you mean http://localhost:8000/hook?"),
+        (["--to", "{fence}.ndjson"], "{fence} and {type} are filled in in URLs"),
+        (["--to", "mqtt://a/plant/{fnce}/{type}"], "--to: {fnce} is not {fence} or {type}; {{ and }} stand for braces"),
+        (["--to", "mqtt://a/plant/{fence"], "--to: {fence is not {fence} or {type}"),
+        (["--to", "mqtt://a/b?version=5"], "no option 'version' after the question mark: there are none"),
+        (["--to", "nats://a/ev ents"], "'ev ents' is no subject of NATS"),
+        (["--to", "nats://a/events..{fence}"], "'events..{fence}' is no subject of NATS"),
     ],
 )
 def test_bad_options_are_named(options: list[object], complaint: str, tmp_path: Path) -> None:
-    done = run("relay", "zone", "--consumer", "test", "--state", tmp_path, "--address", "127.0.0.1:1", *options)
-    assert done.returncode == 2
+    done = dynhull("relay", "zone", "--consumer", "test", "--state", tmp_path, "--address", "127.0.0.1:1", *options)
+    assert done.exit_code == 2
     assert complaint in done.stderr
     assert "word@" not in done.stderr
 

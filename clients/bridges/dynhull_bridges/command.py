@@ -179,7 +179,7 @@ def relay(
     from .lane import Patience
     from .relay import run, target_of
     from .signatures import read_secret
-    from .target import without_secrets
+    from .urls import without_secrets
 
     keys = [read_secret(each) for each in secret or ()]
     patience = Patience(attempts, _seconds(first_pause, "--first-pause"), _seconds(longest_pause, "--longest-pause"))

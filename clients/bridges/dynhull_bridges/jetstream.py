@@ -6,11 +6,12 @@ from urllib.parse import urlsplit
 
 import nats
 from nats.aio.client import Client
-from nats.errors import Error, MaxPayloadError
+from nats.errors import BadSubjectError, Error, MaxPayloadError
 from nats.js.errors import NoStreamResponseError
 
 from .letters import CONTENT_TYPE, Letter
-from .target import NotDeliveredError, RefusedError, filled, without_secrets
+from .target import NotDeliveredError, RefusedError, filled
+from .urls import check_subject, options_of, without_secrets
 
 SUBJECT = "dynhull.{fence}.{type}"
 
@@ -25,11 +26,13 @@ class JetStream:
     most = 1
 
     def __init__(self, url: str, timeout: float) -> None:
-        parts = urlsplit(url)
+        parts = urlsplit(url, allow_fragments=False)
         if not parts.hostname:
             raise ValueError(f"--to {without_secrets(url)} has no host")
         self._server = parts._replace(path="").geturl()
+        options_of(url)
         self._subject = parts.path.removeprefix("/") or SUBJECT
+        check_subject(self._subject)
         if {"*", ">"} & set(self._subject):
             raise ValueError(f"the subject {self._subject!r} has a wildcard, * or >: events go to one subject")
         self._timeout = timeout
@@ -46,6 +49,8 @@ class JetStream:
                 await client.jetstream(timeout=self._timeout).publish(subject, each.text.encode(), headers=headers)
             except MaxPayloadError:
                 raise RefusedError(f"NATS: {len(each.text.encode())} bytes are too many for the server") from None
+            except BadSubjectError:  # the name of the fence has empty words
+                raise RefusedError(f"NATS: {subject!r} is no subject") from None
             except NoStreamResponseError:
                 raise NotDeliveredError(f"NATS: no stream stores the subject {subject}; create one") from None
             except (Error, OSError, TimeoutError) as error:

@@ -8,7 +8,8 @@ from urllib.parse import unquote, urlsplit
 import aiomqtt
 
 from .letters import Letter
-from .target import NotDeliveredError, filled, without_secrets
+from .target import NotDeliveredError, filled
+from .urls import options_of, without_secrets
 
 TOPIC = "dynhull/{fence}/{type}"
 PORT, TLS_PORT = 1883, 8883
@@ -27,6 +28,7 @@ class Mqtt:
         parts = urlsplit(url, allow_fragments=False)
         if not parts.hostname:
             raise ValueError(f"--to {without_secrets(url)} has no host")
+        options_of(url)
         encrypted = parts.scheme == "mqtts"
         self._host, self._port = parts.hostname, parts.port or (TLS_PORT if encrypted else PORT)
         self._user = unquote(parts.username) if parts.username else None

@@ -1,6 +1,7 @@
 """A relay: a durable consumer of fences that delivers their events to one kind of receiver."""
 
 import asyncio
+import re
 import signal
 from collections.abc import Sequence
 from contextlib import suppress
@@ -16,10 +17,11 @@ from dynhull_client import AsyncHullClient, DeadlineError, FenceNotFoundError, U
 from .dead_letters import DeadLetter, StateFolder, gone_key
 from .figures import Figures
 from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, Lane, Patience
-from .target import GoneError, NotDeliveredError, ReaderGoneError, Target
+from .target import PLACE, GoneError, NotDeliveredError, ReaderGoneError, Target, check_places
 from .waiting import SERVER_AWAY, Absence, growing_pauses, unless
 
 log = structlog.get_logger("dynhull_relay")
+WITHOUT_SCHEME = re.compile(r"[^/@\s]+:\d+(/.*)?")  # HOST:PORT
 
 
 def target_of(
@@ -31,7 +33,15 @@ def target_of(
         ValueError: there is no such target, or an option does not suit it.
         OSError: the file cannot be opened.
     """
+    if WITHOUT_SCHEME.fullmatch(to):
+        raise ValueError(f"--to {to}: did you mean http://{to}? A file of that name is ./{to}")
     scheme = urlsplit(to).scheme
+    if scheme not in ("", "file"):
+        check_places(urlsplit(to)._replace(netloc="").geturl())  # a password is nothing to show
+    elif PLACE.search(to):
+        raise ValueError(
+            f"--to {to}: {{fence}} and {{type}} are filled in in URLs; one file has the events of all fences"
+        )
     if scheme in ("http", "https"):
         from .webhook import Webhook
 

@@ -1,10 +1,12 @@
 """What the relay delivers to: the interface, and how a delivery fails."""
 
+import re
 from collections.abc import Sequence
 from typing import Protocol
-from urllib.parse import urlsplit
 
 from .letters import Letter
+
+PLACE = re.compile(r"\{fence\}|\{type\}|\{\{|\}\}")
 
 
 class NotDeliveredError(Exception):
@@ -55,11 +57,15 @@ class Target(Protocol):
 
 
 def filled(template: str, letter: Letter) -> str:
-    """A URL, topic or subject with the name of the fence and the type of the event filled in."""
-    return template.replace("{fence}", letter.fence).replace("{type}", letter.type)
+    """A URL, topic or subject with the name of the fence and the type of the event filled in.
+
+    Doubled braces are braces.
+    """
+    values = {"{fence}": letter.fence, "{type}": letter.type, "{{": "{", "}}": "}"}
+    return PLACE.sub(lambda found: values[found[0]], template)
 
 
-def without_secrets(url: str) -> str:
-    """A URL without user, password and query."""
-    parts = urlsplit(url)
-    return parts._replace(netloc=parts.netloc.rpartition("@")[2], query="").geturl()
+def check_places(template: str) -> None:
+    """ValueError where `filled` would leave a brace that is no place to fill in."""
+    if rest := re.search(r"\{[^{}]*\}?|\}", PLACE.sub("", template)):
+        raise ValueError(f"--to: {rest[0]} is not {{fence}} or {{type}}; {{{{ and }}}} stand for braces")

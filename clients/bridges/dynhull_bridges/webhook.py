@@ -15,7 +15,8 @@ import dynhull_client
 from .addresses import PublicOnly, is_public
 from .letters import BATCH_CONTENT_TYPE, CONTENT_TYPE, Letter
 from .signatures import signature
-from .target import GoneError, NotDeliveredError, RefusedError, filled, without_secrets
+from .target import GoneError, NotDeliveredError, RefusedError, filled
+from .urls import without_secrets
 
 # Client errors after which the same request may succeed later.
 PASSING = {HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS}

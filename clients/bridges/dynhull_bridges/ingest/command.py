@@ -86,7 +86,7 @@ def ingest(
         dynhull ingest kafka://broker:9092/positions --hull fleet --key '$.vehicle.id' --x '$.pos[0]' --y '$.pos[1]'
 
     Messages are JSON. An expression is a path into it, as $.position.lon, or a text in which {1}, {2}, ... are what the
-    wildcards of the topic stand for, {topic} is the topic, and {$.path} is taken from the message.
+    wildcards of the topic stand for, {topic} is the topic, {$.path} is taken from the message, and {{ is a brace.
 
     NATS JetStream and Kafka number their messages: each is applied exactly once, whatever is killed; the hull counts
     the numbers (dynhull_client: last_sequence). MQTT does not: a message may be applied twice, which changes nothing
@@ -99,7 +99,7 @@ def ingest(
     from dynhull_client import AsyncHullClient
 
     from .. import logs
-    from ..target import without_secrets
+    from ..urls import without_secrets
     from .bad import BadMessages
     from .feed import FeedError
     from .ingest import IngestError, feeds_of, run

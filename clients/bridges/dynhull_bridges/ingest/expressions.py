@@ -1,7 +1,7 @@
 """Expressions that take a value from a message: paths into its JSON, and texts with places to fill in.
 
 A path is a singular query of JSONPath (RFC 9535): `$`, then names and indices, as in `$.position[0]` or `$['a b'].c`.
-A text may have `{1}`, `{2}`, ... for the wildcards of the topic, `{topic}`, and `{$.path}`.
+A text may have `{1}`, `{2}`, ... for the wildcards of the topic, `{topic}`, and `{$.path}`; `{{` and `}}` are braces.
 """
 
 import re
@@ -13,7 +13,9 @@ from .feed import Message
 STEP = re.compile(
     r"\.([A-Za-z_\u0080-\uffff][\w\u0080-\uffff]*)|\[(-?\d+)\]|\['((?:[^'\\]|\\.)*)'\]|\[\"((?:[^\"\\]|\\.)*)\"\]"
 )
-FIELD = re.compile(r"\{([^{}]*)\}")
+FIELD = re.compile(r"(\{\{|\}\}|\{[^{}]*\}|[{}])")
+DOUBLED = {"{{": "{", "}}": "}"}
+PLACES = "{1}, {2}, ... (wildcards of the topic), {topic} and {$.path}"
 MISSING: Any = object()
 
 Value = Callable[[Message, Any], Any]
@@ -26,10 +28,11 @@ def value_of(text: str, option: str) -> Value:
     """
     if text.startswith("$"):
         return _at(_steps(text, option))
-    if not FIELD.search(text):
-        return lambda _message, _document: text
     parts = FIELD.split(text)
-    pieces = [_field(each, option) if index % 2 else each for index, each in enumerate(parts)]
+    pieces = [_piece(each, text, option) if index % 2 else each for index, each in enumerate(parts)]
+    if all(isinstance(each, str) for each in pieces):
+        whole = "".join(map(str, pieces))
+        return lambda _message, _document: whole
 
     def filled(message: Message, document: Any) -> str:
         return "".join(each if isinstance(each, str) else _text(each(message, document), text) for each in pieces)
@@ -45,7 +48,18 @@ def last_name(text: str) -> str:
 
 def is_fixed(text: str) -> bool:
     """Whether an expression is the same for all messages."""
-    return not text.startswith("$") and not FIELD.search(text)
+    return not text.startswith("$") and all(each in DOUBLED for each in FIELD.findall(text))
+
+
+def _piece(text: str, whole: str, option: str) -> str | Value:
+    """What a brace stands for, with the text up to the one that closes it."""
+    if text in DOUBLED:
+        return DOUBLED[text]
+    if text in "{}":
+        raise ValueError(
+            f"{option} {whole!r}: {text} has no other brace; {PLACES} are filled in, {{{{ and }}}} stand for braces"
+        )
+    return _field(text[1:-1], option)
 
 
 def _field(text: str, option: str) -> Value:
@@ -61,7 +75,8 @@ def _field(text: str, option: str) -> Value:
 
         return captured
     raise ValueError(
-        f"{option}: {{{text}}} is not {{topic}}, a path {{$.name}}, or the number of a wildcard from {{1}}"
+        f"{option}: {{{text}}} is not {{topic}}, a path {{$.name}}, or the number of a wildcard from {{1}}; "
+        "{{ and }} stand for braces"
     )
 
 

@@ -56,7 +56,10 @@ def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool, to_end: 
 
             return Topic(url, producer).partitions
         case scheme:
-            raise ValueError(f"the URL begins with {scheme!r}: must be mqtt, mqtts, nats, tls or kafka")
+            raise ValueError(
+                f"the URL begins with {f'{scheme}:' if scheme else 'no scheme'}; there are mqtt(s)://HOST/FILTER, "
+                "nats://HOST/STREAM[/SUBJECT] (tls:// encrypts) and kafka://HOST:PORT/TOPIC"
+            )
 
 
 def _known(feeds: Sequence[Feed]) -> Find:

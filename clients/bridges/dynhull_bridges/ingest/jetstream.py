@@ -16,7 +16,7 @@ from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig
 from nats.js.errors import BucketNotFoundError, KeyNotFoundError, NotFoundError
 from nats.js.kv import KeyValue
 
-from ..target import without_secrets
+from ..urls import check_subject, options_of, without_secrets
 from .feed import FeedError, Message, feed_error, producer_name
 from .topics import captures_of
 
@@ -41,10 +41,18 @@ class JetStream:
     """Reads nats://[USER:PASSWORD@]HOST[:PORT]/STREAM[/SUBJECT], or tls:// for TLS; the subject may have wildcards."""
 
     def __init__(self, url: str) -> None:
-        parts = urlsplit(url)
+        parts = urlsplit(url, allow_fragments=False)
         stream, _, subject = unquote(parts.path).strip("/").partition("/")
         if not parts.hostname or not stream:
             raise ValueError(f"{without_secrets(url)}: give nats://HOST/STREAM or nats://HOST/STREAM/SUBJECT")
+        options_of(url)
+        check_subject(stream)
+        if set(".*>\\") & set(stream):
+            raise ValueError(f"no stream of NATS is called {stream!r}: names have no . * > or \\")
+        if subject:
+            check_subject(subject)
+            if ">" in subject.split(".")[:-1]:
+                raise ValueError(f"the subject {subject!r} goes on after >, which stands for all words from there on")
         self.name = without_secrets(url)
         self.producer: str | None = producer_name("nats", stream, *([subject] if subject else []))
         self._server = parts._replace(path="").geturl()

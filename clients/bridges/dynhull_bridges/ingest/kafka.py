@@ -1,13 +1,13 @@
 """A partition of a Kafka topic as a log: the number of a message is its offset, plus one."""
 
 from collections.abc import Sequence
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import unquote, urlsplit
 
 from aiokafka import AIOKafkaConsumer, TopicPartition
 from aiokafka.admin import AIOKafkaAdminClient
 from aiokafka.errors import KafkaConnectionError, KafkaError
 
-from ..target import without_secrets
+from ..urls import options_of, without_secrets
 from .feed import FeedError, Message, feed_error, producer_name
 
 WAIT = 1000  # milliseconds that a read waits for messages
@@ -114,7 +114,7 @@ class Topic:
         self._producer = producer
         if not self._servers or not self._name or "/" in self._name:
             raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
-        asked = parse_qs(parts.query).get("partition", [])
+        asked = options_of(url, ("partition",)).get("partition", [])
         if wrong := [each for each in asked if not each.isdecimal()]:
             raise ValueError(f"{without_secrets(url)}: partition is {wrong[0]!r}, not a number from 0")
         self._asked = [int(each) for each in asked]

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import unquote, urlsplit
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
@@ -16,7 +16,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
-from ..target import without_secrets
+from ..urls import options_of, without_secrets
 from .feed import FeedError, Message, feed_error
 from .topics import captures_of
 
@@ -30,6 +30,7 @@ WAITING = 65_536  # messages that may wait to be read: with QoS 1 the broker sen
 KEPT = 7 * 24 * 3600  # seconds for which the broker keeps a session of MQTT 5
 VERSIONS = {"3": MQTTProtocolVersion.MQTTv311, "3.1.1": MQTTProtocolVersion.MQTTv311, "5": MQTTProtocolVersion.MQTTv5}
 SHARED = "$share/"
+LONGEST_FILTER, LONGEST_SHOWN = 65_535, 200  # bytes, characters
 
 
 class Mqtt:
@@ -42,7 +43,7 @@ class Mqtt:
     def __init__(self, url: str, hull: str) -> None:
         parts = urlsplit(url, allow_fragments=False)
         # A filter may have +, # and $, which need no escapes here.
-        query = parse_qs(parts.query)
+        query = options_of(url, ("version", "client_id"))
         self._filter = unquote(parts.path.removeprefix("/"))
         if not parts.hostname or not self._filter:
             raise ValueError(f"{without_secrets(url)}: give mqtt://HOST/FILTER")
@@ -53,7 +54,7 @@ class Mqtt:
         self.name = without_secrets(url)
         self.producer: str | None = None
         self._host, self._port = parts.hostname, parts.port or (TLS_PORT if encrypted else PORT)
-        plain = self._filter.split("/", 2)[2] if self._filter.startswith(SHARED) else self._filter
+        plain = _checked(self._filter)
         self._captures = captures_of(plain, "/", "+", "#")
         digest = hashlib.sha256(f"{self._filter} {hull}".encode()).hexdigest()[:12]
         name = query.get("client_id", [f"dynhull-{socket.gethostname()}-{digest}"])[0]
@@ -181,3 +182,22 @@ class Mqtt:
                     self._ready.set_exception(error)
 
         self._loop.call_soon_threadsafe(settle)
+
+
+def _checked(whole: str) -> str:
+    """The filter without $share/GROUP/; ValueError where MQTT has no such filter."""
+    problem, topics = None, whole
+    if whole.startswith(SHARED):
+        group, _, topics = whole.removeprefix(SHARED).partition("/")
+        if not group or not topics or {"+", "#"} & set(group):
+            problem = "must be $share/GROUP/FILTER, the group without wildcards"
+    levels = topics.split("/")
+    if "#" in "".join(levels[:-1]) or levels[-1] not in ("#", levels[-1].replace("#", "")):
+        problem = problem or "# must be the last level, alone between slashes"
+    elif any("+" in each and each != "+" for each in levels):
+        problem = problem or "+ must be a whole level, alone between slashes"
+    elif "\0" in whole or len(whole.encode()) > LONGEST_FILTER:
+        problem = problem or f"has a zero character, or more than {LONGEST_FILTER} bytes"
+    if problem is not None:
+        raise ValueError(f"the filter {whole[:LONGEST_SHOWN]!r}: {problem}")
+    return topics
