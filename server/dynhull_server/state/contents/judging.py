@@ -10,10 +10,12 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import GeoHull, convex_hull
+from dynhull import DynamicHull, GeoHull
 from dynhull.arrays import Points
 
+from ..numbers import as_numbers
 from ..records import Center
+from .live import AnyHull
 
 Floats = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.bool_]
@@ -27,20 +29,22 @@ MARGIN = 1e-12
 TINY = 1e-280
 ROUNDING = 2.0**-52
 CORNERS = 3  # of the first hull with an area
-PAIRS_TOGETHER = 2**16  # of a position and an edge
 
 
 class Judge(Protocol):
-    """Judges in one frame. Vertices are those of a hull with an area."""
+    """Judges in one frame."""
 
     def too_fast(self, before: Points, after: Points, elapsed: Microseconds, limit: float) -> tuple[Rows, Floats]:
         """Which of (n,) moves are faster than the limit, and all speeds; inf for a move in no time."""
 
-    def too_large(self, vertices: Points, points: Points, limit: float) -> tuple[Rows, Floats]:
-        """Which of (n,) points would each enlarge the area by more than this factor, and all factors. O(n h)."""
+    def too_large(self, hull: AnyHull, points: Points, limit: float) -> tuple[Rows, Floats]:
+        """Which of (n,) points would each enlarge the area by more than this factor, and all factors.
 
-    def with_point(self, vertices: Points, point: tuple[float, float]) -> Points:
-        """The vertices of the hull with one more point. O(h log h)."""
+        A hull without an area has nothing to grow from.
+        """
+
+    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull:
+        """A hull of the vertices and one more point. O(h log h)."""
 
 
 class Plane:
@@ -60,33 +64,39 @@ class Plane:
             fast[row] = squared * MICROSECONDS**2 > (Fraction(limit) * int(elapsed[row])) ** 2
         return fast, _speeds(lengths, elapsed)
 
-    def too_large(self, vertices: Points, points: Points, limit: float) -> tuple[Rows, Floats]:
-        """As `Judge.too_large`."""
-        following = np.roll(vertices, -1, axis=0)
+    def too_large(self, hull: AnyHull, points: Points, limit: float) -> tuple[Rows, Floats]:
+        """As `Judge.too_large`. O(h + n log h)."""
+        vertices = hull.vertices()
+        if len(vertices) < CORNERS:
+            return no_growth(points)
+        tangents = hull.tangents(points)
+        seeing = np.flatnonzero(~np.isnan(tangents[:, 0, 0]))
+        left, right = (_rows(tangents[seeing, side], vertices) for side in (0, 1))
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-            terms, sizes = _doubled(vertices[0], vertices, following)
-            area, doubt = float(terms.sum()), float(sizes.sum())
-            # Twice the area added: the triangles that a point makes with the edges that it sees.
-            added, doubts = np.empty(len(points)), np.empty(len(points))
-            step = max(1, PAIRS_TOGETHER // len(vertices))
-            for first in range(0, len(points), step):
-                rows = slice(first, first + step)
-                terms, sizes = _doubled(points[rows, None], vertices, following)
-                added[rows], doubts[rows] = np.maximum(-terms, 0.0).sum(axis=1), sizes.sum(axis=1)
-            after, most = area + added, limit * area
-            errors = ROUNDING * (len(vertices) + 16) * (doubts + (1 + limit) * doubt) + TINY
-            large = after > most
-            sure = np.abs(after - most) > errors
-            factors = after / area
+            # Twice the area of the fan from the first vertex to the others, up to each of them.
+            terms, sizes = _products(vertices - vertices[0], np.roll(vertices, -1, axis=0) - vertices)
+            fans, area, doubt = np.cumsum([0.0, *terms]), float(terms.sum()), float(sizes.sum())
+            # Twice the area added: that of the polygon from the point to the vertices that it sees.
+            added, doubts = np.zeros(len(points)), np.zeros(len(points))
+            to = points[seeing] - vertices[0]
+            before, after = (_products(vertices[rows] - vertices[0], to) for rows in (left, right))
+            between = fans[right] - fans[left] + np.where(right < left, area, 0.0)
+            added[seeing] = before[0] - after[0] - between
+            doubts[seeing] = before[1] + after[1]
+            grown, most = area + added, limit * area
+            errors = ROUNDING * (len(vertices) + 16) * (doubts + (4 + limit) * doubt) + TINY
+            large = grown > most
+            sure = np.abs(grown - most) > errors
+            factors = grown / area
         for row in np.flatnonzero(~sure).tolist():
-            before, more = _exact_areas(vertices.tolist(), points[row].tolist())
-            large[row] = before + more > Fraction(limit) * before
-            factors[row] = _as_double(1 + more / before)
+            exact, more = _exact_areas(vertices.tolist(), points[row].tolist())
+            large[row] = exact + more > Fraction(limit) * exact
+            factors[row] = _as_double(1 + more / exact)
         return large, factors
 
-    def with_point(self, vertices: Points, point: tuple[float, float]) -> Points:
+    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull:
         """As `Judge.with_point`."""
-        return convex_hull(np.vstack([vertices, point]))
+        return DynamicHull(np.vstack([hull.vertices(), point]))
 
 
 class Sphere:
@@ -101,8 +111,11 @@ class Sphere:
         lengths: Floats = 2 * EARTH_RADIUS * np.arcsin(np.minimum(chords / 2, 1.0))
         return lengths > limit * (elapsed / MICROSECONDS), _speeds(lengths, elapsed)
 
-    def too_large(self, vertices: Points, points: Points, limit: float) -> tuple[Rows, Floats]:
-        """As `Judge.too_large`."""
+    def too_large(self, hull: AnyHull, points: Points, limit: float) -> tuple[Rows, Floats]:
+        """As `Judge.too_large`. O(n h)."""
+        vertices = hull.vertices()
+        if len(vertices) < CORNERS:
+            return no_growth(points)
         corners, places = _vectors(vertices), _vectors(points)
         following = np.roll(corners, -1, axis=0)
         area = float(_excesses(corners[0], corners, following).sum())
@@ -110,9 +123,14 @@ class Sphere:
         factors: Floats = (area + added) / area
         return factors > limit, factors
 
-    def with_point(self, vertices: Points, point: tuple[float, float]) -> Points:
+    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull:
         """As `Judge.with_point`."""
-        return GeoHull(np.vstack([vertices, point]), center=self._center).vertices()
+        return GeoHull(np.vstack([hull.vertices(), point]), center=self._center)
+
+
+def no_growth(points: Points) -> tuple[Rows, Floats]:
+    """The answer of `Judge.too_large` for a hull without an area."""
+    return np.zeros(len(points), np.bool_), np.full(len(points), np.nan)
 
 
 def _speeds(lengths: Floats, elapsed: Microseconds) -> Floats:
@@ -121,11 +139,20 @@ def _speeds(lengths: Floats, elapsed: Microseconds) -> Floats:
     return speeds
 
 
-def _doubled(point: Floats, starts: Points, ends: Points) -> tuple[Floats, Floats]:
-    """Twice the areas of the triangles of points with edges, positive on their left; the sizes of their terms."""
-    along, to = ends - starts, point - starts
-    left, right = along[..., 0] * to[..., 1], along[..., 1] * to[..., 0]
+def _products(one: Points, other: Points) -> tuple[Floats, Floats]:
+    """The cross products of vectors, and the sizes of their terms."""
+    left, right = one[:, 0] * other[:, 1], one[:, 1] * other[:, 0]
     return left - right, np.abs(left) + np.abs(right)
+
+
+def _rows(points: Points, vertices: Points) -> npt.NDArray[np.intp]:
+    """The rows of points among the vertices of a hull, all of which are there. O(h + k log h)."""
+    numbers, wanted = as_numbers(vertices), as_numbers(points)
+    rightmost = int(np.argmax(numbers))
+    rows = np.searchsorted(numbers[: rightmost + 1], wanted)
+    above = numbers[np.minimum(rows, rightmost)] != wanted
+    rows[above] = len(numbers) - 1 - np.searchsorted(numbers[:rightmost:-1], wanted[above])
+    return rows
 
 
 def _exact_areas(vertices: list[list[float]], point: list[float]) -> tuple[Fraction, Fraction]:

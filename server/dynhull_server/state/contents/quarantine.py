@@ -17,7 +17,7 @@ from dynhull.keys import PackedKeys, key_list, take_keys
 
 from ..records import FOREVER, NO_TIME, HeldChange, HeldRows, KeyRows, Keys, QuarantineRules
 from .deadlines import Key
-from .judging import CORNERS, Judge
+from .judging import Judge
 from .live import AnyKeyedHull
 
 OFF = QuarantineRules()
@@ -206,9 +206,8 @@ class Quarantine:
             speeds[known[fast]] = found[fast]
         if rules.max_growth is not None and len(rows.keys):
             outside = np.flatnonzero(written & (hull.locate(rows.points) < 0))
-            vertices = hull.vertices() if len(outside) else rows.points[:0]
-            if len(vertices) >= CORNERS:
-                large, found = judge.too_large(vertices, rows.points[outside], rules.max_growth)
+            if len(outside):
+                large, found = judge.too_large(hull, rows.points[outside], rules.max_growth)
                 growths[outside[large]] = found[large]
         return speeds, growths
 
@@ -222,10 +221,8 @@ class Quarantine:
             if fast[0]:
                 return False
         if rules.max_growth is not None:
-            vertices = judge.with_point(hull.vertices(), (held.x, held.y))
-            if len(vertices) >= CORNERS:
-                large, _ = judge.too_large(vertices, there, rules.max_growth)
-                return not large[0]
+            large, _ = judge.too_large(judge.with_point(hull, (held.x, held.y)), there, rules.max_growth)
+            return not large[0]
         return True
 
     def _drop_others(
