@@ -87,6 +87,20 @@ def test_hulls_by_subject_and_several_points_a_message(
     assert client.get_hull(f"{name}/a").info.geographic is False
     said = ingested(address, url, *options)  # the place is kept by the broker, for there are several hulls
     assert [line["after"] for line in said if line["event"] == "reading"] == [4]
+    assert any("--producer NAME reads all again" in line["event"] for line in said)
+
+
+def test_each_mapping_has_its_own_place_in_the_log(client: HullClient, address: str, name: str, nats_port: int) -> None:
+    """What one took as bad, another still reads; no hull takes a message twice."""
+    publish(nats_port, name, [(f"v{i % 2}", {"lon": i, "lat": i}) for i in range(6)])
+    options = (f"nats://127.0.0.1:{nats_port}/{name}/{name}.*", "--hull", f"{name}/{{1}}")
+    assert ingested(address, *options, "--x", "$.lng")[-1]["bad"] == 6
+    said = ingested(address, *options)
+    assert [line["after"] for line in said if line["event"] == "reading"] == [0]
+    assert said[-1]["points"] == 6
+    again = ingested(address, *options, "--y", "$['lat']")[-1]
+    assert (again["points"], again["known_before"]) == (0, 6)
+    assert client.get_hull(f"{name}/v1").info.points == 3
 
 
 BAD = {
@@ -312,6 +326,7 @@ def test_a_server_that_is_away(name: str, nats_port: int) -> None:
         (["nats://b/s?foo=1", "--hull", "h"], "no option 'foo' after the question mark: there are none"),
         (["nats://b/s/a b", "--hull", "h"], "'a b' is no subject of NATS"),
         (["nats://b/s/>.a", "--hull", "h"], "goes on after >"),
+        (["nats://b/s", "--hull", "h", "--producer", "a b"], "--producer 'a b': a name has 1 to 200 letters"),
         (["nats://b/a.b", "--hull", "h"], "no stream of NATS is called 'a.b'"),
         (["nats://b/s", "--hull", "h", "--key", "{1"], "--key '{1': { has no other brace; {1}, {2}, ..."),
         (["nats://b/s", "--hull", "h", "--key", "{tpic}"], "--key: {tpic} is not {topic}, a path {$.name}"),

@@ -55,7 +55,10 @@ def ingest(
     ] = None,
     producer: Annotated[
         str | None,
-        typer.Option(help="Name under which hulls count the numbers of a log. Default: made from stream and subject."),
+        typer.Option(
+            help="Name under which hulls count the numbers of a log; a new one reads all again. Default: made from "
+            "stream and subject."
+        ),
     ] = None,
     bad: Annotated[Path | None, typer.Option(help="File of JSON lines to add bad messages to.", dir_okay=False)] = None,
     max_bad: Annotated[
@@ -120,7 +123,7 @@ def ingest(
     logs.configure(log_format.value)
 
     async def serve() -> bool:
-        find = feeds_of(source, hull, producer, keyed=key is not None, to_end=to_end)
+        find = feeds_of(source, hull, producer, mapping, to_end=to_end)
         async with connect(AsyncHullClient) as client:
             return await run(
                 client,

@@ -77,6 +77,12 @@ class Feed(Protocol):
         """Disconnect."""
 
 
+def check_producer(name: str) -> None:
+    """ValueError where no producer can have this name."""
+    if not name or UNSAFE.search(name) or len(name) > LONGEST_PRODUCER:
+        raise ValueError(f"--producer {name!r}: a name has 1 to {LONGEST_PRODUCER} letters, digits and ._-/")
+
+
 def producer_name(*parts: str) -> str:
     """A name for a producer that stands for these parts: letters, digits and ._-/, at most 200.
 

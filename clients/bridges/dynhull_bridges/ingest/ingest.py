@@ -12,9 +12,10 @@ from dynhull_client import AsyncHullClient
 
 from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
-from .feed import Feed, FeedError
+from .feed import Feed, FeedError, check_producer
 from .figures import Figures
 from .lane import NotCreatedError
+from .mapping import Mapping
 from .pump import BROKER_AWAY, FIRST_PAUSE, LONGEST_PAUSE, Pump, Settings
 
 log = structlog.get_logger("dynhull_ingest")
@@ -25,17 +26,19 @@ class IngestError(Exception):
     """The ingest cannot go on; the message says why."""
 
 
-def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool, to_end: bool) -> Find:
+def feeds_of(url: str, hull: str, producer: str | None, mapping: Mapping, *, to_end: bool) -> Find:
     """Finds the feeds that a URL stands for; it raises FeedError if the broker, which has to be asked, does not answer.
 
     Raises:
         ValueError: there are none, or an option does not suit them.
     """
+    if producer is not None:
+        check_producer(producer)
     match urlsplit(url).scheme:
         case "mqtt" | "mqtts":
             from .mqtt import Mqtt
 
-            if not keyed:
+            if not mapping.keyed:
                 raise ValueError(
                     "MQTT has no numbers: a message that comes twice would be two points. Give --key, whose point it "
                     "moves to the same place again"
@@ -48,13 +51,11 @@ def feeds_of(url: str, hull: str, producer: str | None, *, keyed: bool, to_end: 
         case "nats" | "tls":
             from .jetstream import JetStream
 
-            stream = JetStream(url)
-            stream.producer = producer or stream.producer
-            return _known([stream])
+            return _known([JetStream(url, producer, mapping.digest)])
         case "kafka":
             from .kafka import Topic
 
-            return Topic(url, producer).partitions
+            return Topic(url, producer, mapping.digest).partitions
         case scheme:
             raise ValueError(
                 f"the URL begins with {f'{scheme}:' if scheme else 'no scheme'}; there are mqtt(s)://HOST/FILTER, "
@@ -121,7 +122,9 @@ async def run(
     points = sum(each.points for each in pumps)
     ended, begun = [each.ended for each in pumps], [each.begun for each in pumps]
     seconds = max(ended, default=0.0) - min(begun, default=0.0)
-    log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count)
+    known = sum(each.known for each in pumps)
+    already = {"known_before": known} if known else {}
+    log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count, **already)
     return bool(pumps) and all(each.at_end for each in pumps)
 
 

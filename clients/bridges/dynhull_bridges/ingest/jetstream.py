@@ -38,9 +38,15 @@ SHORT_REPLY, SEQUENCE = 9, 5
 
 
 class JetStream:
-    """Reads nats://[USER:PASSWORD@]HOST[:PORT]/STREAM[/SUBJECT], or tls:// for TLS; the subject may have wildcards."""
+    """Reads nats://[USER:PASSWORD@]HOST[:PORT]/STREAM[/SUBJECT], or tls:// for TLS; the subject may have wildcards.
 
-    def __init__(self, url: str) -> None:
+    Args:
+        url: the URL.
+        producer: the name under which hulls count the numbers of messages; None for one of stream and subject.
+        mapping: the digest of the mapping. Each has its own place in the stream.
+    """
+
+    def __init__(self, url: str, producer: str | None, mapping: str) -> None:
         parts = urlsplit(url, allow_fragments=False)
         stream, _, subject = unquote(parts.path).strip("/").partition("/")
         if not parts.hostname or not stream:
@@ -54,7 +60,9 @@ class JetStream:
             if ">" in subject.split(".")[:-1]:
                 raise ValueError(f"the subject {subject!r} goes on after >, which stands for all words from there on")
         self.name = without_secrets(url)
-        self.producer: str | None = producer_name("nats", stream, *([subject] if subject else []))
+        self.producer: str | None = producer or producer_name("nats", stream, *([subject] if subject else []))
+        # As a key of a bucket, which may not begin or end with a dot; no producer has an equals sign.
+        self._key = f"p-{self.producer}={mapping}-p"
         self._server = parts._replace(path="").geturl()
         self._stream = stream
         self._subject = subject or ">"
@@ -196,11 +204,6 @@ class JetStream:
             return await self._context.key_value(POSITIONS)
         except BucketNotFoundError:
             return await self._context.create_key_value(KeyValueConfig(bucket=POSITIONS))
-
-    @property
-    def _key(self) -> str:
-        """The producer as a key of a bucket, which may not begin or end with a dot."""
-        return f"p-{self.producer}-p"
 
     async def lag(self) -> int | None:
         """The number of messages that are not read yet."""

@@ -16,13 +16,21 @@ GROUP = "dynhull-ingest"
 
 
 class Kafka:
-    """Reads one partition of kafka://HOST[:PORT][,HOST...]/TOPIC."""
+    """Reads one partition of kafka://HOST[:PORT][,HOST...]/TOPIC.
 
-    def __init__(self, servers: str, topic: str, partition: int) -> None:
+    Args:
+        servers: the hosts.
+        topic: the name of the topic.
+        partition: the number of the partition.
+        producer: the name under which hulls count the offsets; None for one of topic and partition.
+        group: the group that keeps the offset.
+    """
+
+    def __init__(self, servers: str, topic: str, partition: int, producer: str | None, group: str) -> None:
         self.name = f"kafka/{topic}/{partition}"
-        self.producer: str | None = producer_name("kafka", topic, str(partition))
+        self.producer: str | None = producer or producer_name("kafka", topic, str(partition))
+        self._group = group
         self._servers = servers
-        self.number = partition
         self._partition = TopicPartition(topic, partition)
         self._captures = (topic,)
         self._consumer: AIOKafkaConsumer | None = None
@@ -33,7 +41,7 @@ class Kafka:
         """Connect; see `Feed.begin`."""
         consumer = AIOKafkaConsumer(
             bootstrap_servers=self._servers,
-            group_id=GROUP,  # only keeps the offset: the partition is not shared with other members
+            group_id=self._group,  # only keeps the offset: the partition is not shared with other members
             enable_auto_commit=False,
             auto_offset_reset="none",
             isolation_level="read_committed",
@@ -102,16 +110,18 @@ class Topic:
     Args:
         url: the URL; without partitions it is about all of them.
         producer: the name under which hulls count the offsets, followed by the partition; None for one of the topic.
+        mapping: the digest of the mapping. Each has its own place in the topic.
 
     Raises:
         ValueError: the URL names no topic, or a partition that is no number.
     """
 
-    def __init__(self, url: str, producer: str | None) -> None:
+    def __init__(self, url: str, producer: str | None, mapping: str) -> None:
         parts = urlsplit(url)
         self._servers = parts.netloc
         self._name = unquote(parts.path).strip("/")
         self._producer = producer
+        self._group = ".".join((GROUP, mapping, *([producer] if producer else [])))
         if not self._servers or not self._name or "/" in self._name:
             raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
         asked = options_of(url, ("partition",)).get("partition", [])
@@ -141,7 +151,8 @@ class Topic:
             raise ValueError(f"Kafka has no topic {self._name!r}")
         if missing := sorted(set(self._asked) - set(there)):
             raise ValueError(f"the topic {self._name!r} has no partition {missing[0]}: it has 0 to {max(there)}")
-        found = [Kafka(self._servers, self._name, each) for each in self._asked or there]
-        for each in found:
-            each.producer = f"{self._producer}/{each.number}" if self._producer else each.producer
-        return found
+        return [self._partition(each) for each in self._asked or there]
+
+    def _partition(self, number: int) -> Kafka:
+        producer = f"{self._producer}/{number}" if self._producer else None
+        return Kafka(self._servers, self._name, number, producer, self._group)

@@ -96,6 +96,7 @@ class Lane:
         self._failure: Exception | None = None
         self._news = asyncio.Event()
         self._room = asyncio.Event()
+        self.known = 0  # rows that the hull had already
 
     async def put(self, chunk: Chunk) -> None:
         """Queue a chunk; waits while many wait already."""
@@ -171,6 +172,7 @@ class Lane:
         chunk = self._waiting.popleft()
         self._room.set()
         rest = chunk.after(known)
+        self.known += len(chunk.points) - (0 if rest is None else len(rest.points))
         if rest is None:
             self._away.ends()
             self._settled(0)

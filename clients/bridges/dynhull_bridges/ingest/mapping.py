@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from contextlib import suppress
+from hashlib import sha256
 from typing import Any, NamedTuple
 
 import orjson
@@ -39,6 +40,7 @@ class Mapping:
         hull: the hull of all messages; None if it depends on the message.
         keyed: whether rows have keys.
         degrees: whether the coordinates have the names of longitudes and latitudes.
+        digest: differs from that of any other mapping.
 
     Raises:
         ValueError: an expression is none.
@@ -49,6 +51,7 @@ class Mapping:
     ) -> None:
         self.hull = hull if is_fixed(hull) else None
         self.keyed = key is not None
+        self.digest = sha256(repr((hull, x, y, key, time, str(time_unit), each)).encode()).hexdigest()[:12]
         self.degrees = are_degrees(last_name(x), last_name(y))
         self._hull = value_of(hull, "--hull")
         self._x, self._y = value_of(x, "--x"), value_of(y, "--y")

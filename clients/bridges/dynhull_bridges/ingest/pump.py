@@ -83,6 +83,11 @@ class Pump:
         """The number of messages that are read and not settled."""
         return sum(len(each.messages) for each in self._under_way)
 
+    @property
+    def known(self) -> int:
+        """The number of rows that the hulls had already."""
+        return sum(each.known for each in self._lanes.values())
+
     async def run(self, stop: asyncio.Event) -> None:
         """Read until `stop`, or until no message is left if that is asked for; then wait for what is under way.
 
@@ -125,8 +130,10 @@ class Pump:
         begun = await unless(stop, self._begin())
         if begun is None:
             return
-        self.reached = max(self.reached, begun)
         log.info("reading", feed=feed.name, **({} if feed.producer is None else {"after": begun}))
+        if begun and not self.reached:
+            log.info("goes on where it stopped; --producer NAME reads all again, as if nothing had been taken")
+        self.reached = max(self.reached, begun)
         at_end = False
         while not stop.is_set():
             messages = await feed.read()
