@@ -75,6 +75,12 @@ LOADS = [
         "create {name}-2 --geographic --center 80,40; load {name}-2 half.csv",
     ),
     ("create {name} --center 1,2", "--center is given with --geographic", "create {name} --geographic --center 1,2"),
+    ("create {name} --max-speed 5", "--max-speed is given with --keyed", "create {name} --max-speed 5 --keyed str"),
+    (
+        "create {name} --clamp",
+        "--clamp is given with --max-age or --max-points",
+        "create {name} --clamp --max-skew 1m --max-age 5m",
+    ),
     ("insert {name} 1,2", "`dynhull list`", "list"),
     ("insert {name} 1,2", "`dynhull create`", "create {name}; insert {name} 1,2"),
     ("insert loaded", "as lines of standard input", "insert loaded -1,2"),

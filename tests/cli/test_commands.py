@@ -254,8 +254,6 @@ def test_a_list_without_rows_says_so(served, name, tmp_path):
         f"query {name} vertices": f"{name} has no vertices",
         f"query {name} influence": f"{name} has no vertices",
         f"query {name} vertices --layer 2": f"layer 2 of {name} has no vertices",
-        f"query {name} locate -": "no points were given",
-        f"query {name} positions -": "no keys were given",
         f"phases {name}": f"{name} has no stable entries",
         f"frontier {name}": f"{name} has no efficient points",
         f"relay dead-letters list --state {tmp_path}": f"{tmp_path} has no dead letters",
@@ -264,6 +262,13 @@ def test_a_list_without_rows_says_so(served, name, tmp_path):
         for json_too in ([], ["--json"]) if "inside" not in command else ([],):
             done = dynhull(*command.split(), *json_too, input="")
             assert (done.exit_code, done.stdout, done.stderr) == (0, "", f"{words}\n"), command
+    for question, words in {
+        "locate": "no points: give X,Y",
+        "lines": "no points: give X,Y,X,Y",
+        "positions": "no keys",
+    }.items():
+        done = dynhull("query", name, question, input="")
+        assert (done.exit_code, done.stderr.startswith(f"error: {words}")) == (2, True), done.stderr
     code, shown = on_a_terminal("list", "nobody/")
     assert (code, shown) == (0, "no hulls with names that begin with 'nobody/'\r\n")
 
@@ -312,10 +317,11 @@ def test_tokens(tmp_path, monkeypatch):
     tokens.write_text("[[token]]\n" + "".join(f"{key} = {value}\n" for key, value in entry.items()))
     with server_process("--tokens", str(tokens), complaints="UNAUTHENTICATED") as server:
         monkeypatch.setenv("DYNHULL_ADDRESS", server.address)
-        for token in ([], ["--token", "wrong"]):
+        for token, words in (([], "requires a token: "), (["--token", "wrong"], "does not know the given token: ")):
             done = dynhull("load", "a", *token, input="x,y\n1,2\n")
             assert done.exit_code == 4
-            assert "Give a token with --token or in DYNHULL_TOKEN." in done.stderr
+            assert words in done.stderr
+            assert "with --token or in DYNHULL_TOKEN" in done.stderr
         monkeypatch.setenv("DYNHULL_TOKEN", "right")
         assert dynhull("load", "a", input="x,y\n1,2\n").exit_code == 0
         done = dynhull("load", "b", input="x,y\n1,2\n")

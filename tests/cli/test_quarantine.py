@@ -30,6 +30,7 @@ def test_held_positions_are_listed_released_and_dropped(name):
     rules = run("quarantine", "set", name, "--max-growth", "1.5", "--max-speed", "3").stdout
     assert rules == f"{name}: at most 3 a second and at most 1.5 times the area, 0 keys held, revision 5\n"
     listed = json.loads(run("list", name, "--json").stdout)
+    assert run("list", name).stdout.endswith("\tquarantine at most 3 a second and at most 1.5 times the area, 0 held\n")
     assert (listed["max_speed"], listed["max_growth"], listed["confirmations"], listed["held"]) == (3, 1.5, 1, 0)
     assert "no rules" in run("quarantine", "set", name, "--off").stdout
 

@@ -111,8 +111,13 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
                     "This machine does not trust the server's certificate: name its authority's file with --tls-ca."
                 )
             fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
-        except sdk.UnauthenticatedError as error:
-            fail(Exit.FORBIDDEN, f"{error}\nGive a token with --token or in DYNHULL_TOKEN.")
+        except sdk.UnauthenticatedError:
+            if token is None:
+                fail(Exit.FORBIDDEN, "the server requires a token: give one with --token or in DYNHULL_TOKEN")
+            fail(
+                Exit.FORBIDDEN,
+                "the server does not know the given token: give another one with --token or in DYNHULL_TOKEN",
+            )
         except sdk.PermissionDeniedError as error:
             fail(Exit.FORBIDDEN, str(error))
         except sdk.HullNotFoundError as error:
@@ -120,7 +125,9 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         except sdk.FenceNotFoundError as error:
             fail(Exit.FAILED, f"{error}\n`dynhull fences list` shows the fences of the server.")
         except sdk.InvalidRequestError as error:
-            fail(Exit.UNUSABLE, str(error))
+            from .fields import in_options
+
+            fail(Exit.UNUSABLE, in_options(error))
         except sdk.DynhullError as error:
             fail(Exit.FAILED, str(error))
         except OSError as error:

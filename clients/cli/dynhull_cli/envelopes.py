@@ -40,7 +40,7 @@ def phases(
         for entry in listed(client.phase_diagram(name).stable.tolist(), f"{name} has no stable entries"):
             typer.echo(json_line(stable=entry) if as_json else tab_line(entry))
         return
-    for rows in listed(number_rows(entries), "no entries were given"):
+    for rows in number_rows(entries):
         found = client.phase_diagram(name, rows)
         for entry, above, both, shares in zip(rows, found.energies_above_hull, found.phases, found.shares, strict=True):
             if as_json:
@@ -78,7 +78,7 @@ def frontier(
         corners = zip_longest(found.efficient, found.turning_rates, fillvalue=math.nan)
         for corner, rate in listed(corners, f"{name} has no efficient points"):
             typer.echo(json_line(efficient=corner, turning_rate=rate) if as_json else tab_line(corner, rate))
-    for rows in listed(number_rows(points), "no points were given") if points else ():
+    for rows in number_rows(points) if points else ():
         for point, dominated in zip(rows, client.frontier(name, rows).dominated.tolist(), strict=True):
             if as_json:
                 typer.echo(json_line(asked=point, dominated=dominated))

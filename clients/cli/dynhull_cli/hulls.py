@@ -12,7 +12,7 @@ from .exits import Exit
 from .json_lines import json_line
 from .listing import below, listed
 from .plural import plural
-from .quarantine import Confirmations, MaxGrowth, MaxSpeed, given_rules, rule_members
+from .quarantine import Confirmations, MaxGrowth, MaxSpeed, given_rules, rule_members, shown_rules
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -43,7 +43,7 @@ def list_hulls(
     prefix: Annotated[str, typer.Argument(metavar="PREFIX", help="List only hulls whose names begin with this.")] = "",
     as_json: AsJson = False,
 ) -> None:
-    """List the hulls by name, with their points, distinct points, revision, kind of keys, window and centre.
+    """List the hulls by name: points, distinct points, revision, kind of keys, window, centre and quarantine.
 
     dynhull list fleet/ --json | jq -r .name
 
@@ -63,7 +63,8 @@ def list_hulls(
         else:
             counts = f"{info.points}\t{info.distinct}\t{info.revision}"
             frame = f"\tglobe {_shown_place(info)}".rstrip(" ") if info.geographic else ""
-            typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}")
+            held = f"\tquarantine {_quarantine(info)}" if _quarantine(info) else ""
+            typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}{held}")
 
 
 COUNTS = {"min": 1, "max": 2**63 - 1, "metavar": "INTEGER"}
@@ -151,8 +152,17 @@ def create(
         "center": None if center is None else _place(center),
         "quarantine": given_rules(max_speed, max_growth, confirmations),
     }
-    if center is not None and not geographic:
-        raise ValueError("--center is given with --geographic")
+    _require("--geographic", geographic, {"--center": center is not None})
+    _require(
+        "--keyed",
+        keyed is not None,
+        {"--max-speed": max_speed is not None, "--max-growth": max_growth is not None, "--event-order": event_order},
+    )
+    _require(
+        "--max-age or --max-points",
+        max_age is not None or max_points is not None,
+        {"--clock": clock is not ClockKind.SERVER, "--max-skew": max_skew is not None, "--clamp": clamp},
+    )
     for name in names:
         try:
             client.create_hull(name, **settings)
@@ -165,6 +175,12 @@ def create(
         typer.echo(
             json_line(name=name, created=created) if as_json else f"{name}: {'created' if created else 'exists'}"
         )
+
+
+def _require(other: str, there: bool, given: dict[str, bool]) -> None:
+    """Raise ValueError for an option that is given without the other one that it needs."""
+    for option in (option for option, is_given in given.items() if is_given and not there):
+        raise ValueError(f"{option} is given with {other}")
 
 
 @connected
@@ -276,6 +292,13 @@ def _window(info: "HullInfo") -> str:
     return ", ".join([*age, *([] if info.window.max_points is None else [f"{info.window.max_points:,} points"])])
 
 
+def _quarantine(info: "HullInfo") -> str:
+    """The rules of the quarantine and the number of keys in it; empty without rules and keys."""
+    if info.quarantine is None and not info.held:
+        return ""
+    return f"{shown_rules(info.quarantine)}, {info.held:,} held"
+
+
 def _table(hulls: "list[HullInfo]") -> "Table":
     from rich.table import Table
 
@@ -285,7 +308,8 @@ def _table(hulls: "list[HullInfo]") -> "Table":
     table.add_column("keys")
     table.add_column("window")
     table.add_column("centre")
+    table.add_column("quarantine")
     for info in hulls:
         counts = (f"{each:,}" for each in (info.points, info.distinct, info.revision))
-        table.add_row(info.name, *counts, info.keyed or "", _window(info), _shown_place(info))
+        table.add_row(info.name, *counts, info.keyed or "", _window(info), _shown_place(info), _quarantine(info))
     return table

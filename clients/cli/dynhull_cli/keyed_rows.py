@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynhull_client import HullClient, HullInfo, Points
+from dynhull_client import HullClient, HullInfo, InvalidRequestError, Points
 
 from .columns import plain
 from .rows import STANDARD_INPUT
@@ -34,10 +34,13 @@ def keyed_rows(arguments: list[str] | None) -> tuple[list[str], Points]:
 
 
 def given_keys(arguments: list[str] | None) -> list[str]:
-    """The arguments as keys, or the lines of standard input."""
+    """The arguments as keys, or the lines of standard input; ValueError if there are none."""
     if arguments and arguments != STANDARD_INPUT:
         return arguments
-    return [fields[0] for fields in _lines(arguments) if fields]
+    keys = [fields[0] for fields in _lines(arguments) if fields]
+    if not keys:
+        raise ValueError("no keys: give them as arguments, or as lines of standard input")
+    return keys
 
 
 def keys_for(client: HullClient, name: str, keys: Sequence[str]) -> list[str] | list[int]:
@@ -50,7 +53,10 @@ def keys_for(client: HullClient, name: str, keys: Sequence[str]) -> list[str] | 
 
 def known_hull(client: HullClient, name: str) -> HullInfo | None:
     """The hull, None if there is no such hull."""
-    first = next(client.list_hulls(name), None)
+    try:
+        first = next(client.list_hulls(name), None)
+    except InvalidRequestError as error:
+        raise ValueError(f"the name of the hull {str(error).removeprefix('prefix ')}") from None
     return first if first is not None and first.name == name else None
 
 

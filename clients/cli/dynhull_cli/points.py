@@ -115,10 +115,7 @@ def _all_rows(points: list[str] | None) -> "Points":
 
     from .rows import given_or_read, number_rows
 
-    rows = list(number_rows(given_or_read(points)))
-    if not rows:
-        raise ValueError("no points: give X,Y for each of them, as arguments or as lines of standard input")
-    return np.concatenate(rows)
+    return np.concatenate(list(number_rows(given_or_read(points))))
 
 
 def _left_out(applied: "Applied") -> str:

@@ -93,7 +93,7 @@ def set_rules(
     if as_json:
         typer.echo(json_line(name=name, revision=info.revision, held=info.held, **rule_members(info.quarantine)))
     else:
-        typer.echo(f"{name}: {_shown(info.quarantine)}, {plural(info.held, 'key')} held, revision {info.revision}")
+        typer.echo(f"{name}: {shown_rules(info.quarantine)}, {plural(info.held, 'key')} held, revision {info.revision}")
 
 
 @group(list=list_held, release=release, drop=drop, set=set_rules)
@@ -130,7 +130,7 @@ def rule_members(rules: "Quarantine | None") -> dict[str, Any]:
     }
 
 
-def _shown(rules: "Quarantine | None") -> str:
+def shown_rules(rules: "Quarantine | None") -> str:
     """The rules in a few words."""
     if rules is None or (rules.max_speed is None and rules.max_growth is None):
         return "no rules"

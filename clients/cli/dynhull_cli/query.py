@@ -178,7 +178,7 @@ def _ask_about_keys(
     else:
         located = client.locate(name, keys=keys, keys_of=keys_of, layer=layer)
         answers = [SIDES[each] for each in located.sides.tolist()]
-    for key, answer in listed(zip(keys, answers, strict=True), "no keys were given"):
+    for key, answer in zip(keys, answers, strict=True):
         typer.echo(json_line(asked=key, answer=answer) if as_json else tab_line(key, answer))
 
 
@@ -193,8 +193,7 @@ def _ask_about_points(
 ) -> None:
     from .rows import given_or_read, number_rows
 
-    pieces = number_rows(given_or_read(arguments), 4 if question is Question.LINES else 2)
-    for rows in listed(pieces, "no points were given"):
+    for rows in number_rows(given_or_read(arguments), 4 if question is Question.LINES else 2):
         answers: list[Any]
         if named:
             found = client.support(name, rows, keys=True, layer=layer)

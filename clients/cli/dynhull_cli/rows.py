@@ -23,13 +23,18 @@ def number_rows(arguments: list[str], columns: int = 2) -> Iterator[Points]:
     """Arrays of rows from the arguments, each "X,Y" or, with four columns, "X,Y,X,Y".
 
     A single argument "-" stands for the lines of standard input. Blank lines are skipped. ValueError names the first
-    row that is not numbers.
+    row that is not numbers, or says that there are none.
     """
     read = arguments == STANDARD_INPUT
     texts: Iterable[str] = sys.stdin if read else arguments
     placed = ((f"{'line' if read else 'argument'} {i}", text) for i, text in enumerate(texts, 1) if text.strip())
+    empty = True
     for piece in cut(placed, CHUNK_ROWS):
+        empty = False
         yield np.array([_numbers(place, text, columns) for place, text in piece])
+    if empty:
+        what = f"give {SHAPES[columns]} for each of them, as arguments or as lines of standard input"
+        raise ValueError(f"no points: {what}")
 
 
 def _numbers(place: str, text: str, columns: int) -> list[float]:
