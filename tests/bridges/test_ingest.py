@@ -103,6 +103,15 @@ def test_each_mapping_has_its_own_place_in_the_log(client: HullClient, address: 
     assert client.get_hull(f"{name}/v1").info.points == 3
 
 
+def test_a_subject_that_the_stream_does_not_store(address: str, name: str, nats_port: int) -> None:
+    publish(nats_port, name, [])
+    url = f"nats://127.0.0.1:{nats_port}/{name}/trucks.*"
+    with ingest_process(address, url, "--hull", name, code=2) as ingest:
+        ingest.process.wait(PATIENCE)
+        (said,) = ingest.lines()
+    assert f"stores nothing of 'trucks.*': its subjects are {name}.>" in said
+
+
 BAD = {
     b"{": "the message is no JSON",
     b"": "the message is empty",

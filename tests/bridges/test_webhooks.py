@@ -148,7 +148,9 @@ def test_what_is_refused_becomes_a_dead_letter_and_can_be_sent_again(
     refused = run(*send)
     assert (refused.returncode, refused.stdout) == (1, "0 sent\n")
     assert "HTTP 422" in refused.stderr
-    assert run(*send, "nobody").returncode == 2
+    unknown = run(*send, "nobody")
+    assert (unknown.returncode, unknown.stderr.count("\n")) == (2, 1)
+    assert "has no dead letter nobody" in unknown.stderr
     endpoint.answer = lambda _: (204, {})
     assert run(*send, f"{uid}-4").stdout == "1 sent\n"
     assert run(*send).stdout == "1 sent\n"
@@ -265,6 +267,11 @@ def test_the_metrics_page(client: HullClient, address: str, name: str, endpoint:
         pass_through(client, name, KEYS)
         wait_until(lambda: acknowledged(client, name) == 2)
         wait_until(lambda: scrape(page).get(f'dynhull_relay_backlog{{fence="{name}"}}') == 8)
+        taken = page.rpartition(":")[2]
+        options = ("--address", address, "--consumer", "other", "--to", tmp_path / "other", "--metrics-port", taken)
+        refused = dynhull("relay", name, *options)
+        assert refused.exit_code == 2
+        assert f"--metrics-port {taken}: cannot listen on 127.0.0.1: another program uses this port" in refused.stderr
         figures = scrape(page)
         assert figures[f'dynhull_relay_delivered_total{{fence="{name}"}}'] == 2
         assert figures[f'dynhull_relay_failed_total{{fence="{name}"}}'] >= 1
@@ -325,6 +332,14 @@ def test_a_name_that_leads_home_gets_nothing(
         pass_through(client, name, ["truck"])
         assert "private address" in relay.wait_for("not delivered, trying again")["error"]
     assert endpoint.received == []
+
+
+def test_a_consumer_that_no_fence_can_have(client: HullClient, address: str, name: str, tmp_path: Path) -> None:
+    options = ("--address", address, "--consumer", "ä b", "--to", tmp_path / "events")
+    refused = dynhull("relay", name, *options)
+    assert refused.exit_code == 2
+    assert "'ä b'" in refused.stderr
+    assert client.get_fence(name).consumers == ()
 
 
 def test_a_fence_that_does_not_exist(client: HullClient, address: str, name: str, tmp_path: Path) -> None:

@@ -100,6 +100,10 @@ def send(
     from .signatures import read_secret
 
     async def run() -> tuple[int, str | None]:
+        found = StateFolder(state).dead_letters()
+        unknown = set(ids or ()) - {each.letter.id for each in found}
+        if unknown:
+            raise ValueError(f"{state} has no dead letter {', '.join(sorted(unknown))}")
         target = target_of(
             to,
             keys=[read_secret(each) for each in secret or ()],
@@ -108,10 +112,6 @@ def send(
             timeout=_seconds(timeout, "--timeout"),
             allow_private=allow_private,
         )
-        found = StateFolder(state).dead_letters()
-        unknown = set(ids or ()) - {each.letter.id for each in found}
-        if unknown:
-            raise ValueError(f"{state} has no dead letter {', '.join(sorted(unknown))}")
         return await send_again([each for each in found if not ids or each.letter.id in ids], target)
 
     try:

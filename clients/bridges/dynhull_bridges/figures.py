@@ -2,9 +2,11 @@
 
 import time
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, start_http_server
+from prometheus_client import CollectorRegistry, Counter, Gauge
 
 from dynhull_client import FenceConsumer
+
+from .metrics_page import serve_page
 
 
 class Figures:
@@ -43,5 +45,4 @@ class Figures:
 
     def serve(self, host: str, port: int) -> int:
         """Serve the page from another thread, and return its port."""
-        server, _ = start_http_server(port, host, self._registry)
-        return int(server.server_port)
+        return serve_page(self._registry, host, port)

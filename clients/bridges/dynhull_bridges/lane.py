@@ -11,6 +11,7 @@ from dynhull_client import (
     DeadlineError,
     DynhullError,
     FenceEvent,
+    InvalidRequestError,
     OutcomeUnknownError,
     UnavailableError,
 )
@@ -124,7 +125,8 @@ class Lane:
                 await self._arrived.put(None)
                 return
             except DynhullError as error:
-                if not self._begun and not isinstance(error, UnavailableError):
+                refused = isinstance(error, InvalidRequestError)  # no consumer can have this name, for example
+                if refused or (not self._begun and not isinstance(error, UnavailableError)):
                     raise
                 self._log.warning("no events from the server, trying again", error=str(error))
             await asyncio.sleep(next(pauses))

@@ -13,7 +13,7 @@ import nats
 from nats.aio.msg import Msg
 from nats.errors import Error
 from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig
-from nats.js.errors import BucketNotFoundError, KeyNotFoundError, NotFoundError
+from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError, NotFoundError
 from nats.js.kv import KeyValue
 
 from ..urls import check_subject, options_of, without_secrets
@@ -32,6 +32,7 @@ WAIT = 1.0  # seconds that a read waits for messages
 EXPIRES = 5.0  # seconds after which the server ends a request, and says so
 SILENCE = 15.0  # seconds without a word, after which the connection is lost
 NO_MESSAGES, REQUEST_EXPIRED = "404", "408"
+NOT_IN_STREAM = 10093  # the code of an error
 REFUSAL = "authorization violation"
 # The reply subject of a message: $JS.ACK.STREAM.CONSUMER.attempts.sequence.delivered.time.pending
 SHORT_REPLY, SEQUENCE = 9, 5
@@ -100,7 +101,8 @@ class JetStream:
             error_cb=_quiet,
         )
         self._context = self._client.jetstream(timeout=TIMEOUT)
-        state = (await self._context.stream_info(self._stream)).state
+        stream = await self._context.stream_info(self._stream)
+        state = stream.state
         self._keeps = known is None
         after = await self._kept() if known is None else known
         if after > state.last_seq:
@@ -108,17 +110,23 @@ class JetStream:
                 f"the stream {self._stream!r} ends at {state.last_seq}, but {after} messages of it have been taken: it "
                 "was created again. Give another --producer, or another hull"
             )
-        consumer = await self._context.add_consumer(
-            self._stream,
-            ConsumerConfig(
-                ack_policy=AckPolicy.NONE,
-                deliver_policy=DeliverPolicy.BY_START_SEQUENCE,
-                opt_start_seq=after + 1,
-                filter_subject=self._subject,
-                inactive_threshold=60.0,
-                mem_storage=True,
-            ),
+        wanted = ConsumerConfig(
+            ack_policy=AckPolicy.NONE,
+            deliver_policy=DeliverPolicy.BY_START_SEQUENCE,
+            opt_start_seq=after + 1,
+            filter_subject=self._subject,
+            inactive_threshold=60.0,
+            mem_storage=True,
         )
+        try:
+            consumer = await self._context.add_consumer(self._stream, wanted)
+        except BadRequestError as error:
+            if error.err_code != NOT_IN_STREAM:
+                raise
+            there = ", ".join(stream.config.subjects or ())
+            raise ValueError(
+                f"the stream {self._stream!r} stores nothing of {self._subject!r}: its subjects are {there}"
+            ) from None
         self._left = consumer.num_pending or 0
         self._pull = f"$JS.API.CONSUMER.MSG.NEXT.{self._stream}.{consumer.name}"
         self._arrived.clear()
