@@ -118,6 +118,34 @@ def test_the_life_of_a_fence(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("served")
+def test_a_radius_on_the_globe_is_in_metres(name: str) -> None:
+    assert dynhull("create", name, "--keyed", "str", "--geographic", "--center", "13,52").exit_code == 0
+    ran("create", name, "--circle", 13.4, 52.5, 20000, "--subjects", name)
+    assert ran("show", name)[0] == "area\tcircle around (13.4, 52.5), radius 20000 m"
+    assert dynhull("create", f"{name}-plane", "--keyed", "str").exit_code == 0
+    ran("create", f"{name}-plane", "--circle", 13.4, 52.5, 0.2, "--subjects", f"{name}-plane")
+    assert ran("show", f"{name}-plane")[0].endswith("radius 0.2")
+
+
+@pytest.mark.parametrize(
+    ("polygon", "problem"),
+    [
+        ("POLYGON ((0 0, 4 0, 4 3, 0 0)", "1 ) missing at the end, after character 29"),
+        ("POLYGON (0 0), 4 0, 4 3, 0 0))", "character 29 is a ) without its ("),
+        ("POLYGON ((0 0, 4 O, 4 3, 0 0))", "character 18: 'O' is not a number"),
+        ("POLYGON ((0 0 4 0, 4 3, 0,0))", "corners are X Y with commas between them, as in POLYGON ((0 0, 4 0,"),
+        ("POLYGON ((0 0, 4 0, 4 3))", "form a closed"),
+    ],
+)
+def test_a_slip_in_wkt_is_named_with_its_place(served: str, polygon: str, problem: str) -> None:  # noqa: ARG001
+    done = dynhull("fences", "create", "depot", "--polygon", polygon, "--subjects", "vehicles")
+    assert done.exit_code == 2
+    assert done.stderr.startswith("error: --polygon is not WKT: "), done.stderr
+    assert problem in done.stderr
+    assert "Exception" not in done.stderr
+
+
+@pytest.mark.usefixtures("served")
 def test_a_closed_pipe_ends_a_watch_with_success(name: str) -> None:
     assert dynhull("create", name, "--keyed", "str").exit_code == 0
     ran("create", name, "--polygon", TRIANGLE, "--subjects", name)

@@ -176,6 +176,8 @@ def apply(stub: HullServiceStub, sequence: int) -> Any:
 REFUSED = {
     "no address": ("postgresql://?what=1", "--journal: no address of a PostgreSQL database: "),
     "no server": ("postgresql://tester@127.0.0.1:1/hulls", "cannot connect to the database hulls on 127.0.0.1:1: "),
+    "another database": ("mysql://me:secret@host/hulls", "mysql:// is not one of its schemes; write postgresql://"),
+    "no rights": ("{url}&user=guarded&password=right", 'have its owner say GRANT CREATE ON DATABASE "test'),
     "no database": ("{url}&dbname=missing", 'database "missing" does not exist'),
     "a wrong password": ("{url}&user=guarded&password=secret", "password authentication failed"),
 }

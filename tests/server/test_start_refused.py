@@ -58,6 +58,12 @@ def test_a_file_that_is_unusable(files: Path, monkeypatch: pytest.MonkeyPatch, o
     assert words in line
 
 
+def test_a_file_without_tokens_is_warned_about(files: Path) -> None:
+    (files / "none.toml").write_text("")
+    with server_process("--tokens", str(files / "none.toml"), complaints="has none: every call is refused"):
+        pass
+
+
 def test_data_in_a_file(files: Path) -> None:
     refused = run("serve", "--port", "0", "--data", str(files / "points.csv"))
     assert refused.returncode == 2

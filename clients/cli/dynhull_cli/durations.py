@@ -24,7 +24,9 @@ def duration(text: str | None, option: str) -> timedelta | None:
             return float(found[1]) * UNITS[found[2]]
     except OverflowError:
         pass
-    raise ValueError(f"{option} {text!r} is not a time span: write for example 500ms, 90s, 30m, 2h or 7d")
+    raise ValueError(
+        f"{option} {text!r} is not a time span: write for example 500ms, 90s, 30m, 2h or 7d; a number alone is seconds"
+    )
 
 
 def shown(span: timedelta) -> str:

@@ -83,7 +83,8 @@ def create(
         _setting("Name each point by a key, a string or an integer. Default: points without keys.", "--keyed"),
     ] = None,
     max_age: Annotated[
-        str | None, _setting("Age at which points leave: 500ms, 90s, 30m, 2h or 7d. Default: never.")
+        str | None,
+        _setting("Age at which points leave: 500ms, 90s, 30m, 2h or 7d; a number alone is seconds. Default: never."),
     ] = None,
     max_points: Annotated[
         int | None, _setting("Number of points beyond which the oldest leave. Default: no such limit.", **COUNTS)
@@ -93,7 +94,7 @@ def create(
     ] = ClockKind.SERVER,
     max_skew: Annotated[
         str | None,
-        _setting("How far an event time may be ahead of the server's clock. Default: any distance."),
+        _setting("How far an event time may be ahead of the server's clock, as for --max-age. Default: any distance."),
     ] = None,
     clamp: Annotated[
         bool, _setting("Reduce event times further ahead to the latest allowed, rather than refuse them.", "--clamp")

@@ -47,7 +47,10 @@ def put(
         typer.Option(help="Event time of the positions: ISO 8601 with a time zone, or a number since 1970."),
     ] = None,
     ttl: Annotated[
-        str | None, typer.Option(help="Time after which the points leave the hull: 500ms, 90s, 30m, 2h or 7d.")
+        str | None,
+        typer.Option(
+            help="Time after which the points leave the hull: 500ms, 90s, 30m, 2h or 7d; a number alone is seconds."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

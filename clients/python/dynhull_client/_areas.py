@@ -15,7 +15,10 @@ from ._messages import decode_points, encode_points
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A disk as the area of a fence: center and radius, which is at least 0. Whether a point is inside is exact."""
+    """A disk as the area of a fence: center and radius, which is at least 0. Whether a point is inside is exact.
+
+    For hulls on the globe the center is a longitude and a latitude in degrees, and the radius is in metres.
+    """
 
     x: float
     y: float

@@ -14,6 +14,8 @@ from dynhull_server.storage.rows.tables import UnreadableError
 Connection = psycopg.Connection[tuple[Any, ...]]
 
 SCHEMA = "dynhull"
+SCHEMES = "postgresql", "postgres"
+EXAMPLES = "write postgresql://USER@HOST:PORT/DATABASE, or host=HOST dbname=DATABASE"
 OLDEST_VERSION = 15
 # Seconds until a connection attempt ends; milliseconds until data that nobody acknowledges ends a connection.
 CONNECT_SECONDS, UNACKNOWLEDGED_MS = 10, 10_000
@@ -46,10 +48,13 @@ class Database:
     """
 
     def __init__(self, address: str) -> None:
+        scheme, mark, _ = address.partition("://")
+        if mark and scheme not in SCHEMES:
+            raise ValueError(f"no address of a PostgreSQL database: {scheme}:// is not one of its schemes; {EXAMPLES}")
         try:
             given: dict[str, Any] = {**DEFAULTS, **conninfo_to_dict(address)}
         except psycopg.ProgrammingError as error:
-            raise ValueError(f"no address of a PostgreSQL database: {_words(error)}") from None
+            raise ValueError(f"no address of a PostgreSQL database: {_words(error)}; {EXAMPLES}") from None
         given["options"] = " ".join([*filter(None, [given.get("options")]), *(f"-c {each}" for each in SETTINGS)])
         self._address = make_conninfo(**given)
         where = f"{given.get('host') or 'localhost'}{':' + str(given['port']) if given.get('port') else ''}"

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from psycopg.errors import LockNotAvailable
+from psycopg.errors import InsufficientPrivilege, LockNotAvailable
+from psycopg.sql import Identifier
 
 from dynhull_server.storage.port import FormatError, StorageError
 from dynhull_server.storage.rows.tables import (
@@ -172,11 +173,18 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
 
     Raises:
         FormatError: the database belongs to another program, or to a newer version.
-        StorageError: it has another number of partitions.
+        StorageError: it has another number of partitions, or the user may not create tables.
     """
     present = partitions_of(connection, database)
     if present is None:
-        connection.execute(f"CREATE SCHEMA IF NOT EXISTS {SCHEMA}".encode())
+        try:
+            connection.execute(f"CREATE SCHEMA IF NOT EXISTS {SCHEMA}".encode())
+        except InsufficientPrivilege:
+            base, user = (Identifier(each).as_string(None) for each in (connection.info.dbname, connection.info.user))
+            raise StorageError(
+                f"{user} may not create the schema {SCHEMA} in {database}: have its owner say "
+                f"GRANT CREATE ON DATABASE {base} TO {user}"
+            ) from None
         for statement in _tables():
             connection.execute(statement.encode())
         connection.execute("INSERT INTO format (format, partitions) VALUES (%s, %s)", [FORMAT, partitions])

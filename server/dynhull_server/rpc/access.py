@@ -227,6 +227,8 @@ class TokenFile:
             raise ValueError(f"{self._path}: {where}: {first['msg']}") from None
         except ValueError as error:
             raise ValueError(f"{self._path}: {error}") from None
+        if not table.token:
+            log.warning("the file of tokens has none: every call is refused", extra={"file": str(self._path)})
         return {
             each.sha256: Caller(
                 each.name or each.sha256[:SHORT_HASH], Access(tuple(each.read), tuple(each.write)), each.sha256

@@ -1,11 +1,15 @@
 """Polygons of the command line: GeoJSON and WKT."""
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 WKT_NAMES = ("POLYGON", "MULTIPOLYGON")
+WKT_WORDS = (*WKT_NAMES, "Z", "M", "ZM", "EMPTY")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+EXAMPLE = "POLYGON ((0 0, 4 0, 4 3, 0 0))"
 
 
 def read_polygon(text: str) -> Any:
@@ -34,4 +38,20 @@ def _of_wkt(text: str, source: str) -> Any:
     try:
         return shapely.from_wkt(text)
     except shapely.errors.ShapelyError as error:
-        raise ValueError(f"{source} is not WKT: {error}") from None
+        kind, _, problem = str(error).partition(": ")
+        raise ValueError(f"{source} is not WKT: {_slip(text) if kind == 'ParseException' else problem}") from None
+
+
+def _slip(text: str) -> str:
+    """What is wrong with a text that GEOS cannot parse, whose own words do not say where."""
+    depth = 0
+    for place, character in enumerate(text, 1):
+        depth += {"(": 1, ")": -1}.get(character, 0)
+        if depth < 0:
+            return f"character {place} is a ) without its ("
+    if depth:
+        return f"{depth} ) missing at the end, after character {len(text)}"
+    for word in re.finditer(r"[^\s(),]+", text):
+        if not NUMBER.fullmatch(word[0]) and word[0].upper() not in WKT_WORDS:
+            return f"character {word.start() + 1}: {word[0]!r} is not a number"
+    return f"corners are X Y with commas between them, as in {EXAMPLE}"

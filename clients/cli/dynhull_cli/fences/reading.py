@@ -60,7 +60,7 @@ def show(client: "HullClient", name: FenceName, as_json: AsJson = False) -> None
     if as_json:
         typer.echo(json_line(**fence_members(fence)))
         return
-    typer.echo(f"area\t{area_text(fence)}")
+    typer.echo(f"area\t{area_text(fence, _unit(client, fence))}")
     typer.echo(f"subjects\t{subjects_text(fence)}")
     typer.echo(f"settings\t{settings_text(fence) or 'the usual ones'}")
     typer.echo(f"inside\t{fence.inside} of {plural(fence.subject_count, 'subject')}")
@@ -73,6 +73,20 @@ def show(client: "HullClient", name: FenceName, as_json: AsJson = False) -> None
             f"consumer\t{each.name}: acknowledged {each.acknowledged}, {plural(each.backlog, 'event')} to come"
             f"{oldest}{lost}"
         )
+
+
+def _unit(client: "HullClient", fence: "Fence") -> str:
+    """The unit of lengths of a fence on the globe; empty in the plane, whose unit nobody knows."""
+    from dynhull_client import Circle
+
+    from ..keyed_rows import known_hull
+
+    if not isinstance(fence.area, Circle) or not isinstance(
+        fence.subjects, str
+    ):  # those with a prefix are in the plane
+        return ""
+    hull = known_hull(client, fence.subjects)
+    return " m" if hull is not None and hull.geographic else ""
 
 
 @connected

@@ -46,7 +46,8 @@ PolygonText = Annotated[
     _area("Polygons: a file of GeoJSON or WKT, - for standard input, or WKT itself.", "--polygon", metavar="FILE|WKT"),
 ]
 CircleNumbers = Annotated[
-    tuple[float, float, float] | None, _area("A disk: center and radius.", "--circle", metavar="X Y R")
+    tuple[float, float, float] | None,
+    _area("A disk: center and radius; on the globe in degrees and metres.", "--circle", metavar="X Y R"),
 ]
 Subjects = Annotated[str | None, _subjects("A keyed hull. Its keys are compared with the area.", metavar="HULL")]
 SubjectPrefix = Annotated[
@@ -58,12 +59,16 @@ OtherHull = Annotated[
 Boundary = Annotated[BoundaryKind, typer.Option(help="Whether a subject on the boundary is inside (closed) or not.")]
 Margin = Annotated[float, typer.Option(help="How far outside of the area a subject has to be to leave.")]
 Crosses = Annotated[bool, typer.Option("--crosses", help="Report subjects that pass through between two positions.")]
-Dwell = Annotated[str | None, typer.Option(help="Report subjects that stay inside for this long: 90s, 30m or 2h.")]
+Dwell = Annotated[
+    str | None,
+    typer.Option(help="Report subjects that stay inside for this long: 90s, 30m or 2h; a number alone is seconds."),
+]
 Confirmations = Annotated[
     int, typer.Option(help="Consecutive reports that must agree before a subject enters or leaves.")
 ]
 MinDwell = Annotated[
-    str | None, typer.Option(help="How long a subject must be on the other side before it enters or leaves.")
+    str | None,
+    typer.Option(help="How long, as for --dwell, a subject must be on the other side before it enters or leaves."),
 ]
 Near = Annotated[float, typer.Option(help="With --other-hull: the distance at which hulls are near.")]
 WithoutSelf = Annotated[
@@ -72,7 +77,9 @@ WithoutSelf = Annotated[
 ]
 Layer = Annotated[int, typer.Option(min=1, max=1000, help="The convex layer of --area; 1 is the hull itself.")]
 MaxEvents = Annotated[int, typer.Option(help="Number of events to keep; 0 for the limit of the server.")]
-MaxEventAge = Annotated[str | None, typer.Option(help="How long events are kept: 12h or 7d. Default: no limit.")]
+MaxEventAge = Annotated[
+    str | None, typer.Option(help="How long events are kept: 12h or 7d; a number alone is seconds. Default: no limit.")
+]
 
 
 def _settings(

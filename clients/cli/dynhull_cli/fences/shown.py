@@ -62,12 +62,12 @@ def inside_members(subjects: "SubjectsInside") -> dict[str, Any]:
     return {"hull": subjects.hull, "keys": list(subjects.keys), "revision": subjects.revision}
 
 
-def area_text(fence: Fence) -> str:
-    """The area in a few words."""
+def area_text(fence: Fence, unit: str = "") -> str:
+    """The area in a few words; `unit` is that of lengths."""
     if isinstance(fence.area, str):
         return f"hull {fence.area}"
     if isinstance(fence.area, Circle):
-        return f"circle around ({fence.area.x:g}, {fence.area.y:g}), radius {fence.area.r:g}"
+        return f"circle around ({fence.area.x:g}, {fence.area.y:g}), radius {fence.area.r:g}{unit}"
     corners = sum(len(each.exterior) + sum(map(len, each.holes)) for each in fence.area)
     holes = sum(len(each.holes) for each in fence.area)
     several = f"{len(fence.area)} polygons" if len(fence.area) > 1 else "polygon"

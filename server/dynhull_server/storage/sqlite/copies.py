@@ -277,7 +277,8 @@ def _report(findings: Findings, notes: list[str]) -> Report:
     hulls = sorted(findings.ledger.hulls.values(), key=lambda hull: hull.row.name)
     reports = []
     for hull in hulls:
-        summary = f"revision {hull.last}, {len(hull.ids)} rows of batches"
+        rows = "1 row" if len(hull.ids) == 1 else f"{len(hull.ids)} rows"
+        summary = f"revision {hull.last}, {rows} of batches"
         if hull.snapshots:
             summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
         reports.append(HullReport(hull.row.name, summary, hull.row.number not in findings.damaged))
