@@ -61,6 +61,8 @@ def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, n
     publish(nats_port, name, moves)
     url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*.position"
     said = ingested(address, url, "--hull", name, "--key", "{1}", "--time", "$.ts")
+    assert any("times are seconds since 1970, the first is 2023" in line["event"] for line in said)
+    assert not [line for line in said if line["level"] == "warning"]
     assert said[-1] == {**said[-1], "event": "stopped", "points": 50, "bad": 0}
     last = {move[0].partition(".")[0]: move[1] for move in moves}
     assert positions(client, name, list(last)) == {key: (at["lon"], at["lat"]) for key, at in last.items()}
@@ -70,6 +72,15 @@ def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, n
     said = ingested(address, url, "--hull", name, "--key", "{1}", "--time", "$.ts")
     assert [line["after"] for line in said if line["event"] == "reading"] == [50]
     assert said[-1]["points"] == 1
+
+
+def test_a_mapping_that_looks_wrong_is_warned_about(address: str, name: str, nats_port: int) -> None:
+    publish(nats_port, name, [("p", {"lon": 1, "lat": 2, "ts": 1_700_000_000})] * 3)
+    options = ("--key", "{topic}", "--time", "$.ts", "--time-unit", "ms", "--x", "$.lat", "--y", "$.lon")
+    said = ingested(address, f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, *options)
+    first, second = [line["event"] for line in said if line["level"] == "warning"]
+    assert first == "x is the longitude and y the latitude: the names say the opposite"
+    assert second.startswith("time: 1700000000 milliseconds since 1970 are 1970-01-20T")
 
 
 def test_hulls_by_subject_and_several_points_a_message(

@@ -99,6 +99,8 @@ def ingest(
     """
     import asyncio
 
+    import structlog
+
     from dynhull_client import AsyncHullClient
 
     from .. import logs
@@ -121,6 +123,10 @@ def ingest(
         None if limit is None else limit.total_seconds(),
     )
     logs.configure(log_format.value)
+    if mapping.swapped:
+        structlog.get_logger("dynhull_ingest").warning(
+            "x is the longitude and y the latitude: the names say the opposite", x=x, y=y
+        )
 
     async def serve() -> bool:
         find = feeds_of(source, hull, producer, mapping, to_end=to_end)

@@ -103,7 +103,7 @@ async def run(
     pumps = [Pump(client, away, each, settings, bad, figures) for each in feeds]
     running = asyncio.gather(*(each.run(stop) for each in pumps))
     ending = asyncio.create_task(_end(stop, running, pumps, grace))
-    reporting = asyncio.create_task(_report(pumps, bad, settings, report))
+    reporting = asyncio.create_task(_report(pumps, bad, report))
     try:
         await running
     except ExceptionGroup as group:
@@ -149,15 +149,11 @@ async def _end(stop: asyncio.Event, running: "asyncio.Future[list[None]]", pumps
     running.cancel()
 
 
-async def _report(pumps: Sequence[Pump], bad: BadMessages, settings: Settings, every: float) -> None:
+async def _report(pumps: Sequence[Pump], bad: BadMessages, every: float) -> None:
     """Log the progress now and then, while there is any."""
-    before, then, noted = 0, monotonic(), False
+    before, then = 0, monotonic()
     while True:
         await asyncio.sleep(every)
-        times = settings.mapping.times
-        if times.note is not None and not noted:
-            log.info(times.note)
-            noted = True
         points, now = sum(each.points for each in pumps), monotonic()
         if points != before:
             log.info("taken", points=points, per_second=round((points - before) / (now - then)), bad=bad.count)

@@ -61,6 +61,7 @@ class Lane:
         hull: the name of the hull.
         producer: the name under which the hull counts the numbers of the messages; None without numbers.
         keyed: whether rows have keys.
+        degrees: whether rows seem to be longitudes and latitudes.
         create: settings of the hull if there is none; None to create none.
         bad: called with each message that is refused, and why.
         settled: called when a chunk is settled, with the number of its rows that were applied.
@@ -75,6 +76,7 @@ class Lane:
         producer: str | None,
         *,
         keyed: bool,
+        degrees: bool,
         create: dict[str, Any] | None,
         bad: Callable[[Message, Exception], None],
         settled: Callable[[int], None],
@@ -85,6 +87,7 @@ class Lane:
         self._hull = hull
         self._producer = producer
         self._keyed = keyed
+        self._degrees = degrees
         self._create = create
         self._bad = bad
         self._settled = settled
@@ -285,6 +288,11 @@ class Lane:
             kind = "keys: give --key" if info.keyed is not None else "no keys: leave out --key"
             raise NotCreatedError(f"the points of {self._hull!r} have {kind}, or write to another hull")
         self._kind = info.keyed
+        if self._degrees and not info.geographic and not self._named_by_messages:
+            log.warning(
+                "the hull is a plane: longitudes and latitudes are its x and y, areas square degrees", hull=info.name
+            )
+            self._degrees = False  # said
 
     def _first_key_is_integer(self) -> bool:
         first = next((chunk.keys[0] for chunk in (*self._flying, *self._waiting) if chunk.keys), None)

@@ -3,16 +3,19 @@
 import math
 from collections.abc import Iterator
 from contextlib import suppress
+from datetime import timedelta
 from hashlib import sha256
 from typing import Any, NamedTuple
 
 import orjson
 
-from dynhull_cli.columns import are_degrees, plain
-from dynhull_cli.times import TimeReader, TimeUnit
+from dynhull_cli.columns import are_degrees, is_number, plain
+from dynhull_cli.times import EPOCH, NAMES, TimeReader, TimeUnit
 
 from .expressions import MISSING, is_fixed, last_name, value_of
 from .feed import Message
+
+EARLIEST, LATEST = 1990, 2100  # years in which positions are taken
 
 
 class Row(NamedTuple):
@@ -40,6 +43,8 @@ class Mapping:
         hull: the hull of all messages; None if it depends on the message.
         keyed: whether rows have keys.
         degrees: whether the coordinates have the names of longitudes and latitudes.
+        swapped: whether they have them the other way round.
+        warning: what is odd about the first time; None if nothing is.
         digest: differs from that of any other mapping.
 
     Raises:
@@ -53,6 +58,9 @@ class Mapping:
         self.keyed = key is not None
         self.digest = sha256(repr((hull, x, y, key, time, str(time_unit), each)).encode()).hexdigest()[:12]
         self.degrees = are_degrees(last_name(x), last_name(y))
+        self.swapped = are_degrees(last_name(y), last_name(x))
+        self.warning: str | None = None
+        self._timed = False  # whether there was a time already
         self._hull = value_of(hull, "--hull")
         self._x, self._y = value_of(x, "--x"), value_of(y, "--y")
         for name, text in (("x", x), ("y", y)):
@@ -91,13 +99,23 @@ class Mapping:
             if not isinstance(key, (str, int)) or isinstance(key, bool):
                 raise ValueError(f"the key is {_shown(key)}, not a string or an integer")
         if self._time is not None:
-            time = self.times.read(_present(self._time(message, document), "time"))
+            found = _present(self._time(message, document), "time")
+            time = self.times.read(found)
+            if not self._timed:
+                self._timed = True
+                self._look_at(found, time)
         x = _number(self._x(message, document), "x")
         y = _number(self._y(message, document), "y")
         hull = self._hull(message, document)
         if not isinstance(hull, str):
             raise ValueError(f"the hull is {_shown(hull)}, not a string")
         return Row(hull, key, x, y, time)
+
+    def _look_at(self, found: Any, time: int) -> None:
+        """Warn if a number is a time of another age, in this unit."""
+        unit, when = self.times.unit, EPOCH + timedelta(microseconds=time)
+        if unit is not None and is_number(str(found)) and not EARLIEST <= when.year < LATEST:
+            self.warning = f"time: {found} {NAMES[unit]} since 1970 are {when.isoformat()}: is --time-unit right?"
 
 
 def _number(value: Any, name: str) -> float:

@@ -183,9 +183,20 @@ class Pump:
             if lane is None:
                 lane = self._lanes[hull] = self._lane(hull)
             await lane.put(chunk)
+        self._tell()
         taken.whole = True
         self._news.set()
         self.reached = max(self.reached, messages[-1].number)
+
+    def _tell(self) -> None:
+        """Log, once, how the first time was read."""
+        mapping = self._settings.mapping
+        if mapping.times.note is not None:
+            log.info(mapping.times.note)
+            mapping.times.note = None
+        if mapping.warning is not None:
+            log.warning(mapping.warning)
+            mapping.warning = None
 
     def _rows(self, messages: Sequence[Message]) -> Iterator[tuple[Message, list[Row]]]:
         rows = self._settings.mapping.rows
@@ -209,6 +220,7 @@ class Pump:
             hull,
             self._feed.producer,
             keyed=settings.mapping.keyed,
+            degrees=settings.mapping.degrees,
             create=settings.create,
             bad=self._set_aside,
             settled=self._settled,
