@@ -93,6 +93,7 @@ FOLLOWED_ELSEWHERE = {
     "--token": "test_commands.py: test_tokens",
     "--tls": "test_commands.py: test_tls",
     "--tls-ca": "test_commands.py: test_tls",
+    "--point-limit": "test_hulls.py: test_what_cannot_be_done_changes_nothing",
     "--layer": "test_commands.py: test_layers_and_influence",
     "--out": "test_demo.py: test_hours_of_flights",
     "--client-cert": "test_commands.py: test_tls",

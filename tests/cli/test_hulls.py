@@ -55,6 +55,10 @@ def test_what_cannot_be_done_changes_nothing(name):
     done = dynhull("insert", name, "1,2", "inf,2")
     assert (done.exit_code, done.stderr) == (2, "error: argument 2: 'inf,2' is not X,Y with finite numbers\n")
     assert dynhull("insert", name, input="").exit_code == 2
+    few = f"few-{name}"
+    dynhull("create", few, "--point-limit", "1")
+    done = dynhull("insert", few, "1,2", "3,4")
+    assert done.stderr.startswith("error: the limit on the points of the hull is 1 (--point-limit of the hull, or ")
     done = dynhull("delete", name, f"{name}-not-there", "--yes")
     assert done.exit_code == 1
     done = dynhull("delete", name)

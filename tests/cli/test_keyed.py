@@ -110,6 +110,7 @@ def test_a_watch_names_who_joins_and_leaves_the_corners(served, name):
         (["put", "HULL", "a", "1", "2", "--ttl", "soon"], "--ttl 'soon' is not a time span: write for example"),
         (["create", "HULL/x", "--max-age", "forever"], "--max-age 'forever' is not a time span"),
         (["create", "HULL/x", "--clock", "data"], "--clock is given with --max-age or --max-points"),
+        (["put", "HULL", "", "1", "2"], "error: arguments: the key is empty"),
         (["put", "HULL", "a", "1", "2", "--ttl", "0"], "error: --ttl is '0 s and 0 ns': must be positive"),
         (["load", "ü", "--key", "a"], "error: the name of the hull is 'ü': "),
         (["fences", "create", "x", "--subjects", "HULL", "--area", "a b"], "error: --area is 'a b': "),

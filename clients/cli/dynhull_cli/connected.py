@@ -128,6 +128,11 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
             from .fields import in_options
 
             fail(Exit.UNUSABLE, in_options(error))
+        except sdk.LimitExceededError as error:
+            if error.metadata.get("limit") == "max_points":  # an option of that name is for windows
+                where = "(--point-limit of the hull, or --max-points of `dynhull serve`)"
+                fail(Exit.FAILED, f"the limit on the points of the hull is {error.value} {where}")
+            fail(Exit.FAILED, str(error))
         except sdk.DynhullError as error:
             fail(Exit.FAILED, str(error))
         except OSError as error:

@@ -83,6 +83,8 @@ def _position(place: str, fields: list[str]) -> tuple[float, float]:
         found = float(plain(x, ".")), float(plain(y, "."))
     except ValueError:
         found = math.nan, math.nan
+    if not fields[0]:
+        raise ValueError(f"{place}: the key is empty")
     if not all(map(math.isfinite, found)):
         raise ValueError(f"{place}: {','.join(fields)!r} is not KEY,X,Y with finite numbers")
     return found

@@ -55,5 +55,7 @@ def _summary(found: "Verification") -> str:
     rounds = ", ".join(f"{each.guess:,}" for each in found.rounds)
     how = f"Chan's guesses: {rounds}" if rounds else "nothing to compute"
     fences = f", {plural(found.fences, 'fence')}" if found.fences else ""
-    counts = f"{found.points:,} points, {found.vertices:,} vertices{fences}"
+    counts = (
+        f"{plural(found.points, 'point')}, {found.vertices:,} {'vertex' if found.vertices == 1 else 'vertices'}{fences}"
+    )
     return f"verified at revision {found.revision:,}: {counts} ({how})"

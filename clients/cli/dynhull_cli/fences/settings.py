@@ -64,7 +64,7 @@ Dwell = Annotated[
     typer.Option(help="Report subjects that stay inside for this long: 90s, 30m or 2h; a number alone is seconds."),
 ]
 Confirmations = Annotated[
-    int, typer.Option(help="Consecutive reports that must agree before a subject enters or leaves.")
+    int, typer.Option(min=0, help="Consecutive reports that must agree before a subject enters or leaves.")
 ]
 MinDwell = Annotated[
     str | None,
@@ -76,7 +76,7 @@ WithoutSelf = Annotated[
     typer.Option("--without-self", help="Compare each subject with the hull of the others; needs a margin."),
 ]
 Layer = Annotated[int, typer.Option(min=1, max=1000, help="The convex layer of --area; 1 is the hull itself.")]
-MaxEvents = Annotated[int, typer.Option(help="Number of events to keep; 0 for the limit of the server.")]
+MaxEvents = Annotated[int, typer.Option(min=0, help="Number of events to keep; 0 for the limit of the server.")]
 MaxEventAge = Annotated[
     str | None, typer.Option(help="How long events are kept: 12h or 7d; a number alone is seconds. Default: no limit.")
 ]
