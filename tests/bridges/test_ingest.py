@@ -77,10 +77,14 @@ def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, n
 def test_a_mapping_that_looks_wrong_is_warned_about(address: str, name: str, nats_port: int) -> None:
     publish(nats_port, name, [("p", {"lon": 1, "lat": 2, "ts": 1_700_000_000})] * 3)
     options = ("--key", "{topic}", "--time", "$.ts", "--time-unit", "ms", "--x", "$.lat", "--y", "$.lon")
-    said = ingested(address, f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, *options)
+    url = f"nats://127.0.0.1:{nats_port}/{name}"
+    said = ingested(address, url, "--hull", name, *options)
     first, second = [line["event"] for line in said if line["level"] == "warning"]
     assert first == "x is the longitude and y the latitude: the names say the opposite"
     assert second.startswith("time: 1700000000 milliseconds since 1970 are 1970-01-20T")
+    said = ingested(address, url, "--hull", name, "--key", "{topic}", "--producer", "again")
+    (only,) = [line["event"] for line in said if line["level"] == "warning"]
+    assert only.startswith("the hull is a plane: longitudes and latitudes are its x and y")
 
 
 def test_hulls_by_subject_and_several_points_a_message(

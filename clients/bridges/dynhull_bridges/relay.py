@@ -17,7 +17,7 @@ from dynhull_client import AsyncHullClient, DeadlineError, FenceNotFoundError, U
 from .dead_letters import DeadLetter, StateFolder, gone_key
 from .figures import Figures
 from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, Lane, Patience
-from .target import PLACE, GoneError, NotDeliveredError, ReaderGoneError, Target, check_places
+from .target import GoneError, NotDeliveredError, ReaderGoneError, Target, check_places
 from .waiting import SERVER_AWAY, Absence, growing_pauses, unless
 
 log = structlog.get_logger("dynhull_relay")
@@ -38,7 +38,7 @@ def target_of(
     scheme = urlsplit(to).scheme
     if scheme not in ("", "file"):
         check_places(urlsplit(to)._replace(netloc="").geturl())  # a password is nothing to show
-    elif PLACE.search(to):
+    elif "{fence}" in to or "{type}" in to:
         raise ValueError(
             f"--to {to}: {{fence}} and {{type}} are filled in in URLs; one file has the events of all fences"
         )
