@@ -108,14 +108,14 @@ async def run(
         when_pipe_closes(partial(_stop_from_thread, loop, stop))
     figures = Figures()
     port = {} if metrics is None else {"metrics_port": figures.serve(*metrics)}
+    lanes = [Lane(client, each, consumer, target, to, patience, folder, figures, stop) for each in wanted]
+    log.info("relaying", fences=wanted, to=to, consumer=consumer, server=server, **port)
     await unless(stop, _require_fences(client, server, wanted))
     if stop.is_set():
         log.info("stopped")
         return True
     if enable:
         folder.enable()
-    lanes = [Lane(client, each, consumer, target, to, patience, folder, figures, stop) for each in wanted]
-    log.info("relaying", fences=wanted, to=to, consumer=consumer, server=server, **port)
     running = [asyncio.create_task(lane.run()) for lane in lanes]
     ending = asyncio.create_task(_end(stop, running, grace))
     try:
