@@ -1,11 +1,11 @@
 """Write a data folder with the installed version: a fixture for the versions after it, which must open it.
 
-    python tests/data/make_folder.py tests/data/format6
+    python tests/data/make_folder.py tests/data/format8
 
 By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
 the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
 of each hull, as that version exports them, with keys and times; the JSON files have the events of fences, and who is
-inside.
+inside, and positions in quarantine.
 """
 
 import json
@@ -20,7 +20,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 
-from dynhull_client import Circle, HullClient, Prefix
+from dynhull_client import Circle, HullClient, Prefix, Quarantine
 from dynhull_proto.v1 import hull_pb2, hull_service_pb2, hull_service_pb2_grpc
 
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
@@ -58,9 +58,9 @@ def insert_and_delete(client, producer, first, last):
         before = points
 
 
-def snapshots(data):
-    """The line of the hull in the report of `dynhull check`."""
-    return next(line for line in ran("check", data).splitlines() if line.startswith("fleet:")).count(",") - 1
+def snapshots(data, hull="fleet"):
+    """The number of snapshots of a hull in the report of `dynhull check`."""
+    return next(line for line in ran("check", data).splitlines() if line.startswith(f"{hull}:")).count(",") - 1
 
 
 def fill(data, address, client):
@@ -93,6 +93,41 @@ def fill_keyed(client):
     client.put("vans", keys[:2], -points[:2], times=[MOMENT - SECOND, MOMENT + SECOND], remove=keys[8:])
     for second in range(0, 90, 10):
         client.put("tracks", [second, 2**64 - 1], [[second, 0], [0, second]], times=[MOMENT + second * SECOND] * 2)
+
+
+def fill_held(data, client):
+    """Positions in quarantine by both rules, in a snapshot, and one that was confirmed."""
+    client.create_hull("held", keyed="str", ordering="event_time", quarantine=Quarantine(10, 3, 2))
+    keys, corners = [f"flight é{i}" for i in range(50)], np.arange(100.0).reshape(50, 2) % 37
+    client.put("held", keys, corners, times=[MOMENT] * 50)
+    while snapshots(data, "held") < 1:
+        continue
+    client.put("held", keys[:48], corners[:48] + 999, times=[MOMENT + SECOND] * 48, expire_times=[MOMENT + YEARS] * 48)
+    client.put("held", keys[:9], corners[:9] + 999, times=[MOMENT + 2 * SECOND] * 9)
+    client.put("held", ["new"], [[500, 500]], times=[MOMENT])
+    while snapshots(data, "held") < 2:
+        continue
+
+
+def change_held(client):
+    """Positions released, dropped, confirmed and held, and other rules."""
+    client.release("held", ["flight é20"], drop=["flight é21", "flight é22"], producer="desk", sequence=1)
+    client.set_quarantine("held", Quarantine(max_speed=20))
+    client.put("held", ["flight é0", "flight é49"], [[1000, 999], [-999, 0]], times=[MOMENT + 3 * SECOND] * 2)
+
+
+def export_held(client, target):
+    info = client.get_hull("held").info
+    found = {
+        "rules": [info.quarantine.max_speed, info.quarantine.max_growth, info.quarantine.confirmations],
+        "revision": info.revision,
+        "points": info.points,
+        "held": [
+            [each.key, each.position, each.time.isoformat(), each.speed, each.growth, each.revision, each.confirmations]
+            for each in client.list_held("held")
+        ],
+    }
+    target.with_name(f"{target.name}-held.json").write_text(json.dumps(found, indent=1, ensure_ascii=False))
 
 
 def fill_fences(client):
@@ -155,6 +190,8 @@ def main():
     with served(data) as (_, address, client):
         fill(data, address, client)
         fill_fences(client)
+        fill_held(data, client)
+        export_held(client, target / "stopped")
         export_fences(client, target / "stopped")
     take(data, target / "stopped")
     export(data, target / "stopped")
@@ -163,6 +200,8 @@ def main():
         client.apply("zones/a", insert=[(7, 7)], producer="truck", sequence=2)
         client.put("vans", ["van é0"], [[5, 5]], times=[MOMENT + 2 * SECOND], producer="gate", sequence=2)
         client.put("vans", ["van é0"], [[-5, 5]], times=[MOMENT + 3 * SECOND])
+        change_held(client)
+        export_held(client, target / "killed")
         export(data, target / "killed")
         export_fences(client, target / "killed")
         process.kill()

@@ -39,11 +39,14 @@ from dynhull_server.state.records import (
     Create,
     Delete,
     Expiry,
+    HeldChange,
+    HeldRows,
     HullRow,
     HullSettings,
     Kept,
     KeyRows,
     PointRows,
+    QuarantineRules,
     Record,
     Window,
 )
@@ -311,6 +314,34 @@ def test_hulls_with_keys_and_times(opened, kind):
             same(opened.storage.read(3, revision), expected)
         opened.reopen()
         assert opened.contents.hulls == [hull]
+
+
+def held(keys, n, seed=0):
+    measures = np.random.default_rng(seed).random((2, n))
+    measures[:, 1::3] = np.nan
+    revisions = np.arange(n) + 1
+    return HeldRows(keys(n, seed), points(n, seed), times(n, seed), times(n, seed + 1), *measures, revisions, revisions)
+
+
+@pytest.mark.parametrize(("kind", "keys"), [("str", strings), ("int", integers)])
+def test_what_is_in_quarantine_comes_back(opened, kind, keys):
+    rules = QuarantineRules(12.5, None, 3)
+    hull = HullRow(3, kind, "uid", 0.5, HullSettings(kind, quarantine=rules))
+    opened.commit(Create(hull))
+    nothing = keys(0), NOTHING, keys(0)
+    changes = [
+        Record(1, KeyRows(*nothing, held=HeldChange(held(keys, 5), keys(0)))),
+        Record(2, KeyRows(*nothing, held=HeldChange(held(keys, 0), keys(2), QuarantineRules(None, 1.5, 0)))),
+        Record(3, KeyRows(keys(2), points(2), keys(0), held=HeldChange(held(keys, 4, 7), keys(3, 1)))),
+    ]
+    opened.commit(Append(3, changes[:2]))
+    kept = Kept(2, Contents(points(9), keys(9), held=held(keys, 40_000)), rules=QuarantineRules(None, 1.5, 0))
+    opened.carry_out(opened.storage.snapshot(3, kept))
+    opened.commit(Append(3, changes[2:]))
+    for _ in range(2):
+        assert opened.storage.row(3) == hull
+        same(opened.storage.read(3), replace(kept, records=changes[2:]))
+        opened.reopen()
 
 
 def test_a_snapshot_counts_once_it_is_whole(opened):

@@ -1,5 +1,6 @@
 """Data folders that earlier versions wrote: they open, are migrated once, and go on."""
 
+import dataclasses
 import json
 import shutil
 import sqlite3
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from command_line import dynhull
 from faulty_disk import FaultyDisk, failure
-from folders import DATABASE, OLD_FOLDERS, append, event, opened, read_fence, same, snapshot
+from folders import DATABASE, OLD_FOLDERS, append, event, flip, opened, read_fence, same, snapshot
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
@@ -18,6 +19,7 @@ from dynhull_server.state.fences.records import AppendEvents, Delay, DropEvents,
 from dynhull_server.state.fences.restoring import members_after
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError
+from dynhull_server.storage.rows.columns import point_bytes
 from dynhull_server.storage.sqlite.disk import Access, Disk
 from dynhull_server.storage.sqlite.schema import FORMAT
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -235,7 +237,7 @@ def test_a_folder_of_format_4_has_every_fence(folder, name):
         assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
 
 
-# Formats 6 and 7, written by tests/data/make_folder.py
+# Formats 6 to 8, written by tests/data/make_folder.py
 
 
 def as_told(event):
@@ -244,7 +246,7 @@ def as_told(event):
     return [event.sequence, event.type.name.lower(), event.hull, key, position, event.distance]
 
 
-@pytest.mark.parametrize("version", ["format6", "format7"])
+@pytest.mark.parametrize("version", ["format6", "format7", "format8"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
 def test_a_folder_with_events_has_every_event(folder, name, version):
     """Those of rows for one fence each, and of shared ones; the next ones share rows, and are dropped one by one."""
@@ -278,3 +280,34 @@ def test_a_folder_with_events_has_every_event(folder, name, version):
         storage.close()
         storage, _ = opened(folder)
     storage.close()
+
+
+@pytest.mark.parametrize("name", ["stopped", "killed"])
+def test_a_folder_with_a_quarantine_has_every_position(folder, name):
+    """In a snapshot and, after a kill, in batches after it; a byte that flips there is noticed."""
+    shutil.copytree(OLD_FOLDERS / "format8" / name, folder)
+    expected = json.loads((OLD_FOLDERS / "format8" / f"{name}-held.json").read_text())
+    storage, contents = opened(folder)
+    (row,) = (each for each in contents.hulls if each.name == "held")
+    kept = storage.read(row.number)
+    live = replayed(kept, row.settings)
+    storage.close()
+    assert kept.contents.held is not None
+    assert (kept.last_revision, len(live.hull)) == (expected["revision"], expected["points"])
+    assert list(dataclasses.astuple(live.quarantine.rules)) == expected["rules"]
+    held = live.quarantine.stored()
+    moments = held.times.astype("datetime64[us]").astype(object)
+    measures = [
+        [None if np.isnan(each) else each for each in pair] for pair in zip(held.speeds, held.growths, strict=True)
+    ]
+    columns = held.keys, held.points.tolist(), moments, measures, held.revisions.tolist(), held.confirmed.tolist()
+    found = [
+        [key, at, f"{time}+00:00".replace(" ", "T"), *two, *more]
+        for key, at, time, two, *more in zip(*columns, strict=True)
+    ]
+    assert found == expected["held"]
+    flip(folder / DATABASE, point_bytes(kept.contents.held.points[:20]))
+    done = dynhull("check", folder)
+    (line,) = (each for each in done.stdout.splitlines() if each.startswith("held:"))
+    assert done.exit_code == 1
+    assert line.endswith("DAMAGED")
