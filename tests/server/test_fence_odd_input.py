@@ -475,9 +475,12 @@ OPTIONS: dict[str, tuple[list[str], str]] = {
     ),
     "negative confirmations": (
         ["create", "odd/zone", *DISK, "--confirmations", "-1"],
-        "confirmations must be at least 0",
+        "'-1'. Input should be greater than or equal to 0",
     ),
-    "negative events": (["create", "odd/zone", *DISK, "--max-events", "-1"], "max_events must be at least 0"),
+    "negative events": (
+        ["create", "odd/zone", *DISK, "--max-events", "-1"],
+        "'-1'. Input should be greater than or equal to 0",
+    ),
     "a dwell without a unit": (["create", "odd/zone", *DISK, "--dwell", "90 sheep"], "--dwell '90 sheep'"),
     "a negative min_dwell": (["create", "odd/zone", *DISK, "--min-dwell", "-1s"], "--min-dwell '-1s'"),
     "an age in words": (["create", "odd/zone", *DISK, "--max-event-age", "old"], "--max-event-age 'old'"),
@@ -485,7 +488,7 @@ OPTIONS: dict[str, tuple[list[str], str]] = {
     "a name with a blank": (["create", "a b", *DISK], "name is 'a b'"),
     "an empty prefix of odd characters": (
         ["create", "odd/zone", "--circle", "0", "0", "1", "--subject-prefix", "%"],
-        "config.subject_prefix is %",
+        "--subject-prefix is %",
     ),
     "a circle that is none": (
         ["create", "odd/zone", "--circle", "0", "nan", "1", "--subjects", "odd/fleet"],
@@ -501,7 +504,7 @@ OPTIONS: dict[str, tuple[list[str], str]] = {
     ),
     "other subjects": (
         ["replace", "odd/depot", "--circle", "0", "0", "5", "--subjects", "odd/ids"],
-        "config.subject_hull is odd/ids",
+        "--subjects is odd/ids",
     ),
     "ahead": (["ack", "odd/depot", "mail", "99"], "sequence 99 is after the last event, 2"),
     "backwards in words": (["ack", "odd/depot", "mail", "-1"], "No such option: -1"),

@@ -91,8 +91,9 @@ def test_a_stream_whose_acknowledgements_are_not_read_is_not_read_either() -> No
 
 
 def test_a_watcher_that_takes_too_long_is_told() -> None:
+    # Half a second is more than the first event takes on a busy machine, which would end the watch at once.
     with (
-        measured("--max-watch-lag", "0.01", "--scrub-cpu", "0") as (server, address),
+        measured("--max-watch-lag", "0.5", "--scrub-cpu", "0") as (server, address),
         HullClient(server.address) as client,
         grpc.insecure_channel(server.address, SMALL_WINDOW) as channel,
     ):
@@ -100,9 +101,9 @@ def test_a_watcher_that_takes_too_long_is_told() -> None:
         client.apply("a", insert=ring(0))
         watch = HullServiceStub(channel).Watch(pb.WatchRequest(name="a"))
         done = 0
-        while scrape(address)["dynhull_watch_lag_seconds"] < 0.02:
+        while scrape(address)["dynhull_watch_lag_seconds"] < 0.6:
             turn(client, done, done + 20)
             done += 20
         code, info, _ = refusal(lambda: list(watch))
         assert (code, info.reason) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED")
-        assert dict(info.metadata) == {"limit": "max_watch_lag", "value": "0.01"}
+        assert dict(info.metadata) == {"limit": "max_watch_lag", "value": "0.5"}
