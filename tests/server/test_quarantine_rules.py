@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from dynhull import convex_hull
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import KeyedBatch
-from dynhull_server.state.errors import KeyMissingError, KeyRepeatedError, LimitExceededError, RefusedError
+from dynhull_server.state.errors import (
+    InvalidBatchError,
+    KeyMissingError,
+    KeyRepeatedError,
+    LimitExceededError,
+    RefusedError,
+)
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
@@ -276,6 +282,17 @@ def test_what_is_held_counts_for_the_limit():
     assert hull.put([("one more", 5, 5, None)]).inserted == 1
 
 
+def test_what_is_let_in_at_the_limit_was_counted_before():
+    hull = Hull(QuarantineRules(max_growth=1.5))
+    hull.put(SQUARE)
+    hull.put([(f"far {i}", 99 + i, 0, None) for i in range(36)])
+    assert hull.put([("far 3", 102.5, 0, None), ("a", -99, 0, None)]).released == 1
+    assert hull.ask(releases=["far 4"]).released == 1
+    assert hull.put([("one more", 5, 5, None)], ["far 5"]).inserted == 1
+    with pytest.raises(LimitExceededError):
+        hull.put([("and one more", 5, 5, None)], ["a stranger"])
+
+
 def test_a_repeated_key_changes_nothing_although_one_of_its_rows_would_be_held():
     hull = Hull(QuarantineRules(max_growth=1.5))
     hull.put(SQUARE)
@@ -310,6 +327,37 @@ def test_on_the_globe_in_metres(center):
     assert hull.put([("d", 170, 0, 31), ("e", -178, 1, 31)]).held == [0]
     hull.restart()
     assert hull.put([("d", 170.1, 0, 100)]).released == 1
+
+
+def test_a_held_position_may_be_out_of_reach_after_the_centre_has_moved():
+    hull = Hull(QuarantineRules(max_growth=3.0), frame="geographic", center=(0.0, 0.0))
+    hull.put([("a", 79, -1, 0), ("b", 81, -1, 0), ("c", 80, 1, 0)])
+    assert hull.put([("d", -80, 0, 1), ("e", -80, 1, 1)]).held == [0, 1]
+    hull.state.recenter((80.0, 0.0), hull.records)
+    hull.restart()
+    with pytest.raises(InvalidBatchError, match=r"releases row 1 is 'e', held at \(-80.0, 1.0\): .* from the centre"):
+        hull.ask(releases=["f", "e"])
+    assert hull.put([("d", -3, 0, 2)]).held == [0]  # a position that cannot be confirms nothing
+    assert hull.put([("d", -3, 1, 3)]).released == 1
+    assert (set(hull.positions()), set(hull.held())) == ({"a", "b", "c", "d"}, {"e"})
+
+
+@pytest.mark.parametrize("size", [1e-7, 1e-10])
+def test_growth_of_small_hulls_on_the_globe(size):
+    hull = Hull(QuarantineRules(max_growth=3.0), frame="geographic")
+    corners = [(8.0, 47.0), (8 + size, 47.0), (8 + size, 47 + size), (8.0, 47 + size)]
+    hull.put([(key, *at, 0) for key, at in zip("abcd", corners, strict=True)])
+    assert hull.put([("e", 8 + 1.9 * size, 47.0, 1), ("f", 8.2, 47.1, 1)]).held == [1]
+
+
+@pytest.mark.parametrize("size", [1e-200, 5e-324, 1.0, 1e200])
+@pytest.mark.filterwarnings("error")
+def test_growth_by_any_area(size):
+    """A factor of 1, and areas that overflow or vanish in floating point."""
+    hull = Hull(QuarantineRules(max_growth=1.0))
+    hull.put([("a", 0, 0, None), ("b", 8 * size, 0, None), ("c", 0, 8 * size, None)])
+    beyond = np.nextafter(8 * size, np.inf)
+    assert hull.put([("d", beyond, 0, None), ("e", size, size, None), ("f", 0, 8 * size, None)]).held == [0]
 
 
 def test_held_rows_have_what_a_release_needs():

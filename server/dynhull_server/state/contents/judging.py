@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynhull import DynamicHull, GeoHull
 from dynhull.arrays import Points
+from dynhull.globe import Gnomonic
 
 from ..numbers import as_numbers
 from ..records import Center
@@ -43,8 +44,8 @@ class Judge(Protocol):
         A hull without an area has nothing to grow from.
         """
 
-    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull:
-        """A hull of the vertices and one more point. O(h log h)."""
+    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull | None:
+        """A hull of the vertices and one more point; None if there can be none. O(h log h)."""
 
 
 class Plane:
@@ -52,7 +53,7 @@ class Plane:
 
     def too_fast(self, before: Points, after: Points, elapsed: Microseconds, limit: float) -> tuple[Rows, Floats]:
         """As `Judge.too_fast`."""
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             lengths: Floats = np.hypot(*(after - before).T)
             most = limit * (elapsed / MICROSECONDS)
             fast = lengths > most
@@ -72,7 +73,7 @@ class Plane:
         tangents = hull.tangents(points)
         seeing = np.flatnonzero(~np.isnan(tangents[:, 0, 0]))
         left, right = (_rows(tangents[seeing, side], vertices) for side in (0, 1))
-        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        with np.errstate(all="ignore"):
             # Twice the area of the fan from the first vertex to the others, up to each of them.
             terms, sizes = _products(vertices - vertices[0], np.roll(vertices, -1, axis=0) - vertices)
             fans, area, doubt = np.cumsum([0.0, *terms]), float(terms.sum()), float(sizes.sum())
@@ -88,6 +89,9 @@ class Plane:
             large = grown > most
             sure = np.abs(grown - most) > errors
             factors = grown / area
+        if limit == 1.0:  # all that is outside adds to the area, however little
+            large[seeing] = True
+            sure[seeing] = np.isfinite(factors[seeing])
         for row in np.flatnonzero(~sure).tolist():
             exact, more = _exact_areas(vertices.tolist(), points[row].tolist())
             large[row] = exact + more > Fraction(limit) * exact
@@ -119,12 +123,16 @@ class Sphere:
         corners, places = _vectors(vertices), _vectors(points)
         following = np.roll(corners, -1, axis=0)
         area = float(_excesses(corners[0], corners, following).sum())
+        if area <= 0:  # rounded, of a few nanometres
+            return no_growth(points)
         added = np.array([np.maximum(-_excesses(place, corners, following), 0.0).sum() for place in places])
         factors: Floats = (area + added) / area
         return factors > limit, factors
 
-    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull:
-        """As `Judge.with_point`."""
+    def with_point(self, hull: AnyHull, point: tuple[float, float]) -> AnyHull | None:
+        """As `Judge.with_point`; None for a point out of reach, since the centre may have moved after it was held."""
+        if self._center is None or not Gnomonic(self._center).project(np.array([point]))[1][0]:
+            return None
         return GeoHull(np.vstack([hull.vertices(), point]), center=self._center)
 
 
@@ -181,6 +189,6 @@ def _vectors(lonlat: Points) -> Floats:
 
 def _excesses(place: Floats, starts: Floats, ends: Floats) -> Floats:
     """The areas of the triangles of a place with edges on the unit sphere, positive on their left (Eriksson 1990)."""
-    volume = np.cross(starts, ends) @ place
+    volume = np.cross(starts - place, ends - place) @ place  # of differences: small hulls have small errors
     excesses: Floats = 2 * np.arctan2(volume, 1 + (starts * ends).sum(axis=1) + starts @ place + ends @ place)
     return excesses

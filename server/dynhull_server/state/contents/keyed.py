@@ -190,7 +190,7 @@ class Keyed:
             admitted.request = batch
         held = 0 if quarantine is None else len(quarantine)
         if len(self.hull) + held + len(rows.keys) > self._most_points:
-            self._refuse_growth(admitted, held)
+            self._refuse_growth(admitted)
         return admitted
 
     def check(self, admitted: Admitted) -> None:
@@ -345,6 +345,11 @@ class Keyed:
         if self.quarantine is None or batch.releases is None:
             return batch
         found = self.quarantine.of(key for key in key_list(batch.releases) if key in self.quarantine)
+        misplaced = None if self.globe is None else self.globe.refusal(found.points)
+        if misplaced is not None:  # the centre has moved since
+            key = key_list(found.keys)[misplaced.row]
+            held = f"{key!r}, held at {misplaced.place}"
+            raise InvalidBatchError("releases", held, misplaced.problem, key_list(batch.releases).index(key))
         has_times, has_deadlines = (found.times != NO_TIME).any(), (found.deadlines != FOREVER).any()
         return replace(
             batch,
@@ -499,17 +504,28 @@ class Keyed:
             if not there.all():
                 admission.young = there if admission.young is None else there & admission.young
 
-    def _refuse_growth(self, admitted: Admitted, held: int) -> None:
-        """Raise LimitExceededError if the hull would have too many points, with those held in quarantine."""
-        rows, window = admitted.rows, self._settings.window
+    def _refuse_growth(self, admitted: Admitted) -> None:
+        """Raise LimitExceededError if there would be too many keys in the hull and, held out, beside it. O(m)."""
+        rows, window, clock = admitted.rows, self._settings.window, admitted.clock
         if rows.condition == "present":
             return
-        new = len(rows.keys) - int(np.count_nonzero(self._there(rows.keys, admitted.clock)))
-        after = self._number(admitted.clock) + new - int(np.count_nonzero(self._there(rows.removes, admitted.clock)))
+        absent, beside = ~self._there(rows.keys, clock), self._only_held(clock)
+        new = int(np.count_nonzero(absent))
+        if beside:
+            new -= sum(key in beside for key in compress(key_list(rows.keys), absent.tolist()))
+        inside = self._number(clock) + new - int(np.count_nonzero(self._there(rows.removes, clock)))
         if window is not None and window.max_points:
-            after = min(after, window.max_points)
-        if new and after + held > self._most_points:
+            inside = min(inside, window.max_points)
+        if new and inside + len(beside.difference(key_list(rows.removes))) > self._most_points:
             raise LimitExceededError("max_points", self._most_points)
+
+    def _only_held(self, clock: int | None) -> set[Key]:
+        """The keys in quarantine that are not in the hull, once those have left that leave at `clock`. O(m)."""
+        if not self.quarantine:
+            return set()
+        keys = self.quarantine.staying(too_old(self._settings, clock), clock)
+        there = self._there(_of_kind(keys, self._no_keys()), clock)
+        return set(compress(keys, (~there).tolist()))
 
     def _has(self, keys: Keys) -> npt.NDArray[np.bool_]:
         """Which keys are there."""

@@ -128,12 +128,20 @@ class Quarantine:
         ended = clock is not None and self._first_deadline <= clock
         if not (old or ended):
             return
-        for key, held in list(self._held.items()):
-            too_old = until is not None and NO_TIME < held.time <= until
-            if too_old or (clock is not None and held.deadline <= clock):
-                self._drop(key)
+        staying = set(self.staying(until, clock))
+        for key in self._held.keys() - staying:
+            self._drop(key)
         self._first_time = min((each.time for each in self._held.values() if each.time != NO_TIME), default=FOREVER)
         self._first_deadline = min((each.deadline for each in self._held.values()), default=FOREVER)
+
+    def staying(self, until: int | None, clock: int | None) -> list[Key]:
+        """The keys whose positions are neither too old nor at their deadline. O(m)."""
+        return [
+            key
+            for key, held in self._held.items()
+            if not (until is not None and NO_TIME < held.time <= until)
+            and not (clock is not None and held.deadline <= clock)
+        ]
 
     def _put(self, rows: HeldRows) -> None:
         for key, *values in _items(rows):
@@ -221,8 +229,8 @@ class Quarantine:
             if fast[0]:
                 return False
         if rules.max_growth is not None:
-            large, _ = judge.too_large(judge.with_point(hull, (held.x, held.y)), there, rules.max_growth)
-            return not large[0]
+            with_held = judge.with_point(hull, (held.x, held.y))
+            return with_held is not None and not judge.too_large(with_held, there, rules.max_growth)[0][0]
         return True
 
     def _drop_others(
