@@ -344,7 +344,10 @@ class Hull(Live):
 
 def as_percent(percent: float) -> float:
     """A share, checked."""
-    share = as_coordinate(percent, "percent")
+    try:
+        share = percent if type(percent) is float else as_coordinate(percent, "percent")
+    except TypeError:
+        raise TypeError(f"percent must be a real number, got {repr_of(percent)}") from None
     if not 0 <= share <= 100:
         raise ValueError(f"percent is {share}: must be from 0 to 100")
     return share

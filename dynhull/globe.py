@@ -15,6 +15,7 @@ a hull: counter-clockwise, in degrees, longitude first, as `GeoHull.vertices` re
 from ._ellipsoid import area, diameter, distance, perimeter
 from ._flat_map import boundary, geojson
 from ._globe import REACH, Gnomonic, as_center, as_lonlat
+from ._globe_sketch import sketch
 
 __all__ = [
     "REACH",
@@ -27,4 +28,5 @@ __all__ = [
     "distance",
     "geojson",
     "perimeter",
+    "sketch",
 ]

@@ -8,7 +8,7 @@ import pytest
 from globes import GEO_HULLS, GEO_KEYED_HULLS, GEO_WINDOW_HULLS, around, random_center
 
 from dynhull import GeoHull
-from dynhull.globe import Gnomonic
+from dynhull.globe import Gnomonic, distance
 from dynhull.globe import area as area_of
 
 
@@ -65,10 +65,30 @@ def test_the_hull_of_the_nearest_points(kind):
         hull.mcp(101)
 
 
+def test_sketches_and_how_far_the_hull_reaches_beyond_them(kind):
+    sets = [points for _, points in random_sets()]
+    sets.append(around(np.random.default_rng(8), (12.0, 40.0), 80, 9))  # edges pass over others
+    sets.append(np.array([(0.0, 80.0), (120.0, 80.0), (-120.0, 80.0), (50.0, 30.0), (230.0, 28.0)]))
+    for points in sets:
+        hull = GEO_HULLS[kind](points)
+        vertices = hull.vertices()
+        everywhere = np.concatenate([vertices, hull.boundary(hull.perimeter / 500)])
+        for k in (1, 2, 3, 5, 8):
+            few, error = hull.sketch(k)
+            assert len(few) == min(k, len(vertices))
+            assert [vertex for vertex in vertices.tolist() if vertex in few.tolist()] == few.tolist()
+            beyond = everywhere[GeoHull(few, hull.center).locate(everywhere) < 0]
+            farthest = max(distance(few, beyond).max(initial=0.0), 0.0)
+            assert farthest <= error <= farthest * 1.02 + 1e-6 or (error == 0 and k >= len(vertices))
+    with pytest.raises(ValueError, match="k is 0"):
+        hull.sketch(0)
+
+
 def test_few_points(kind):
     hull = GEO_HULLS[kind]()
     assert (hull.layers(3), hull.influence().tolist(), hull.depth([(0, 0)], 2).tolist()) == ([], [], [0])
     assert hull.mcp(95).shape == (0, 2)
+    assert (hull.sketch(3)[0].shape, hull.sketch(3)[1]) == ((0, 2), 0.0)
     hull.insert_many([(180, 0), (-180, 0), (170, 0)])
     assert [each.tolist() for each in hull.layers(5)] == [[[-180, 0], [170, 0]]]
     assert hull.influence().tolist() == [0, 0]
@@ -91,3 +111,7 @@ def test_entities_and_windows_have_them_too(kind):
         assert [each.tolist() for each in hull.layers(2)] == [each.tolist() for each in expected.layers(2)]
         assert hull.influence().tolist() == expected.influence().tolist()
         assert hull.mcp(80).tolist() == expected.mcp(80).tolist()
+        assert (hull.sketch(5)[0].tolist(), hull.sketch(5)[1]) == (
+            expected.sketch(5)[0].tolist(),
+            expected.sketch(5)[1],
+        )

@@ -214,8 +214,8 @@ def test_odd_arguments(make):
         (lambda: hull.depth([[0, np.nan]], 1), ValueError, "row 0"),
         (lambda: hull.sketch(0), ValueError, "k is 0: must be at least 1"),
         (lambda: hull.mcp(101), ValueError, "percent is 101.0: must be from 0 to 100"),
-        (lambda: hull.mcp(float("nan")), ValueError, "percent is nan"),
-        (lambda: hull.mcp("95"), TypeError, "percent"),
+        (lambda: hull.mcp(float("nan")), ValueError, "percent is nan: must be from 0 to 100"),
+        (lambda: hull.mcp("95"), TypeError, "percent must be a real number, got '95'"),
         (lambda: hull.mcp(95, "mode"), ValueError, 'center must be "mean" or "median", got \'mode\''),
     ):
         with pytest.raises(kind, match=words):

@@ -11,7 +11,6 @@ from dynhull_client import (
     DeadlineError,
     HullClient,
     HullCopy,
-    HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
     Sketch,
@@ -138,8 +137,12 @@ def test_on_the_globe(client: HullClient, rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(client.influence(name).areas, live.influence())
     inside = client.locate(name, lonlat, layer=2).sides >= 0
     np.testing.assert_array_equal(inside, live.depth(lonlat, 2) == 2)
-    with pytest.raises(HullUnsuitableError, match="geographic"), client.watch(name, max_vertices=8) as events:
-        next(events)
+    for layer, mine in ((1, live), (2, GeoHull(live.layers(2)[1], (10, 45)))):
+        with client.watch(name, max_vertices=8, layer=layer, measures=True) as events:
+            few, (vertices, error) = next(events), mine.sketch(8)
+        assert isinstance(few, Sketch)
+        np.testing.assert_array_equal(few.vertices, vertices)
+        assert (few.error, few.measures and few.measures.area) == (error, mine.area)
 
 
 def test_a_watch_follows_a_layer_although_the_hull_stays(client: HullClient) -> None:

@@ -857,7 +857,7 @@ def watch(
             revision. A Progress then says that they have not changed up to its revision.
         layer: the convex layer to follow, as for `locate`. Its watch begins with a Snapshot after each lost connection.
         max_vertices: send `Sketch` events with at most this many of the vertices, from 1 to 1000, and with how far the
-            hull reaches beyond them, for hulls too large to send. Not in a geographic hull.
+            hull reaches beyond them, for hulls too large to send.
         follow: whether the watch survives the deletion of the hull: it returns a `Deleted` event, and a Snapshot when
             there is a new hull of that name. It also waits for a hull that does not exist yet. Without it,
             HullNotFoundError ends the watch. With `directions`, `layer` or `max_vertices`, the watch notices only a

@@ -376,8 +376,8 @@ class Change(Value):
 class Sketch(Value):
     """The extreme vertex in each requested direction, (k, 2), or at most `max_vertices` of the vertices and keys.
 
-    `error` is how far the hull reaches beyond these vertices (Hausdorff's distance), the exact value rounded up; 0.0 in
-    a watch with directions. (0, 2) if the hull has no points.
+    `error` is how far the hull reaches beyond these vertices (Hausdorff's distance), the exact value rounded up; on the
+    globe in metres, rounded up by 1.1 % at most; 0.0 in a watch with directions. (0, 2) if the hull has no points.
     """
 
     revision: int

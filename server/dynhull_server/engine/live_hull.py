@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DynamicHull
+from dynhull import DynamicHull, globe
 from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
@@ -126,11 +126,11 @@ class LiveHull:
         """Whether the points are places on the globe."""
         return self.settings.geographic
 
-    def require_plane(self, field: str = "") -> None:
-        """Raise HullUnsuitableError if the points are places on the globe; `field` is that of the request."""
+    def require_plane(self) -> None:
+        """Raise HullUnsuitableError if the points are places on the globe."""
         if self.geographic:
             reason = "is geographic, and this question is about points of a plane"
-            raise HullUnsuitableError(self.name, reason, field=field)
+            raise HullUnsuitableError(self.name, reason)
 
     def require_frame_of(self, other: "LiveHull", field: str) -> None:
         """Raise HullUnsuitableError if one hull is geographic, and the other one is not; `field` names this one."""
@@ -247,10 +247,14 @@ class LiveHull:
         return answers
 
     async def sketch(self, counts: Counts, vertices: Points, most: int) -> tuple[Points, float]:
-        """At most `most` of these vertices, and how far the hull reaches beyond them. The hull is a plane."""
-        outline = await self.outline(counts, vertices)
-        assert isinstance(outline, DynamicHull)  # of the plane
-        found: tuple[Points, float] = await self._engine.aside(partial(outline.sketch, most))
+        """At most `most` of these vertices, and how far the hull reaches beyond them."""
+        if self.geographic:
+            work = partial(globe.sketch, vertices, most)
+        else:
+            outline = await self.outline(counts, vertices)
+            assert isinstance(outline, DynamicHull)  # of the plane
+            work = partial(outline.sketch, most)
+        found: tuple[Points, float] = await self._engine.aside(work)
         return found
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:

@@ -206,7 +206,7 @@ class FewView:
     """At most `most` of the vertices, and how far the hull reaches beyond them; each event has all of them.
 
     Args:
-        hull: the hull, which is a plane.
+        hull: the hull.
         most: the number of vertices.
         vertices: whether to include all vertices.
         keys: whether to include the keys of the vertices, in a keyed hull.
@@ -224,13 +224,13 @@ class FewView:
 
     def _look(self, state: HullState) -> tuple[_Looked, float]:
         """A sketch of the hull itself."""
-        assert not isinstance(state.hull, GeographicHull)  # it is a plane
+        assert not isinstance(state.hull, GeographicHull)  # its sketches are made aside
         chosen, error = state.hull.sketch(self._most)
         vertices = state.vertices() if self._with_vertices else None
         return (chosen, vertices, state.keys_at(chosen) if self._with_keys else None), error
 
     async def _look_aside(self, min_revision: int) -> tuple[Counts, tuple[_Looked, float]]:
-        """A sketch of the vertices of the layer, made outside of the trips."""
+        """A sketch of the vertices of the layer or of places on the globe, made outside of the trips."""
         keys = None
         if self._with_keys:
             counts, vertices, keys = await self._hull.named_vertices(min_revision, self._layer)
@@ -241,7 +241,7 @@ class FewView:
         return counts, ((chosen, vertices if self._with_vertices else None, named), error)
 
     async def _sketch(self, min_revision: int = 0) -> Sketch:
-        if self._layer > 1 or self._most > FEW_VERTICES:
+        if self._layer > 1 or self._most > FEW_VERTICES or self._hull.geographic:
             counts, (self._held, self._error) = await self._look_aside(min_revision)
         else:
             rows = self._most * ROWS_A_VERTEX + (self._hull.vertex_count if self._with_vertices else 0)

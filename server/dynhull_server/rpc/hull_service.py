@@ -427,7 +427,6 @@ class HullService:
         if directions is not None:
             view = SketchView(hull, directions, vertices=request.include_measures, keys=keys)
         elif most:
-            hull.require_plane("max_vertices")
             view = FewView(hull, most, vertices=request.include_measures, keys=keys, layer=layer)
         elif resume is None:
             view = VerticesView(hull, keys=keys, layer=layer)

@@ -24,7 +24,9 @@ class HullSnapshot(HullEvent):
     center: Place | None = Field(description="Of a hull on the globe, longitude and latitude of its centre.")
     measures: Measures | None = Field(None, description="With measures=true.")
     error: float | None = Field(
-        None, description="With max_vertices, the distance by which the hull reaches beyond the vertices, rounded up."
+        None,
+        description="With max_vertices, the distance by which the hull reaches beyond the vertices, rounded up; "
+        "on the globe in metres.",
     )
 
 

@@ -40,7 +40,7 @@ MaxVertices = Annotated[
         ge=1,
         le=1000,
         description="Show at most this many of the vertices. Each event is then a snapshot; its error is the distance "
-        "by which the hull reaches beyond them, rounded up. Not for hulls on the globe.",
+        "by which the hull reaches beyond them, rounded up; on the globe in metres.",
     ),
 ]
 Consumer = Annotated[
@@ -95,7 +95,8 @@ async def hull_events(
     _admit(request)
     with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
         await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
-        await _require_kind(client, name, keys=keys, few=max_vertices is not None)
+        if keys:
+            await _require_keys(client, name)
     view = View(token_of(request), name, form, rate, keys, measures, layer, max_vertices)
     state = request.app.state
     texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
@@ -130,17 +131,12 @@ async def follow_fence(
     return EventStream(texts, state.health, state.figures)
 
 
-async def _require_kind(client: AsyncHullClient, name: str, *, keys: bool, few: bool) -> None:
-    """Refuse what the hull does not have: an EventSource would come again and again after an event "problem"."""
-    if not (keys or few):
-        return
+async def _require_keys(client: AsyncHullClient, name: str) -> None:
+    """Refuse a hull without keys: an EventSource would come again and again after an event "problem"."""
     async for info in client.list_hulls(name):
-        if info.name == name and keys and info.keyed is None:
+        if info.name == name and info.keyed is None:
             detail = f"keys: the hull {name!r} has points without keys"
             raise ProblemError(409, detail, "HULL_UNSUITABLE", field="keys", value=name)
-        if info.name == name and few and info.geographic:
-            detail = f"max_vertices: the hull {name!r} is on the globe, and sketches are of a plane"
-            raise ProblemError(409, detail, "HULL_UNSUITABLE", field="max_vertices", value=name)
         return
 
 
