@@ -117,7 +117,7 @@ def test_lists_have_pages(gateway: Gateway, name: str) -> None:
 BAD = [
     ("/points", {"insert": [[0, 0], [1, "2"]]}, ("insert", 1, '"2"', "/insert/1/1")),
     ("/points", {"insert": [[0, 0], [1]]}, ("insert", 1, None, "/insert/1")),
-    ("/points", [[0, 0], [True, 1]], ("1", 1, "true", "/1/0")),
+    ("/points", [[0, 0], [True, 1]], ("body", 1, "true", "/1/0")),
     ("/points", {"inserts": []}, ("inserts", None, "[]", "/inserts")),
     ("/points", {"keys": ["a", 1.5], "points": [[0, 0], [1, 1]]}, ("keys", 1, "1.5", "/keys/1")),
     ("/points", {"keys": ["a", 1], "points": [[0, 0], [1, 1]]}, ("keys", 1, "1", "/keys/1")),
@@ -232,8 +232,12 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
         assert (answer.status, answer.json["status"], answer.json["reason"]) == (status, status, reason), answer.json
     assert cases[2][0].json["row"] == 1
     refused = gateway.call("PATCH", at)
-    assert (refused.status, refused.headers["Allow"]) == (405, "DELETE, GET")
-    assert f"{at} takes DELETE and GET, not PATCH" in refused.json["detail"]
+    assert (refused.status, refused.headers["Allow"]) == (405, "DELETE, GET, HEAD")
+    assert f"{at} takes DELETE, GET, HEAD, not PATCH" in refused.json["detail"]
+    assert gateway.call("PUT", "/openapi.json").headers["Allow"] == "GET, HEAD"
+    assert "near it are /hulls/{name}/points," in gateway.get("/hulls//points").json["detail"]
+    assert gateway.post(f"{at}/points", [[0, "x"]]).json["field"] == "body"
+    assert gateway.get("/hulls", Authorization=f"Bearer {'x' * 20_000}").status == 401
     assert f"{at}/rows" in next(
         answer.json["detail"] for answer, _, _ in cases if answer.json.get("value") == f"{at}/row"
     )
@@ -246,6 +250,19 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
     assert (
         "must be PRODUCER:SEQUENCE" in gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number").json["detail"]
     )
+
+
+def test_head_is_get_without_the_body(gateway: Gateway, square: str) -> None:
+    connection = gateway.connection()  # one for all: what follows a body would be out of step
+    for path in ("/", f"/hulls/{square}", f"/hulls/{square}?f=geojson", f"/hulls/{square}/events", "/nowhere"):
+        connection.request("HEAD", path)
+        response = connection.getresponse()
+        assert (response.status, response.read()) == (404 if path == "/nowhere" else 200, b""), path
+        whole = gateway.get(path) if not path.endswith("/events") else None
+        assert whole is None or response.headers["Content-Length"] == str(len(whole.body))
+    connection.request("HEAD", f"/hulls/{square}/points")
+    assert connection.getresponse().status == 405
+    connection.close()
 
 
 def test_a_numbered_batch_is_applied_once(gateway: Gateway, square: str) -> None:

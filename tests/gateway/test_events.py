@@ -158,7 +158,9 @@ def test_a_layer_and_a_sketch(gateway: Gateway, name: str) -> None:
         each.close()
 
 
-@pytest.mark.parametrize("query", ["layer=0", "layer=1001", "max_vertices=0", "max_vertices=1001", "layer=x"])
+@pytest.mark.parametrize(
+    "query", ["layer=0", "layer=1001", "max_vertices=0", "max_vertices=1001", "layer=x", "rate=1e-9"]
+)
 def test_layers_and_sketches_out_of_range_are_refused(gateway: Gateway, name: str, query: str) -> None:
     gateway.post("/hulls", {"name": name})
     refused = gateway.get(f"/hulls/{name}/events?{query}")

@@ -92,5 +92,12 @@ def test_other_names_are_refused(behind: Gateway) -> None:
     refused = behind.get("/hulls", Host="rebound.example:80")
     assert (refused.status, refused.json["field"]) == (421, "Host")
     assert "--allow-host" in refused.json["detail"]
+    connection = behind.connection()
+    connection.putrequest("GET", "/hulls", skip_host=True)
+    for name in (NAMED, "rebound.example"):
+        connection.putheader("Host", name)
+    connection.endheaders()
+    assert connection.getresponse().status == 421
+    connection.close()
     assert behind.get("/hulls", Host=f"{NAMED}:8443").status == 200
     assert behind.get("/dynhull/hulls").status == 200

@@ -7,6 +7,7 @@ from typing import Any
 from fastapi import Depends, FastAPI, Request, Response
 from fastapi.middleware.cors import CORSMiddleware
 from pydantic import BaseModel
+from starlette.routing import Route
 
 import dynhull_client
 from dynhull_client import AsyncHullClient
@@ -18,6 +19,7 @@ from .events.documents import FenceEvent, HullChange, HullProgress, HullSnapshot
 from .events.feeds import Feeds
 from .figures import Figures, Measured
 from .gathering import Gatherer
+from .heads import HeadAsGet
 from .hosts import KnownHosts
 from .ogc import routes as maps
 from .ogc.documents import FeatureCollection, Item
@@ -70,9 +72,10 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     routers = [module.router for module in (hulls, points, uploads, fences, questions, events, maps, health)]
     for router in routers:
         app.include_router(router)
-    app.state.routes = [route for router in routers for route in router.routes]
     app.openapi = partial(_description, app)  # type: ignore[method-assign]  # the framework's way to have one's own
-    app.add_route("/openapi.json", _answer_description, include_in_schema=False)
+    description = Route("/openapi.json", _answer_description, include_in_schema=False)
+    app.router.routes.append(description)
+    app.state.routes = [description, *(route for router in routers for route in router.routes)]
     handlers.install(app)
     app.add_middleware(SmallChanges, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
@@ -87,6 +90,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     if settings.hosts:
         app.add_middleware(KnownHosts, hosts=settings.hosts)
     app.add_middleware(Measured, figures=app.state.figures)
+    app.add_middleware(HeadAsGet)
     app.add_middleware(PathsAsSent, root_path=settings.root_path)
     return app
 

@@ -11,6 +11,7 @@ from dynhull_client import AsyncHullClient
 from .problems import ProblemError
 
 SCHEME = "bearer "
+LONGEST_TOKEN = 8192  # gRPC refuses calls with more metadata
 
 described = HTTPBearer(auto_error=False, description="A token of the server (`dynhull token`), passed on as it is.")
 
@@ -22,7 +23,11 @@ def token_of(request: Request) -> str | None:
         return None
     if given[: len(SCHEME)].lower() != SCHEME:
         raise ProblemError(HTTPStatus.UNAUTHORIZED, "Authorization must be Bearer and a token", "UNAUTHENTICATED")
-    return given[len(SCHEME) :].strip()
+    token = given[len(SCHEME) :].strip()
+    if len(token) > LONGEST_TOKEN:
+        detail = f"a token has at most {LONGEST_TOKEN} characters, not {len(token)}"
+        raise ProblemError(HTTPStatus.UNAUTHORIZED, detail, "UNAUTHENTICATED")
+    return token
 
 
 def client_of(request: Request) -> AsyncHullClient:

@@ -15,6 +15,7 @@ from starlette.routing import Match, Route
 from dynhull_client import DynhullError
 
 from .bodies import body_of
+from .heads import GET, HEAD
 from .invalid import of_validation
 from .problems import ProblemError, cut, problem
 from .refusals import of_refusal, of_value_error
@@ -68,7 +69,7 @@ def install(app: FastAPI) -> None:
 
 def _not_allowed(request: Request) -> Response:
     allowed = sorted(_methods(request))
-    detail = f"{cut(_path(request))} takes {' and '.join(allowed)}, not {request.method}"
+    detail = f"{cut(_path(request))} takes {', '.join(allowed)}, not {request.method}"
     response = problem(HTTPStatus.METHOD_NOT_ALLOWED, detail, reason="METHOD_NOT_ALLOWED", value=request.method)
     response.headers["Allow"] = ", ".join(allowed)
     return response
@@ -93,17 +94,14 @@ def _paths_like(path: str, routes: Iterable[Route]) -> list[str]:
     found: dict[str, None] = {}
     for route in routes:
         parts = route.path.split("/")
-        filled = [given[i] if part.startswith("{") and i < len(given) else part for i, part in enumerate(parts)]
+        filled = [given[i] if part.startswith("{") and any(given[i : i + 1]) else part for i, part in enumerate(parts)]
         found["/".join(filled)] = None
     return list(found)
 
 
 def _methods(request: Request) -> set[str]:
-    """The methods of a path: the framework has a route for each."""
+    """The methods of a path: the framework has a route for each, and every GET takes HEAD."""
     routes: Iterable[Route] = request.app.state.routes
-    return {
-        method
-        for route in routes
-        if route.matches(request.scope)[0] is not Match.NONE
-        for method in route.methods or ()
-    }
+    found = [route.methods or () for route in routes if route.matches(request.scope)[0] is not Match.NONE]
+    methods = {method for each in found for method in each}
+    return methods | {HEAD} if GET in methods else methods

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from .problems import problem
+from .problems import cut, problem
 
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 ANY = "*"
@@ -34,15 +34,17 @@ class KnownHosts:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, or refuse it."""
         if scope["type"] == "http":
-            given = next((value for name, value in scope["headers"] if name == b"host"), b"").decode("latin-1")
+            # More than one is refused below: their names, with a comma between, are no name.
+            given = b", ".join(value for name, value in scope["headers"] if name == b"host").decode("latin-1")
             name = _name(given)
             if name not in self._hosts:
                 refused = problem(
                     HTTPStatus.MISDIRECTED_REQUEST,
-                    f"this gateway does not answer to {given}; dynhull gateway --allow-host {name or 'NAME'} allows it",
+                    f"this gateway does not answer to {cut(given) or 'requests without a name'}; "
+                    f"dynhull gateway --allow-host {cut(name or 'NAME')} allows it",
                     reason="UNKNOWN_HOST",
                     field="Host",
-                    value=given,
+                    value=cut(given),
                 )
                 await refused(scope, receive, send)
                 return

@@ -130,5 +130,5 @@ def named(cause: Cause, path: Iterable[str | int] = ()) -> dict[str, Any]:
     """The fields of a problem that name a cause. `path`: the way to it in the body."""
     parts = list(path)
     row = next((part for part in parts if isinstance(part, int)), None)
-    field = cause.parameter or (str(parts[0]) if parts else "body")
+    field = cause.parameter or (parts[0] if parts and isinstance(parts[0], str) else "body")
     return {"field": field, "row": row, "value": cause.value, "errors": [cause]}

@@ -120,16 +120,16 @@ class Csv:
 
     def __call__(self, lines: Sequence[bytes]) -> list[Row]:
         """The rows of some lines."""
-        cells = _cells(lines)
         if self._columns is None:
-            first = next(cells, None)
-            if first is None:
+            if not lines:
                 return []
+            (first,) = _cells(lines[:1])
             self._columns = self._named([each.strip().lower() for each in first])
             self._fields = len(first)
+            lines = lines[1:]
         columns = self._columns
         rows: list[Row] = []
-        for row in cells:
+        for row in _cells(lines):
             if len(row) != self._fields:
                 detail = f"{len(row)} fields in a table of {self._fields} columns"
                 raise RowError(len(rows), detail, None, cut(",".join(row)))

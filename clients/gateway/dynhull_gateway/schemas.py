@@ -135,7 +135,8 @@ IdempotencyKey = Annotated[
         alias="Idempotency-Key",
         pattern=IDEMPOTENCY_KEY,
         description="PRODUCER:SEQUENCE makes the request safe to repeat: the hull applies each number of a producer "
-        "once. Of a body of rows, it is the number of the first row, and the rows are counted on from there.",
+        "once, whatever the body: what comes with a number that it has is not applied, and counts as `duplicate` or "
+        "`repeated`. Of a body of rows, it is the number of the first row, and the rows are counted on from there.",
         examples=["sensor-7:1"],
     ),
 ]

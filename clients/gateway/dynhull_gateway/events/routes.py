@@ -23,7 +23,10 @@ router = APIRouter(tags=["events"])
 LastEventId = Annotated[
     str | None, Header(alias="Last-Event-ID", max_length=300, description="The id of the last event that was received.")
 ]
-Rate = Annotated[float, Query(gt=0, le=100, description="The most events a second, each with all changes before it.")]
+ONE_A_DAY = 1 / 86400  # the least that a watch takes
+Rate = Annotated[
+    float, Query(ge=ONE_A_DAY, le=100, description="The most events a second, each with all changes before it.")
+]
 FormOf = Annotated[
     Form,
     Query(

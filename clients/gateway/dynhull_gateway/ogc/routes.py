@@ -47,6 +47,7 @@ router = APIRouter(tags=["maps"], route_class=JsonRoute)
 HULLS = "hulls"
 ENTITIES = "entities:"
 ROUND = 100
+DESCRIBED_BY = "describedby", "describedBy"  # as registered, and as GDAL 3.6 looks for it
 
 Segment = Annotated[str, StringConstraints(min_length=1, max_length=300), BeforeValidator(unquoted)]
 CollectionId = Annotated[
@@ -277,7 +278,8 @@ def _hulls(request: Request) -> Collection:
 def _entities(request: Request, name: str) -> Collection:
     made = _collection(request, f"{ENTITIES}{name}", f"Entities of {name}", f"The position of each key of {name}.")
     path = f"collections/{quote(made.id, safe='')}/schema"
-    made.links.append(_link(request, path, "describedby", SCHEMA, f"{made.title}: types of properties"))
+    for rel in DESCRIBED_BY:
+        made.links.append(_link(request, path, rel, SCHEMA, f"{made.title}: types of properties"))
     return made
 
 
