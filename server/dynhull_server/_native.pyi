@@ -26,3 +26,8 @@ def added(runs: object, places: dict[int, int], lasts: object, news: object, end
     """
     Add runs to the columns of new ones, and set the last events of their fences.
     """
+
+def counted(places: object, news: tuple[object, object, object, object], columns: tuple[object, object, object, object, object]) -> None:
+    """
+    Count events of fences at these places: two columns are set, two are added to, and the last is 1.
+    """

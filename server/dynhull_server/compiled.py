@@ -66,6 +66,14 @@ class Native(Protocol):
     ) -> None:
         """`FenceRuns.add` in storage/rows, where there is room."""
 
+    def counted(
+        self,
+        places: "npt.NDArray[Any]",
+        news: "tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]",
+        columns: "tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]",
+    ) -> None:
+        """`Tallies.take` in state/fences."""
+
 
 def _load() -> Native | None:
     if KERNEL == "python":

@@ -21,7 +21,7 @@ from dynhull_server.state.events import (
     Tick,
     WriteBatch,
 )
-from dynhull_server.state.fences import event_log
+from dynhull_server.state.fences import event_log, tallies
 from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea
 from dynhull_server.state.fences.records import AppendEvents, Cause
 from dynhull_server.state.fences.requests import CreateFence
@@ -66,7 +66,8 @@ def put(dice: random.Random, name: str, now: int) -> WriteBatch:
     return request
 
 
-def life(seed: str) -> list[Any]:
+def life(seed: str) -> tuple[list[Any], list[list[int]]]:
+    """The events of a life, and what is counted of its fences."""
     dice, of_seed = random.Random(seed), Life()
     for name in ("fleet/1", "fleet/2"):
         of_seed.step(CreateHull(Everyone(), name, CREATED, HullSettings("int")))
@@ -81,16 +82,17 @@ def life(seed: str) -> list[Any]:
         batches = [put(dice, name, now + dice.randrange(-20, 20)) for _ in range(dice.randrange(1, 4))]
         of_seed.step(Arrived(batches))
         of_seed.step(Tick(now / 1e6, now, Everyone()))
-    return of_seed.made
+    return of_seed.made, of_seed.core.tallies.columns.tolist()
 
 
 @pytest.mark.parametrize("seed", ["a", "b"])
 @pytest.mark.skipif(native is None, reason="the server runs on pure Python")
 def test_crossings_become_the_same_events_in_both_implementations(seed: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = [life(seed)]
+    found, counted = life(seed)
     monkeypatch.setattr(event_log, "native", None)
-    found.append(life(seed))
-    assert len(found[0]) > 10
-    causes = {event.causes for made in found[0] for events in made.values() for event in events}
+    monkeypatch.setattr(tallies, "native", None)
+    again = life(seed)
+    assert len(found) > 10
+    causes = {event.causes for made in found for events in made.values() for event in events}
     assert causes >= {Cause.MOVED, Cause.AREA, Cause.APPEARED, Cause.REMOVED, Cause.EXPIRED}
-    assert found[0] == found[1]
+    assert again == (found, counted)

@@ -1,5 +1,6 @@
 """What every implementation of the storage promises."""
 
+import gc
 import io
 import itertools
 import sqlite3
@@ -636,6 +637,19 @@ def test_a_deleted_fence_leaves_nothing(opened):
         assert read_fence(opened.storage, 10).events == events(1, 1)
         assert opened.contents.next_number in (1, 11)
         opened.reopen()
+
+
+def test_commits_leave_nothing_to_the_garbage_collector(opened):
+    """Cycles of references would have it look at all objects of a server with many fences, again and again."""
+    fenced(opened, 3)
+    gc.collect()
+    gc.disable()
+    try:
+        opened.commit(appended(9, events(4, 6)), Append(1, records(1, 1)))
+        opened.commit(PutConsumer(9, Consumer("post")), DropEvents(9, 2))
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
 
 
 def test_fences_that_share_commits_keep_their_own_events(opened):

@@ -7,14 +7,12 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-
 from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError, words_for_callers
 from ..state.fences.config import FenceConfig
 from ..state.fences.event_block import EventBlock
 from ..state.fences.fence import Fence
 from ..state.fences.fence_leg import members
-from ..state.fences.records import Consumer, EventType, FenceEvent, Inside
+from ..state.fences.records import Consumer, FenceEvent, Inside
 from ..state.fences.requests import (
     CreateFence,
     DeleteFence,
@@ -147,7 +145,7 @@ class Fences:
         self._engine = engine
         self._storage = storage
         self._live: dict[Fence, LiveFence] = {}
-        self.events: Counter[EventType] = Counter()
+        self.events: Counter[int] = Counter()
         self.stirred: dict[Fence, None] = {}
         self.watched: dict[int, LiveFence] = {}
 
@@ -205,9 +203,7 @@ class Fences:
             events: the events; None for none.
         """
         if events is not None:
-            for kind, count in enumerate(np.bincount(events.types).tolist()):
-                if count:
-                    self.events[EventType(kind)] += count
+            self.events.update(events.types.tolist())
             if self.watched:
                 for number in self.watched.keys() & set(events.fences.tolist()):
                     self.watched[number].moved()

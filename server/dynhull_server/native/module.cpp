@@ -244,6 +244,24 @@ void added(const nb::object& runs, const nb::dict& places, const nb::object& las
   }
 }
 
+// Counts events of fences, given their places: each of the first two columns gets the new value, each of the next two
+// as much more, and each of the last one a 1.
+void counted(const nb::object& places, const nb::tuple& news, const nb::tuple& columns) {
+  if (news.size() != 4 || columns.size() != 5) throw nb::value_error("there are four columns of news, and five others");
+  const View<std::int64_t> of_places(places);
+  const std::size_t count = of_places.size();
+  const View<std::int64_t> lasts(news[0], count), times(news[1], count), made(news[2], count), changes(news[3], count);
+  const Room of_lasts(columns[0]), of_times(columns[1]), of_made(columns[2]), of_changes(columns[3]), seen(columns[4]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto place = static_cast<std::size_t>(of_places.data()[i]);
+    of_lasts[place] = lasts.data()[i];
+    of_times[place] = times.data()[i];
+    of_made[place] += made.data()[i];
+    of_changes[place] += changes.data()[i];
+    seen[place] = 1;
+  }
+}
+
 }  // namespace
 }  // namespace dynhull_server
 
@@ -268,4 +286,8 @@ NB_MODULE(_native, module) {
              nb::sig("def added(runs: object, places: dict[int, int], lasts: object, news: object, end: int, row: int) "
                      "-> None"),
              "Add runs to the columns of new ones, and set the last events of their fences.");
+  module.def("counted", &dynhull_server::counted, "places"_a, "news"_a, "columns"_a,
+             nb::sig("def counted(places: object, news: tuple[object, object, object, object], "
+                     "columns: tuple[object, object, object, object, object]) -> None"),
+             "Count events of fences at these places: two columns are set, two are added to, and the last is 1.");
 }

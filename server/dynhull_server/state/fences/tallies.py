@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from ...compiled import native
+
 if TYPE_CHECKING:
     from .fence import Fence
     from .numbering import Told
@@ -116,6 +118,19 @@ class Tallies(Table):
     def take(self, told: "Told") -> None:
         """Count events of crossings, which are committed."""
         columns, places = self.columns, told.places
+        if native is not None:
+            native.counted(
+                places,
+                told[2:],
+                (
+                    columns[Column.LAST],
+                    columns[Column.TIME],
+                    columns[Column.UNSAVED],
+                    columns[Column.INSIDE],
+                    columns[Column.STIRRED],
+                ),
+            )
+            return
         columns[Column.LAST][places] = told.lasts
         columns[Column.TIME][places] = told.times
         columns[Column.UNSAVED][places] += told.made

@@ -229,6 +229,7 @@ class Group:
         """Update the ledger, after the commit."""
         for effect in self._effects:
             effect()
+        self._effects.clear()  # they refer to what refers to them: it would wait for the garbage collector
         self._ledger.totals = self.totals
 
     def _take(self, change: Change | AnyStep) -> None:
