@@ -39,6 +39,11 @@ class Frames(asyncio.Protocol):
         self._unsent: list[bytes] = []
         self._unread = bytearray()
 
+    @property
+    def connected(self) -> bool:
+        """Whether frames that are sent now can arrive."""
+        return self._transport is not None
+
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin to send."""
         self._transport = cast("asyncio.Transport", transport)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 QUERY = f"/{DESCRIPTOR.full_name}/Query"
 
+# The reads of a message that are divided among the workers at once: meanwhile other calls wait, for some 50 ms.
+AT_ONCE = 8_192
 # Where the answer to a read comes from: a worker, or this process.
 Source = WorkerLink | Exception | pb.SeparateRequest
 Separate = Callable[[Call, bytes], Awaitable[bytes]]
@@ -48,6 +50,10 @@ class MergedQuery:
 
     async def answer(self, reads: Sequence[pb.Read]) -> None:
         """Answer the reads of a message. Those of a worker that is away are answered with its error."""
+        for begin in range(0, len(reads), AT_ONCE):
+            await self._answer(reads[begin : begin + AT_ONCE])
+
+    async def _answer(self, reads: Sequence[pb.Read]) -> None:
         parts: dict[WorkerLink, pb.QueryRequest] = {}
         sources = [self._source(index, read) for index, read in enumerate(reads)]
         for read, source in zip(reads, sources, strict=True):
@@ -59,7 +65,7 @@ class MergedQuery:
             for read, source in zip(reads, sources, strict=True):
                 if _waits(read):
                     await self._send()
-                await self._add(await self._answer(source))
+                await self._add(await self._answer_from(source))
             await self._send()
             # An answer may be here before its request is known to be sent; to cancel that would end the worker's call.
             await asyncio.gather(*sending)
@@ -72,7 +78,7 @@ class MergedQuery:
         for each in self._upstreams.values():
             each.close()
 
-    async def _answer(self, source: Source) -> pb.ReadAnswer:
+    async def _answer_from(self, source: Source) -> pb.ReadAnswer:
         if isinstance(source, WorkerLink):
             return await self._upstreams[source].next()
         answer = pb.ReadAnswer()

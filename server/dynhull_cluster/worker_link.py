@@ -60,7 +60,7 @@ class WorkerLink:
     @property
     def present(self) -> bool:
         """Whether the worker can be called."""
-        return self._frames is not None
+        return self._frames is not None and self._frames.connected
 
     async def run(self) -> None:
         """Connect, and connect again whenever the worker has ended."""
@@ -101,6 +101,9 @@ class WorkerLink:
         """
         frames = self._present()
         if len(message) <= MOST_BYTES:
+            while not frames.writable.is_set():  # what a worker that does not read has not got is its caller's alone
+                await frames.writable.wait()
+                frames = self._present()
             return await frames.ask(method, f"{call.owner} {call.caller.key}".encode(), message)
         asked = self._channel.unary_unary(method)(message, metadata=metadata_of(call), wait_for_ready=True)
         try:
@@ -122,7 +125,7 @@ class WorkerLink:
         return Upstream(self._channel.stream_stream(method)(metadata=caller, wait_for_ready=True))
 
     def _present(self) -> "_Frames":
-        if self._frames is None:
+        if self._frames is None or not self._frames.connected:
             raise WorkerAwayError(self.number)
         return self._frames
 
@@ -154,10 +157,15 @@ class _Frames(Frames):
 
     Args:
         lost: set when the connection is lost.
+
+    Attributes:
+        writable: set while the worker takes what is sent, and when the connection is lost.
     """
 
     def __init__(self, lost: "asyncio.Future[None]") -> None:
         super().__init__()
+        self.writable = asyncio.Event()
+        self.writable.set()
         self._lost = lost
         self._last = 0
         self._waiting: dict[int, asyncio.Future[bytes]] = {}
@@ -184,8 +192,17 @@ class _Frames(Frames):
         else:
             answer.set_exception(RelayedError(Status.FromString(rest)))
 
+    def pause_writing(self) -> None:
+        """The worker has not read for a while."""
+        self.writable.clear()
+
+    def resume_writing(self) -> None:
+        """It has read on."""
+        self.writable.set()
+
     def connection_lost(self, error: Exception | None) -> None:
         super().connection_lost(error)
+        self.writable.set()
         for answer in self._waiting.values():
             if not answer.done():
                 answer.set_exception(RelayedError(lost_status()))

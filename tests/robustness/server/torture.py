@@ -194,13 +194,15 @@ class Torture:
 
     def _kill_one_of(self, kind: str) -> None:
         """A kill of one process of several, which the server starts again."""
-        os.kill(self._one_of(kind), signal.SIGKILL)
+        with suppress(ProcessLookupError):  # a restart of all may be under way, and have ended it
+            os.kill(self._one_of(kind), signal.SIGKILL)
 
     def _pause_worker(self) -> None:
         worker = self._one_of("worker")
-        os.kill(worker, signal.SIGSTOP)
-        time.sleep(self._random.uniform(0.1, 1.0))
-        os.kill(worker, signal.SIGCONT)
+        with suppress(ProcessLookupError):  # as above
+            os.kill(worker, signal.SIGSTOP)
+            time.sleep(self._random.uniform(0.1, 1.0))
+            os.kill(worker, signal.SIGCONT)
 
     def _restart(self) -> None:
         """All processes are restarted, one at a time."""
