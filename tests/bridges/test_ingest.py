@@ -135,8 +135,8 @@ BAD = {
     b'{"id": "a", "x": 1}': "y is missing, not a number",
     b'{"id": "a", "x": "east", "y": 1}': "x is 'east', not a number",
     b'{"id": "a", "x": "inf", "y": 1}': "x is 'inf', not finite",
-    b'{"id": "", "x": 1, "y": 1}': "",
-    b'{"id": "' + b"k" * 5000 + b'", "x": 1, "y": 1}': "",
+    b'{"id": "", "x": 1, "y": 1}': "keys row 0 is ",
+    b'{"id": "' + b"k" * 5000 + b'", "x": 1, "y": 1}': "keys row 0 is ",
 }
 
 

@@ -14,7 +14,7 @@ from dynhull import GeoHull
 from dynhull_client import AsyncHullClient, Circle, HullClient
 from dynhull_dashboard.cards import table
 from dynhull_dashboard.degrees import circle
-from dynhull_dashboard.describe import describe
+from dynhull_dashboard.describe import describe, describe_key
 from dynhull_dashboard.feed import HullFeed
 from dynhull_dashboard.fence_feed import FenceFeed
 from dynhull_dashboard.looks import Look
@@ -50,10 +50,13 @@ def test_a_hull_across_180_degrees_is_drawn_in_one_piece(address: str, fiji: str
                 assert corners.keys == ("b", "c", "a")
                 assert inner.points.tolist() == [[179.25, -17]]
                 assert feed.bounds == (177.5, -18, 180.25, -16.25)
-                assert " km²</td>" in table([(feed, LOOK)], True, "square units")
+                shown_table = table([(feed, LOOK)], True, "square units")
+                assert " km²</td>" in shown_table
+                assert "square units" not in shown_table
                 assert "longitude from 177.5 to 180.25, latitude from -18 to -16.25" in describe([feed])
                 await until(lambda: feed.search.find("b").state is State.VERTEX)
                 assert (feed.search.find("b").x, feed.search.find("b").y) == (180.25, -17)
+                assert describe_key("b", feed, feed.search.find("b"))[1] == "longitude 180.25, latitude -17, revision 1"
             finally:
                 await feed.close()
 
@@ -102,6 +105,7 @@ def test_a_circle_of_metres_has_its_size_in_degrees(address: str, fiji: str) -> 
             feed = FenceFeed(client, f"{fiji}/zone")
             try:
                 await until(lambda: feed.area.bounds is not None and json.loads(feed.marks.message)["x"] != [])
+                assert feed.unit == " m"
                 left, bottom, right, top = feed.area.bounds or (0.0, 0.0, 0.0, 0.0)
                 assert (left + right) / 2 == pytest.approx(180.25)
                 assert (top - bottom) / 2 == pytest.approx(20 / 111.2, rel=0.01)

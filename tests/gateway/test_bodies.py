@@ -188,6 +188,21 @@ def test_of_half_a_body_whole_batches_are_applied_and_the_rest_can_follow(gatewa
     assert (gap.status, gap.json["expected"]) == (409, ROWS + 2)
 
 
+def test_a_body_that_stalls_is_answered_when_the_gateway_ends(address: str, name: str) -> None:
+    with gateway_process(address, "--grace", "1s", complaints="graceful shutdown exceeded") as gateway:
+        gateway.post("/hulls", {"name": name})
+        connection = gateway.connection()
+        connection.putrequest("POST", f"/hulls/{name}/rows")
+        connection.putheader("Content-Type", NDJSON)
+        connection.putheader("Content-Length", "1000000")
+        connection.endheaders(lines(0, ROWS))
+        wait_until(lambda: size(gateway, name) >= 8192)
+        gateway.process.terminate()
+        response = connection.getresponse()
+        assert (response.status, json.loads(response.read())["reason"]) == (503, "DRAINING")
+        connection.close()
+
+
 def test_an_error_late_in_a_body_says_how_many_rows_were_applied(gateway: Gateway, plane: str) -> None:
     refused = gateway.post(f"/hulls/{plane}/rows", lines(0, 3 * ROWS) + b"[1, null]\n", NDJSON).json
     assert refused["row"] == 3 * ROWS

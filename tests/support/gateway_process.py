@@ -80,6 +80,7 @@ def gateway_process(address: str, *options: str, complaints: str = "") -> Iterat
             said = errors.read()
             assert ended == 0, said
             assert complaints in said if complaints else not said, said
+            assert "Traceback" not in said, said
 
 
 class Events:

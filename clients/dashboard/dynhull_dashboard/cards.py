@@ -20,7 +20,7 @@ MARKERS = {
     "star": '<path d="M20 1.5l1.9 4.3 4.7.5-3.5 3.1 1 4.6-4.1-2.4-4.1 2.4 1-4.6-3.5-3.1 4.7-.5z"/>',
     "hex": '<path d="M20 2.5l5 2.8v5.4l-5 2.8-5-2.8V5.3z"/>',
 }
-HEADINGS = ("Revision", "Points", "Vertices", "Area ({area})", "Batches/s")
+HEADINGS = ("Revision", "Points", "Vertices", "Area{area}", "Batches/s")
 LAST_HEADING = "Live hull against Chan's algorithm"
 UNKNOWN = "-"
 DIGITS, RATE_DIGITS = 6, 3
@@ -28,8 +28,13 @@ NOW_SECONDS, SECONDS_UP_TO = 2.0, 120.0
 
 
 def table(shown: Iterable[tuple[HullFeed, Look]], connected: bool, area_unit: str) -> str:
-    """A table of the hulls as HTML, empty without hulls. On a narrow page its rows are cards."""
-    figures = [heading.format(area=escape(area_unit)) for heading in HEADINGS]
+    """A table of the hulls as HTML, empty without hulls. On a narrow page its rows are cards.
+
+    `area_unit`: of hulls in a plane; areas on the globe have their own.
+    """
+    shown = list(shown)
+    area = f" ({escape(area_unit)})" if any(feed.center is None for feed, _ in shown) else ""
+    figures = [heading.format(area=area) for heading in HEADINGS]
     headings = "".join(f'<th scope="col">{heading}</th>' for heading in ("Hull", *figures, LAST_HEADING))
     rows = "".join(_row(feed, look, connected, figures) for feed, look in shown)
     return f"<table><thead><tr>{headings}</tr></thead>{rows}</table>" if rows else ""

@@ -20,6 +20,11 @@ SEGMENT = 100_000.0
 POLE = 90.0
 
 
+def axes(center: Center | None) -> tuple[str, str]:
+    """The names of both coordinates. `center`: of a hull on the globe."""
+    return ("x", "y") if center is None else ("longitude", "latitude")
+
+
 def shown(places: Points, center: Center | None) -> Points:
     """The places with longitudes within half a turn of the centre, so that no hull is torn at 180 degrees.
 

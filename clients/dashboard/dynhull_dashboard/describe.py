@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dynhull_cli.fences.shown import area_text, subjects_text
 from dynhull_client import Fence, HullNotFoundError
 
+from .degrees import axes
 from .event_rows import shortened
 from .feed import HullFeed
 from .fence_feed import FenceFeed
@@ -41,7 +42,7 @@ def _sentence(feed: HullFeed) -> str:
         return f"{feed.name}: nothing drawn."
     left, bottom, right, top = feed.bounds
     shape = SHAPES.get(feed.vertices, f"a convex polygon with {feed.vertices:,} vertices")
-    x, y = ("x", "y") if feed.center is None else ("longitude", "latitude")
+    x, y = axes(feed.center)
     pole = "".join(f" with the {pole} pole inside" for pole in feed.poles)
     return (
         f"{feed.name}: {shape}{pole} around {feed.points:,} points, {x} from {left:.6g} to {right:.6g}, "
@@ -52,8 +53,8 @@ def _sentence(feed: HullFeed) -> str:
 def _fence(feed: FenceFeed) -> str:
     if feed.fence is None:
         return f"Fence {feed.name}: {'deleted' if feed.deleted else 'nothing drawn'}."
-    margin = f", margin {feed.fence.margin:g}" if feed.fence.margin else ""
-    area = f"Fence {feed.name}: {area_text(feed.fence)}{margin}. {_inside(feed, feed.fence)}."
+    margin = f", margin {feed.fence.margin:g}{feed.unit}" if feed.fence.margin else ""
+    area = f"Fence {feed.name}: {area_text(feed.fence, feed.unit)}{margin}. {_inside(feed, feed.fence)}."
     last = feed.events.last
     if last is None or last.type not in EVENTS:
         return area
@@ -77,5 +78,6 @@ def describe_key(key: str, feed: HullFeed, sighting: Sighting) -> list[str]:
     if not feed.keyed:
         return [f"The points of {feed.name} have no keys", ""]
     sentence = SENTENCES[sighting.state].format(key=key, hull=feed.name)
-    at = f"x {sighting.x:.12g}, y {sighting.y:.12g}, revision {sighting.revision:,}"
+    x, y = axes(feed.center)
+    at = f"{x} {sighting.x:.12g}, {y} {sighting.y:.12g}, revision {sighting.revision:,}"
     return [sentence, at if sighting.seen else ""]

@@ -48,7 +48,7 @@ def _row(feed: FenceFeed, look: Look, hulls: Collection[str], connected: bool) -
 
 
 def _figures(feed: FenceFeed, fence: Fence) -> tuple[str, ...]:
-    area = area_text(fence)
+    area = area_text(fence, feed.unit)
     if feed.area.drawn < feed.area.corners:
         area += f" ({feed.area.drawn:,} drawn)"
     consumers = [_consumer(each) for each in fence.consumers[:MOST_CONSUMERS]]

@@ -55,6 +55,11 @@ class FenceFeed:
             return len(self.inside)
         return 0 if self.fence is None else self.fence.inside
 
+    @property
+    def unit(self) -> str:
+        """What follows a length: metres on the globe, nothing in a plane."""
+        return "" if self.marks.center is None else " m"
+
     def messages(self) -> dict[str, str]:
         """What the pages draw and list, by kind."""
         return {"area": self.area.message, "inside": self.marks.message, "events": self.events.message}

@@ -14,6 +14,7 @@ from dynhull_client import AsyncHullClient
 
 from . import fences, handlers, health, hulls, points, questions, uploads
 from .bodies import JSON, LimitedBodies
+from .ends import AnsweredAtTheEnd
 from .events import routes as events
 from .events.documents import FenceEvent, HullChange, HullProgress, HullSnapshot
 from .events.feeds import Feeds
@@ -92,6 +93,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.add_middleware(Measured, figures=app.state.figures)
     app.add_middleware(HeadAsGet)
     app.add_middleware(PathsAsSent, root_path=settings.root_path)
+    app.add_middleware(AnsweredAtTheEnd, health=app.state.health)
     return app
 
 

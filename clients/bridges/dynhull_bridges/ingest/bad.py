@@ -8,6 +8,9 @@ from typing import Any
 
 import structlog
 
+from dynhull_cli.fields import in_options
+from dynhull_client import InvalidRequestError
+
 from ..lines import whole_or_nothing, write_all
 from .feed import Message
 
@@ -36,19 +39,20 @@ class BadMessages:
     def add(self, message: Message, error: Exception) -> None:
         """Keep a message aside. TooManyBadError if there are too many, OSError if it cannot be written."""
         self.count += 1
+        reason = in_options(error) if isinstance(error, InvalidRequestError) else str(error)
         if self._file is not None:
-            line = json.dumps(_line(message, error), ensure_ascii=False) + "\n"
+            line = json.dumps(_line(message, reason), ensure_ascii=False) + "\n"
             try:
                 with whole_or_nothing(self._file):
                     write_all(self._file, line.encode())
             except OSError as failure:
                 raise OSError(failure.errno, failure.strerror, str(self._path)) from None
         if self.count <= LOGGED:
-            log.warning("bad message", **_place(message), error=str(error))
+            log.warning("bad message", **_place(message), error=reason)
         if self.count == LOGGED + 1:
             log.warning("more bad messages are counted, not logged")
         if self._most is not None and self.count > self._most:
-            raise TooManyBadError(f"more than {self._most} bad messages; the last one, of {message.topic}: {error}")
+            raise TooManyBadError(f"more than {self._most} bad messages; the last one, of {message.topic}: {reason}")
 
     def close(self) -> None:
         """Close the file."""
@@ -65,8 +69,8 @@ def _place(message: Message) -> dict[str, Any]:
     return {"topic": message.topic, **({"number": message.number} if message.number else {})}
 
 
-def _line(message: Message, error: Exception) -> dict[str, Any]:
-    line = {**_place(message), "error": str(error)}
+def _line(message: Message, reason: str) -> dict[str, Any]:
+    line = {**_place(message), "error": reason}
     payload = message.payload or b""
     try:
         line["payload"] = payload.decode()

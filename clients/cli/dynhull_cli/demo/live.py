@@ -39,6 +39,8 @@ def live(console: Console, scene: Scene, speed: float) -> None:
             running("dashboard", "dynhull_cli", "dashboard", *where, "--metrics", metrics, apart=True) as dashboard,
             HullClient(address) as hulls,
         ):
+            if stop.is_set():
+                return
             _create(hulls, scene)
             query = urlencode([("hull", scene.hull_name), *(("fence", name) for name in scene.circles)])
             console.print(f"[bold]{scene.title}[/bold]")

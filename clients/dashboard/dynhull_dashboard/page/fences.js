@@ -69,10 +69,13 @@ function draw_marks(canvas, {view, hulls, fences, colours}) {
     canvas.stroke()
   }
 }
-// The name above or below each area; where neither has room, in its middle, or not at all.
-function draw_fence_names(canvas, {view, hulls, fences, taken}) {
+// The name above or below each area, or in its middle: where there is room; else above or below, over points.
+function draw_fence_names(canvas, {view, hulls, fences, taken, colours}) {
+  const names = new Boxes()
   canvas.font = NAME_FONT
   canvas.textAlign = "center"
+  canvas.lineWidth = 3
+  canvas.strokeStyle = colours.paper
   for (const fence of fences.values()) {
     const around = fence.margins(view, hulls)
     const places = (around.length ? around : fence.polygons(view, hulls)).flat(2).map(([x, y]) => view.place(x, y))
@@ -81,15 +84,17 @@ function draw_fence_names(canvas, {view, hulls, fences, taken}) {
     const [left, top, right, low] = box_around(places), name = fence.name
     const label = name.length > LONGEST_NAME ? `…${name.slice(1 - LONGEST_NAME)}` : name
     const width = text_width(label, NAME_FONT), at = down => places.find(place => place[1] == down)[0]
-    for (const [across, bottom] of [[at(top), top - NAME_GAP], [at(low), low + NAME_GAP + NAME_HEIGHT],
-      [(left + right) / 2, (top + low + NAME_HEIGHT) / 2]]) {
-      const box = {left: across - width / 2, right: across + width / 2, top: bottom - NAME_HEIGHT, bottom}
-      if (!is_inside(box, view.rect) || !taken.is_free(box)) continue
-      taken.add(box)
-      canvas.fillStyle = fence.look.colour
-      canvas.fillText(label, across, bottom - 4)
-      break
-    }
+    const [above, below, middle] = [
+      [at(top), top - NAME_GAP], [at(low), low + NAME_GAP + NAME_HEIGHT], [(left + right) / 2, (top + low + NAME_HEIGHT) / 2],
+    ].map(([across, bottom]) => ({left: across - width / 2, right: across + width / 2, top: bottom - NAME_HEIGHT, bottom}))
+    const fits = box => is_inside(box, view.rect) && names.is_free(box)
+    const box = [above, below, middle].find(each => fits(each) && taken.is_free(each)) ?? [above, below].find(fits)
+    if (!box) continue
+    taken.add(box)
+    names.add(box)
+    canvas.fillStyle = fence.look.colour
+    canvas.strokeText(label, (box.left + box.right) / 2, box.bottom - 4)
+    canvas.fillText(label, (box.left + box.right) / 2, box.bottom - 4)
   }
   canvas.textAlign = "left"
 }
