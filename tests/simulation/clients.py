@@ -43,7 +43,7 @@ from dynhull_server.state.fences.config import Area, CircleArea, FenceConfig, Hu
 from dynhull_server.state.fences.fence import Fence
 from dynhull_server.state.fences.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts, HullState
-from dynhull_server.state.records import Center, HullSettings, Identity, Times, Window
+from dynhull_server.state.records import Center, HullSettings, Identity, QuarantineRules, Times, Window
 
 from .entities import Key
 from .fence_model import PREFIX
@@ -199,6 +199,8 @@ class Client:
                 await self.recall(op)
             case "recenter":
                 await self.recenter(op)
+            case "release" | "rules":
+                await self.request(op)
             case "last":
                 await self.last(op["name"])
             case "fence" | "refence" | "unfence" | "follow" | "ack" | "unack" | "inside":
@@ -253,6 +255,25 @@ class Client:
             self._applied(asked, attempt, applied, producer, sequence)
             if name in TIMED:
                 self._put(op, attempt, applied)
+
+    async def request(self, op: Operation) -> None:
+        """Let keys out of the quarantine, or change its rules."""
+        name, kind = op["name"], TIMED[op["name"]]
+        named = (str, int)[kind == "int"]
+        releases, drops = (list(map(named, op.get(field, ()))) for field in ("releases", "drops"))
+        rules = QuarantineRules(**op["rules"]) if "rules" in op else None
+        batch = KeyedBatch(cast("Any", kind), as_keys([], kind), NO_POINTS, as_keys([], kind), rules=rules)
+        if rules is None:
+            batch.releases, batch.drops = as_keys(releases, kind), as_keys(drops, kind)
+        else:
+            self.model.ask_rules(name, rules)
+        asked = self.model.ask(name)
+        try:
+            applied = await self.server.apply(name, WriteBatch(op["rows"], lambda: batch), create=False)
+        except Exception as error:
+            self.refused(asked, error, (HullNotFoundError,))
+        else:
+            self.model.requested(asked, set(releases), set(drops), applied)
 
     async def together(self, op: Operation) -> None:
         """A batch to each of several hulls; a fault of it is in the last one."""
@@ -613,7 +634,8 @@ def _settings(op: Operation) -> HullSettings:
         window = Window(max_points=2)
     by_event_time, center = op.get("by_event_time", False), op.get("center")
     if op["name"] not in GLOBE:
-        return HullSettings(identity, op.get("max_points", 0), window, by_event_time)
+        rules = QuarantineRules(**op["quarantine"]) if "quarantine" in op else None
+        return HullSettings(identity, op.get("max_points", 0), window, by_event_time, quarantine=rules)
     center = None if center is None else tuple(center)
     return HullSettings(identity, op.get("max_points", 0), window, by_event_time, "geographic", center)
 

@@ -69,7 +69,7 @@ from dynhull_server.state.fences.requests import (
 )
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import NO_TIME, Center, HullSettings
+from dynhull_server.state.records import NO_TIME, Center, HullSettings, QuarantineRules
 from dynhull_server.state.schedule import LOOK_AGAIN
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
@@ -80,6 +80,7 @@ from .fence_model import PREFIX
 from .globe import points
 from .model import SKIPS, Model, Truth
 from .plan import Operation
+from .quarantine_model import waiting_of
 from .schedule import Schedule
 
 DAY = 90_000.0
@@ -553,6 +554,13 @@ def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -
     held = loaded(name, kept.contents)
     if (held, kept.clock) != (entities.held, entities.clock):
         raise model.finds(f"{name} holds {held} at {kept.clock}, kept is {entities.held} at {entities.clock}")
+    out, quarantine = state.quarantine, entities.quarantine
+    waiting = {} if out is None else waiting_of(out.stored())
+    rules = QuarantineRules() if out is None else out.rules
+    if (waiting, rules, state.counts.held) != (quarantine.waiting, quarantine.rules, len(quarantine.waiting)):
+        raise model.finds(f"{name} holds out {waiting} by {rules}, kept is {quarantine.waiting} by {quarantine.rules}")
+    if out is not None and not out.whole():
+        raise model.finds(f"the quarantine of {name} is not as it was held")
 
 
 def _remember(failed: list[Exception | None], error: Exception | None, _: bool) -> None:

@@ -10,6 +10,7 @@ from dynhull_server.state.fences.records import Cause
 from dynhull_server.state.records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, PointRows
 
 from .globe import points
+from .quarantine_model import Carried, Quarantined, Verdict
 
 Key = str | float
 
@@ -34,6 +35,7 @@ class Entities:
         held: the points there are.
         clock: the hull's clock.
         gone: why points have left in the last revision.
+        quarantine: the positions held out.
     """
 
     def __init__(self, name: str, settings: HullSettings) -> None:
@@ -43,10 +45,19 @@ class Entities:
         self.held: dict[Key, Entity] = {}
         self.clock: int | None = None
         self.gone: dict[Key, Cause] = {}
+        self.quarantine = Quarantined(settings.quarantine, ordered=settings.by_event_time)
 
     @property
     def follows_server(self) -> bool:
         return self._window is None or self._window.clock == "server"
+
+    def judge(self, rows: KeyRows, clock: int | None, revision: int) -> Verdict | Carried:
+        """Follow what a batch, or a request about the quarantine, does there; before `apply`."""
+        if clock is not None:
+            self.quarantine.leave(self._until(clock), clock)
+        if len(rows.removes):
+            return self.quarantine.judge(self.held, rows, revision)
+        return self.quarantine.carry_out(rows)
 
     def apply(self, rows: KeyRows) -> Effect:
         """Put and remove keys."""
@@ -99,17 +110,22 @@ class Entities:
         """Let those leave that are too old, or whose time has come. Whether they are as many as was said."""
         leaving = self.overdue(clock, rows.until)
         self._remove(leaving, Cause.EXPIRED)
+        self.quarantine.leave(rows.until, clock)
         return len(leaving) == rows.points > 0
 
     def overdue(self, clock: int, until: int | None = None) -> list[Key]:
         """Who has to have left when the hull's clock is `clock`."""
-        if until is None and self._window is not None and self._window.max_age:
-            until = clock - self._window.max_age
+        if until is None:
+            until = self._until(clock)
         return [
             key
             for key, entity in self.held.items()
             if (until is not None and NO_TIME < entity.time <= until) or entity.deadline <= clock
         ]
+
+    def _until(self, clock: int) -> int | None:
+        """The greatest time that is too old."""
+        return clock - self._window.max_age if self._window is not None and self._window.max_age else None
 
 
 def loaded(name: str, contents: Contents) -> dict[Key, Entity]:

@@ -9,6 +9,7 @@ its x, and all points of a parabola are vertices: so an answer names the batches
 * A read at a revision is the truth at that revision, and so is a recall.
 * A hull on the globe has the centre of its creation, of its first points or of the last request to move it.
 * No answer to a later request is older than an answer that has been seen.
+* Positions are held out of a hull, and let in, as its rules say: see `quarantine_model`.
 * Events of fences follow from the revisions: see `fence_model`.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
@@ -25,11 +26,23 @@ from dynhull_server.state.batch import Applied
 from dynhull_server.state.fences.records import Cause
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import Append, Center, Create, Delete, Expiry, HullRow, KeyRows, PointRows, Record
+from dynhull_server.state.records import (
+    Append,
+    Center,
+    Create,
+    Delete,
+    Expiry,
+    HullRow,
+    KeyRows,
+    PointRows,
+    QuarantineRules,
+    Record,
+)
 
 from .entities import Effect, Entities, Entity, Key
 from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
 from .globe import FAR, GLOBE, mean, points
+from .quarantine_model import BrokenRuleError, Carried, Verdict
 
 Content = tuple[float, ...]
 
@@ -53,7 +66,8 @@ class Truth:
     `keys` are the keys at each revision, by their x, and `entities` those that there are; of hulls without keys or
     window none.
     `attempts` are the batches of the revisions, `held` the entities at each, and `gone` why others left in it;
-    `centers` are those at each revision, and `recenters` the revisions that moved the centre and are not answered.
+    `centers` are those at each revision, and `recenters` the revisions that moved the centre and are not answered;
+    `requests` those about the quarantine that are not answered.
     `corners` is for fences. `since` is the number of commits when it was made.
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
     """
@@ -69,6 +83,7 @@ class Truth:
     attempts: list[int | None] = field(default_factory=lambda: [None])
     centers: list[Center | None] = field(init=False)
     recenters: set[int] = field(default_factory=set)
+    requests: dict[int, Carried] = field(default_factory=dict)
     corners: dict[int, Rings] = field(default_factory=dict)
     since: int = 0
     entities: Entities = field(init=False)
@@ -154,10 +169,11 @@ class Model:
         self._places: dict[int, tuple[Truth, int]] = {}
         self._refused: set[int] = set()
         self._bound: dict[int, list[int]] = {}
-        self._effects: dict[int, tuple[Effect, int]] = {}
+        self._effects: dict[int, tuple[Effect, int, Verdict | None]] = {}
         self._floor: dict[str, tuple[int, int]] = {}
         self._attempts = self._uids_given = 0
         self._centers_asked: dict[str, set[Center | None]] = defaultdict(set)
+        self._rules_asked: dict[str, set[QuarantineRules]] = defaultdict(set)
         self._open: Counter[tuple[str, str]] = Counter()
         self._asked: Counter[tuple[str, str]] = Counter()
         self._numbered: dict[tuple[str, str, int], list[Truth]] = defaultdict(list)
@@ -240,7 +256,7 @@ class Model:
         if _only_moves_center(record):
             self._recenter(truth, record)
             return None
-        if isinstance(record.rows, Expiry):
+        if isinstance(record.rows, Expiry) or _is_request(record.rows):
             self._revise(truth, record, record.rows)
             return None
         rows = record.rows
@@ -309,9 +325,9 @@ class Model:
                 if record.clock is None or not entities.expire(rows, record.clock):
                     raise self.finds(f"revision {record.revision} of {truth.row.name} lets others leave: {record}")
             case KeyRows():
-                self._effects[_attempt(truth, rows)] = entities.apply(rows), len(rows.keys)
+                self._apply(truth, record, rows)
             case _:
-                self._effects[_attempt(truth, rows)] = entities.apply_points(rows), len(rows.inserts)
+                self._effects[_attempt(truth, rows)] = entities.apply_points(rows), len(rows.inserts), None
         if entities.clock is not None and (record.clock is None or record.clock < entities.clock):
             raise self.finds(f"the clock of {truth.row.name} goes back from {entities.clock} to {record.clock}")
         entities.clock = record.clock
@@ -321,6 +337,21 @@ class Model:
         truth.gone.append(entities.gone)
         truth.keys.append({entity.x: key for key, entity in entities.held.items()})
         truth.contents.append(tuple(sorted(truth.keys[-1])))
+
+    def _apply(self, truth: Truth, record: Record, rows: KeyRows) -> None:
+        """A batch of keys, or a request about the quarantine."""
+        try:
+            verdict = truth.entities.judge(rows, record.clock, record.revision)
+        except BrokenRuleError as error:
+            raise self.finds(f"at revision {record.revision} of {truth.row.name}: {error}") from error
+        effect = truth.entities.apply(rows)
+        if isinstance(verdict, Verdict):
+            self._effects[_attempt(truth, rows)] = effect, len(rows.keys), verdict
+            return
+        truth.requests[record.revision] = verdict
+        assert rows.held is not None  # it is a request
+        if rows.held.rules not in (None, *self._rules_asked[truth.row.name]):
+            raise self.finds(f"{truth.row.name} has the rules {rows.held.rules}, which nobody asked for")
 
     def overdue(self, time: int) -> list[str]:
         """The hulls that hold what should have left at a time by the server's clock."""
@@ -434,14 +465,20 @@ class Model:
 
         With `timed` its rows had times or deadlines, which may have been too early.
         """
+        ordered = attempt in self._places and self._places[attempt][0].row.settings.by_event_time
         if applied.duplicate:
             return
         if applied.late and not timed:
             raise self.finds(f"of batch {attempt} {applied.late} rows were late when they came")
-        effect, rows = self._effects[attempt]
-        said = applied.inserted, applied.moved, applied.stale, applied.skipped, applied.deleted, applied.evicted
-        if (said, applied.late) != (effect, puts - rows):
+        effect, rows, verdict = self._effects[attempt]
+        held = 0 if verdict is None else verdict.held
+        # A put that is older than a held position changes nothing either, and is not kept.
+        stale = puts - rows - held - applied.late if ordered else 0
+        said = applied.inserted, applied.moved, applied.stale - stale, applied.skipped, applied.deleted, applied.evicted
+        if stale < 0 or (said, applied.late) != (effect, puts - rows - held - stale):
             raise self.finds(f"batch {attempt} is said to have done {applied}, and did {effect} of {rows} rows")
+        if verdict is not None and Verdict(len(applied.held), applied.released, applied.dropped) != verdict:
+            raise self.finds(f"batch {attempt} is said to have done {applied}, and did {verdict}")
 
     def answered_fence(self, asked: Asked, number: int, last: int) -> None:
         """An answer about a fence comes from after the event `last`."""
@@ -561,6 +598,25 @@ class Model:
                 first = asked.floor[1] if number == asked.floor[0] else 0
                 yield from ((truth, revision) for revision in range(first, truth.revision + 1))
 
+    def ask_rules(self, name: str, rules: QuarantineRules) -> None:
+        """Other rules of a quarantine are asked for."""
+        self._rules_asked[name].add(rules)
+
+    def requested(self, asked: Asked, releases: set[Key], drops: set[Key], applied: Applied) -> None:
+        """A request about the quarantine has been carried out."""
+        for truth, revision in self._since(asked):
+            carried = truth.requests.get(revision)
+            if revision != applied.revision or carried is None:
+                continue
+            expected = carried.waited & releases, carried.waited & drops
+            missing = len(releases | drops) - len(carried.released | carried.dropped)
+            said = applied.released, applied.dropped, applied.missing
+            if (carried.released, carried.dropped) == expected and said == (*map(len, expected), missing):
+                del truth.requests[revision]
+                self._answered(asked, (truth.row.number, revision))
+                return
+        raise self.finds(f"{asked.name} is said to have released {releases}, dropped {drops} by {applied}: not kept")
+
     def last(self, asked: Asked, producer: str, sequence: int) -> None:
         """The last number of a producer was answered."""
         kept = [each.producers.get(producer, 0) for each in self._hulls.values() if each.row.name == asked.name]
@@ -575,6 +631,11 @@ def tag(attempt: int, kind: str) -> Key:
 
 def _only_moves_center(record: Record) -> bool:
     return record.center is not None and not len(record.rows)
+
+
+def _is_request(rows: object) -> bool:
+    """Whether it is about the quarantine: every batch of keys removes one of its own."""
+    return isinstance(rows, KeyRows) and not len(rows.removes)
 
 
 def _attempt(truth: Truth, rows: PointRows | KeyRows) -> int:

@@ -78,6 +78,11 @@ QUERIES = (1, 1, 2, 4)
 # Where points of the parabola are asked for: most batches insert one of these.
 PLACES_ASKED = 12
 
+# The share of the plans with keys in which bad positions are held out, and how many requests there are about that.
+WITH_QUARANTINE = 0.3
+QUARANTINED = ("k", "kk", "l")
+REQUESTS = (1, 2, 4, 8)
+
 # The share of plans with fences in which a client does what hardly ever comes together by chance.
 WITH_SCENES = 0.5
 
@@ -161,6 +166,10 @@ def random_plan(seed: int, layer: str) -> Plan:
     scenes = random.Random(f"scenes {seed}")  # the other plans stay as they were
     if fences and scenes.random() < WITH_SCENES:
         _add_scene(scenes, plan, fences)
+    quarantine = random.Random(f"quarantine {seed}")
+    held = [name for name in timed if name in QUARANTINED]
+    if held and quarantine.random() < WITH_QUARANTINE:
+        _add_quarantine(quarantine, plan, held)
     queries = random.Random(f"queries {seed}")
     if layer != "core" and queries.random() < WITH_QUERIES:
         for _ in range(queries.choice(QUERIES)):
@@ -186,6 +195,59 @@ def _query(draw: random.Random, names: tuple[str, ...]) -> Operation:
     if draw.random() < 0.2:
         op["leave"] = int(draw.expovariate(1 / 3))
     return op
+
+
+def _add_quarantine(draw: random.Random, plan: Plan, names: list[str]) -> None:
+    """Hulls have rules, and clients let positions in, drop them and change the rules."""
+    for life in plan["lives"]:
+        for client in life["clients"]:
+            for op in client:
+                if op["do"] == "create" and op["name"] in names and draw.random() < 0.8:
+                    op["quarantine"] = _rules(draw)
+        for _ in range(draw.choice(REQUESTS)):
+            client = draw.choice(life["clients"])
+            client.insert(draw.randint(0, len(client)), _request(draw, draw.choice(names)))
+    draw.choice(plan["lives"])["clients"].append(_positions_held(draw, plan["layer"], draw.choice(names)))
+    plan["limits"] |= {"max_hulls": 10, "max_points": 100}
+
+
+def _request(draw: random.Random, name: str) -> Operation:
+    """Keys are let in and dropped, or there are other rules."""
+    op = {"do": "rules", "name": name, "rules": _rules(draw)}
+    if draw.random() < 0.8:
+        keys = draw.sample(range(4), draw.choice((1, 2, 4)))
+        op = {"do": "release", "name": name, "releases": keys[::2], "drops": keys[1::2]}
+    op["rows"] = draw.choice((1, 1, 200))
+    if draw.random() < 0.2:
+        op["leave"] = int(draw.expovariate(1 / 3))
+    return op
+
+
+def _positions_held(draw: random.Random, layer: str, name: str) -> list[Operation]:
+    """Three keys make a small hull; others move far away, and there perhaps farther."""
+    create = {"do": "create", "name": name, "max_points": 0} | _settings(draw, name)
+    rules = {"max_speed": draw.choice((None, None, 1e5)), "max_growth": 10.0, "confirmations": draw.choice((1, 1, 2))}
+    scene: list[Operation] = [create | {"quarantine": rules}]
+    put = {"do": "put", "name": name, "create": True, "numbered": False, "rows": 1, "time": 0, "removes": []}
+    scene.append(put | {"keys": [0, 1, 2]})
+    for _ in range(draw.randint(4, 12)):
+        op = put | {"keys": draw.sample(range(4), draw.choice((1, 1, 2)))}
+        if draw.random() < 0.3:
+            op |= _puts(draw) | {"keys": op["keys"]}
+        others = [_request(draw, name)] * 2 + [{"do": "snapshot", "name": name}] * (layer == "core")
+        scene.append(draw.choice([op] * 6 + others))
+        if draw.random() < 0.5:
+            scene.append({"do": "tick" if layer == "core" else "rest", "name": name, "seconds": 0.1})
+    return scene
+
+
+def _rules(draw: random.Random) -> dict[str, Any]:
+    """The rules of a quarantine; points are on the parabola, one farther out than the other."""
+    return {
+        "max_speed": draw.choice((None, 1.0, 100.0, 1e5)),
+        "max_growth": draw.choice((None, 1.0, 1.5, 10.0)),
+        "confirmations": draw.choice((0, 1, 1, 2)),
+    }
 
 
 def _recall_beside_delete(draw: random.Random, name: str) -> list[list[Operation]]:

@@ -24,6 +24,7 @@ QUICK = {
     "fence_lines_use_up_hulls",
     "fence_not_restored",
     "fence_sequence_again",
+    "quarantine_not_replayed",
     "row02_discarded_while_creating",
     "row06_commit_thread_catches_one_kind",
     "row18_unknown_is_nothing",
