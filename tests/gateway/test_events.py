@@ -199,6 +199,10 @@ def test_a_fence_from_any_place(gateway: Gateway, name: str) -> None:
     assert later.next()[1]["sequence"] == 3
     replaced = Events(gateway, path, Last_Event_ID="another:9")
     assert replaced.next()[0] == "replaced"
+    for ahead in (gateway.get(f"{path}?after=4"), gateway.get(path, Last_Event_ID=f"{uid}:{2**64 - 1}")):
+        assert (ahead.status, ahead.json["reason"]) == (409, "SEQUENCE_AHEAD"), (
+            "an EventSource would come again and again"
+        )
     gateway.call("DELETE", f"/fences/{name}")
     assert rest.next()[0] == "closed"
     for each in (everything, rest, consumer, later, replaced):

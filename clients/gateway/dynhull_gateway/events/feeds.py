@@ -90,7 +90,8 @@ class Feed:
             if place is None and resume is not None:
                 place = self._place(*resume)
             ahead = resume is not None and resume[0] == self._copy.uid and resume[1] > self._copy.revision
-            if place is None and self._known and not (ahead and monotonic() < begun + PATIENCE_SECONDS):
+            patience = begun + PATIENCE_SECONDS - monotonic() if ahead else 0.0
+            if place is None and self._known and patience <= 0:
                 place, resume = self._count, None
                 yield self._whole()
             elif place is not None and place < self._count - len(self._events):
@@ -102,7 +103,7 @@ class Feed:
                     yield sent.text
             else:
                 try:
-                    async with asyncio.timeout(keepalive):
+                    async with asyncio.timeout(min(keepalive, patience) if patience > 0 else keepalive):
                         await news.wait()
                 except TimeoutError:
                     yield COMMENT

@@ -128,9 +128,10 @@ async def follow_fence(
     _admit(request)
     resume = resumed(last_event_id)
     uid, place = ("", after) if resume is None or consumer is not None else resume
-    await _require_fence(client, name)
+    reading = Reading(name, consumer, uid, place, conflate)
+    await _require_fence(client, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
-    texts = fence_events(client, Reading(name, consumer, uid, place, conflate), state.settings.keepalive_seconds)
+    texts = fence_events(client, reading, state.settings.keepalive_seconds)
     return EventStream(texts, state.health, state.figures)
 
 
@@ -143,10 +144,14 @@ async def _require_keys(client: AsyncHullClient, name: str) -> None:
         return
 
 
-async def _require_fence(client: AsyncHullClient, name: str) -> None:
-    """Refuse a fence that is not there. While the server is away the stream waits for it."""
+async def _require_fence(client: AsyncHullClient, reading: Reading, field: str) -> None:
+    """Refuse a fence that is not there, or has no such event yet. While the server is away the stream waits for it."""
     with suppress(UnavailableError):
-        await client.get_fence(name)
+        fence = await client.get_fence(reading.name)
+        after = reading.after or 0
+        if reading.uid in ("", fence.uid) and after > fence.last_sequence:
+            detail = f"{field}: {after} is after the last event, {fence.last_sequence}"
+            raise ProblemError(409, detail, "SEQUENCE_AHEAD", field=field, value=str(after))
 
 
 def _admit(request: Request) -> None:
