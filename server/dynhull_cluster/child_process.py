@@ -4,12 +4,13 @@ import asyncio
 import logging
 import multiprocessing
 import os
+import signal
 import socket
 import time
 from contextlib import suppress
 from itertools import count
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, cast
 
 from . import child
 from .line import Line
@@ -94,7 +95,7 @@ class ChildProcess:
 
     async def restart(self) -> None:
         """Have it end its calls, and wait until its successor serves."""
-        self._restarting = True
+        self._restarting = self._process is not None
         await self._end()
         await self.serving.wait()
 
@@ -131,7 +132,7 @@ class ChildProcess:
             log.error("a process cannot be started", extra={"failed": self.name, "reason": str(error)})
             return os.EX_OSERR
         self._process = process
-        self._ended = ended = _ended(process)
+        self._ended = ended = asyncio.get_running_loop().create_future()
         self.starts += 1
         line = self._line = await Line.on(ours)
         line.send(self._begin)
@@ -142,7 +143,7 @@ class ChildProcess:
                     self.serving.set()
                 elif (answer := self._asked.get(message["metrics"])) is not None and not answer.done():
                     answer.set_result(message["page"])
-            await asyncio.shield(ended)
+            await _reported(process)
             process.join()
             return process.exitcode or 0
         finally:
@@ -154,6 +155,7 @@ class ChildProcess:
                     answer.set_result(None)
             if process.exitcode is None:
                 process.kill()
+            ended.set_result(None)
 
     async def _end(self) -> None:
         """Send SIGTERM, and SIGKILL if that has not ended it in time."""
@@ -161,25 +163,28 @@ class ChildProcess:
         if process is None:
             return
         ended = self._ended
-        process.terminate()
+        _signal(process, signal.SIGTERM)
         try:
             async with asyncio.timeout(self._grace + LAST_SECONDS):
                 await asyncio.shield(ended)
         except TimeoutError:
             log.error("a process does not end: it is killed", extra={"killed": self.name})
-            process.kill()
+            _signal(process, signal.SIGKILL)
             await ended
 
 
-def _ended(process: BaseProcess) -> "asyncio.Future[None]":
-    """Set when the process has ended."""
+def _signal(process: BaseProcess, number: int) -> None:
+    """Send a signal, also when the process that forked it has ended: multiprocessing then takes both for ended."""
+    with suppress(ProcessLookupError):
+        os.kill(cast("int", process.pid), number)
+
+
+async def _reported(process: BaseProcess) -> None:
+    """Wait until the process that forked this one says that it has ended, or has ended itself."""
     loop = asyncio.get_running_loop()
-    ended: asyncio.Future[None] = loop.create_future()
-
-    def end() -> None:
+    reported = asyncio.Event()
+    loop.add_reader(process.sentinel, reported.set)
+    try:
+        await reported.wait()
+    finally:
         loop.remove_reader(process.sentinel)
-        if not ended.done():
-            ended.set_result(None)
-
-    loop.add_reader(process.sentinel, end)
-    return ended

@@ -9,7 +9,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
-from cluster import processes
+from cluster import descendants, processes
 from command_line import dynhull
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from patience import PATIENCE, wait_until
@@ -34,8 +34,17 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         # The tests may run in several processes: each of their servers has something to complain about.
         wait_until(lambda: "gateway-1" in processes(server.process.pid))
         gateway = processes(server.process.pid)["gateway-1"]
+        # Nothing depends on the process that forks the others: there is another one for those to come, and all end.
+        os.kill(forking(server), signal.SIGKILL)
         os.kill(gateway, signal.SIGKILL)
         again("gateway-1", server, gateway)
+
+
+def forking(server: Server) -> int:
+    """The number of the process that forks the others."""
+    commands = {each: Path(f"/proc/{each}/cmdline").read_bytes() for each in descendants(server.process.pid)}
+    others = processes(server.process.pid).values()
+    return next(each for each, command in commands.items() if b"forkserver" in command and each not in others)
 
 
 def again(name: str, server: Server, killed: int) -> None:
