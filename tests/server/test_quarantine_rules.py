@@ -229,6 +229,18 @@ def test_released_and_dropped_by_hand():
         hull.put(SQUARE, drops=PackedKeys.pack(["g"]))
 
 
+def test_released_together_with_and_without_times():
+    hull = Hull(QuarantineRules(max_growth=1.5))
+    hull.put(SQUARE)
+    hull.put([("e", 99, 0, None), ("a", -99, 0, None)])
+    hull.put([("f", 0, 99, 7)])
+    hull.restart()
+    result = hull.ask(releases=["e", "f", "a"])
+    assert (result.released, result.inserted, result.moved) == (3, 2, 1)
+    assert hull.state.entities().times.tolist() == [NO_TIME] * 5 + [START + 7 * SECOND]
+    hull.restart()
+
+
 def test_a_key_that_is_only_held_can_be_removed():
     hull = Hull(QuarantineRules(max_growth=1.5))
     hull.put(SQUARE)

@@ -424,10 +424,9 @@ class Keyed:
             written = self._written(rows)
         put = NOTHING_PUT
         if len(rows.keys):  # otherwise a hull by event time would ask for times
-            moments = None if times is None else library_times(times)
-            put = hull.update(rows.keys, rows.points, moments, only=rows.condition)
+            put = _update(hull, rows, rows.points)
             if mirror is not None:
-                mirror.plane.update(rows.keys, mirror.project(rows.points), moments, only=rows.condition)
+                _update(mirror.plane, rows, mirror.project(rows.points))
         if times is not None:
             self._note_times(times)
         if written is not None:
@@ -552,6 +551,20 @@ class Keyed:
 
     def _no_keys(self) -> Keys:
         return PackedKeys(b"", b"") if self._kind == "str" else np.empty(0, np.uint64)
+
+
+def _update(hull: AnyKeyedHull, rows: KeyRows, points: Points) -> Put:
+    """Put the keys of a change at points."""
+    keys, times, only = rows.keys, rows.times, rows.condition
+    if times is None:
+        return hull.update(keys, points, None, only=only)
+    dated = times != NO_TIME
+    if dated.all():
+        return hull.update(keys, points, library_times(times), only=only)
+    # Released together: some were held with a time, some without.
+    with_time = hull.update(select_keys(keys, dated), points[dated], library_times(times[dated]), only=only)
+    without = hull.update(select_keys(keys, ~dated), points[~dated], None, only=only)
+    return Put(*map(sum, zip(with_time, without, strict=True)))
 
 
 def stored_times(times: npt.NDArray[np.float64]) -> Times:
