@@ -70,8 +70,12 @@ function draw_marks(canvas, {view, hulls, fences, colours}) {
   }
 }
 // The name above or below each area, or in its middle: where there is room; else above or below, over points.
-function draw_fence_names(canvas, {view, hulls, fences, taken, colours}) {
+function draw_fence_names(canvas, {view, hulls, fences, taken, colours, rings}) {
   const names = new Boxes()
+  for (const {across, down, radius, box} of rings) {
+    names.add(square_box(across, down, radius))
+    names.add(box)
+  }
   canvas.font = NAME_FONT
   canvas.textAlign = "center"
   canvas.lineWidth = 3
