@@ -7,7 +7,7 @@ import os
 import signal
 import socket
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from itertools import count
 from multiprocessing.process import BaseProcess
 from typing import Any, cast
@@ -122,15 +122,18 @@ class ChildProcess:
 
     async def _live(self) -> int:
         """Start it, and listen to it until it ends. Returns its exit code, negative for a signal."""
-        ours, theirs = socket.socketpair()
-        try:
-            with theirs:
-                process = PROCESSES.Process(target=child.main, args=(theirs,), name=self.name)
-                process.start()
-        except OSError as error:  # no processes or no memory: for the moment, or for good
-            ours.close()
-            log.error("a process cannot be started", extra={"failed": self.name, "reason": str(error)})
-            return os.EX_OSERR
+        with ExitStack() as failed:
+            try:
+                ours, theirs = socket.socketpair()
+                failed.callback(ours.close)
+                with theirs:
+                    process = PROCESSES.Process(target=child.main, args=(theirs,), name=self.name)
+                    process.start()
+            except (OSError, EOFError) as error:  # no descriptors, processes or memory: for the moment, or for good
+                reason = str(error) or "the process that forks others has ended"
+                log.error("a process cannot be started", extra={"failed": self.name, "reason": reason})
+                return os.EX_OSERR
+            failed.pop_all()
         self._process = process
         self._ended = ended = asyncio.get_running_loop().create_future()
         self.starts += 1

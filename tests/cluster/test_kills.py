@@ -1,6 +1,7 @@
 """Processes that are killed: what goes on, what comes back, and what is refused."""
 
 import os
+import resource
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -121,6 +122,21 @@ def reaches(client: HullClient) -> bool:
     except UnavailableError:
         return False
     return True
+
+
+def test_a_supervisor_without_descriptors_starts_a_process_once_there_are_some(server: Server) -> None:
+    supervisor = server.process.pid
+    before = resource.prlimit(supervisor, resource.RLIMIT_NOFILE)
+    worker = processes(supervisor)["worker-0"]
+    with HullClient(server.address) as client:
+        resource.prlimit(supervisor, resource.RLIMIT_NOFILE, (3, before[1]))
+        os.kill(worker, signal.SIGKILL)
+        wait_until(lambda: "worker-0" not in processes(supervisor))
+        for _ in range(50):  # the others go on, while it tries
+            client.get_hull(NAMES[1])
+        resource.prlimit(supervisor, resource.RLIMIT_NOFILE, before)
+        again("worker-0", server, worker)
+        wait_until(lambda: reaches(client))
 
 
 def test_all_processes_are_restarted_one_at_a_time(server: Server) -> None:

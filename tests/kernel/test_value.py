@@ -85,3 +85,19 @@ def test_a_number_that_is_not_a_double_is_still_checked(hull):
     assert (float(2**53), float(-(2**53))) in hull
     hull.insert(-0.0, 0.5)
     assert str(hull.points()[np.flatnonzero(hull.points()[:, 1] == 0.5)[0], 0]) == "0.0"
+
+
+def test_a_thread_that_has_a_hull_at_the_end_of_its_program_is_no_complaint():
+    """It is never destroyed, which nanobind would take for a fault of the bindings."""
+    program = """
+import threading
+from dynhull import DynamicHull
+def hold(hull, held):
+    held.set()
+    threading.Event().wait()
+held = threading.Event()
+threading.Thread(target=hold, args=(DynamicHull([[0, 0]]), held), daemon=True).start()
+held.wait()
+"""
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("", "")

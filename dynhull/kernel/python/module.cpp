@@ -341,6 +341,7 @@ void add_fork_hooks(nb::module_& module) {
 }  // namespace dynhull
 
 NB_MODULE(_kernel, module) {
+  nanobind::set_leak_warnings(false);  // a daemon thread that has a hull at the end of its program is no fault
   module.doc() = "The hull tree in C++, with the same results as the one in Python.";
   nanobind::register_exception_translator(dynhull::translate_broken_invariant);
   dynhull::add_hull_tree(module);
